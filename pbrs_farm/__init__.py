@@ -36,9 +36,9 @@ if TYPE_CHECKING:
     from pbrs_farm.scene.pictures import film as film
     from pbrs_farm.scene.pictures import render as render
     from pbrs_farm.scene.pictures import render_homes as render_homes
-    from pbrs_farm.study.packing.pack_shards import pack as pack
-    from pbrs_farm.study.packing.packing_plan import Packing as Packing
     from pbrs_farm.views.open_views import open_views as open
+    from pbrs_farm.views.packing.pack_shards import pack as pack
+    from pbrs_farm.views.packing.packing_plan import Packing as Packing
     from pbrs_farm.views.view_sample import SampleRequest as SampleRequest
     from pbrs_farm.views.views import Frame as Frame
 
@@ -57,7 +57,7 @@ _PUBLIC: Final = {
     "Frame": "pbrs_farm.views.views:Frame",
     "Home": "pbrs_farm.scene.home:Home",
     "Model": "pbrs_farm.scene.models:Model",
-    "Packing": "pbrs_farm.study.packing.packing_plan:Packing",
+    "Packing": "pbrs_farm.views.packing.packing_plan:Packing",
     "Recipe": "pbrs_farm.core.recipe:Recipe",
     "SampleRequest": "pbrs_farm.views.view_sample:SampleRequest",
     "export_views": "pbrs_farm.export.export_views:export",
@@ -66,7 +66,7 @@ _PUBLIC: Final = {
     "make": "pbrs_farm.scene.home:make",
     "model": "pbrs_farm.scene.models:model",
     "models": "pbrs_farm.scene.models:models",
-    "pack": "pbrs_farm.study.packing.pack_shards:pack",
+    "pack": "pbrs_farm.views.packing.pack_shards:pack",
     "open": "pbrs_farm.views.open_views:open_views",
     "render": "pbrs_farm.scene.pictures:render",
     "render_homes": "pbrs_farm.scene.pictures:render_homes",

@@ -1,4 +1,4 @@
-"""Opens files that strangers name: regular ones of bounded size, nothing else. Effect: reads files.
+"""Opens files that strangers name: regular ones of bounded size, nothing else; writes folders whole. Effect: reads and writes files.
 
 The one way in for every file that a user hands over. A device has no end, a pipe may never answer,
 and a file larger than its limit would fill the memory: each is an OSError whose strerror says so.
@@ -10,6 +10,7 @@ import codecs
 import errno
 import hashlib
 import os
+import shutil
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -129,3 +130,26 @@ def fault_of(error: OSError) -> str:
     if isinstance(error, FileNotFoundError):
         return "no such file"
     return f"cannot be read: {error.strerror or 'the system gave no reason'}"
+
+
+@contextmanager
+def new_folder(out: Path) -> Iterator[Path]:
+    """Yield a temporary folder that is renamed to out at the end, or removed on any error.
+
+    Raises BadInput if out has contents, or cannot be written.
+    """
+    if out.exists() and (not out.is_dir() or any(out.iterdir())):
+        raise BadInput(out, "", "is there already", hint="name a new folder")
+    # Write beside it, on the same file system, then rename.
+    scratch = out.with_name(f".{out.name}.partial")
+    shutil.rmtree(scratch, ignore_errors=True)
+    try:
+        scratch.mkdir(parents=True)
+        yield scratch
+        if out.exists():
+            out.rmdir()  # empty, as checked above
+        scratch.rename(out)
+    except OSError as error:
+        raise BadInput(out, "", f"cannot be written: {error.strerror or error}") from error
+    finally:
+        shutil.rmtree(scratch, ignore_errors=True)

@@ -23,10 +23,10 @@ from benchmarks.figures import write_report
 from pbrs_farm.core.house import House, Item
 from pbrs_farm.core.made_home import MadeHome
 from pbrs_farm.core.recipe import recipe_from_name
-from pbrs_farm.dress.things import case_goods, hung, radiators
-from pbrs_farm.dress.things.families import families
-from pbrs_farm.dress.things.maker import Family, Thing, described_in
-from pbrs_farm.dress.things.things import THINGS
+from pbrs_farm.furnishings.things import case_goods, hung, radiators
+from pbrs_farm.furnishings.things.families import families
+from pbrs_farm.furnishings.things.maker import Family, Thing, described_in
+from pbrs_farm.furnishings.things.things import THINGS
 
 FOLDER: Final = Path("out/bench/variety")
 FIRST_SEED: Final = 61001

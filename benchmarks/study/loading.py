@@ -15,8 +15,8 @@ from pathlib import Path
 import pbrs_farm
 from benchmarks.figures import write_report
 from benchmarks.study.rendered import FOLDER
-from pbrs_farm.study.packing.pack_shards import pack
-from pbrs_farm.study.packing.packing_plan import Packing
+from pbrs_farm.views.packing.pack_shards import pack
+from pbrs_farm.views.packing.packing_plan import Packing
 from pbrs_farm.views.view_sample import SampleRequest
 from pbrs_farm.views.views import Views
 

@@ -18,7 +18,7 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.frames import LUMINANCE
 from pbrs_farm.core.house import House, geometry_from_house
 from pbrs_farm.core.recipe import Recipe, recipe_from_name
-from pbrs_farm.dress.surroundings import with_surroundings
+from pbrs_farm.furnishings.surroundings import with_surroundings
 from pbrs_farm.prepare.read_source import read_house
 from pbrs_farm.prepare.source import resolve
 from pbrs_farm.raycast.caster import Caster

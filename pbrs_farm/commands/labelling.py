@@ -123,9 +123,9 @@ def _export_homes(args: argparse.Namespace) -> int:
 
 def _pack_views(args: argparse.Namespace) -> int:
     from pbrs_farm.core.house_split import shares_from_text
-    from pbrs_farm.study.packing.pack_shards import pack
-    from pbrs_farm.study.packing.packing_plan import Packing
     from pbrs_farm.views.open_views import open_views
+    from pbrs_farm.views.packing.pack_shards import pack
+    from pbrs_farm.views.packing.packing_plan import Packing
     from pbrs_farm.views.view_sample import LAYERS
 
     colour, _, quality = args.colour.partition(":")

@@ -45,8 +45,8 @@ from pbrs_farm.run.request import (
     wanted_of,
 )
 from pbrs_farm.sets.data_set import SHIPPED, DataSet, SetCard, SetForm, SetPart, shipped_sets
-from pbrs_farm.study.packing.packing_plan import FORMS, Packing
 from pbrs_farm.truth.optional_layers import check_lens
+from pbrs_farm.views.packing.packing_plan import FORMS, Packing
 from pbrs_farm.views.view_sample import LAYERS
 
 _ENDING: Final = ".toml"

@@ -223,7 +223,7 @@ class ModelPose:
 
 
 OUTSIDE: Final = "outside"
-"""Tag of an item that lies before the windows (dress/surroundings): seen, and no part of the home.
+"""Tag of an item that lies before the windows (furnishings/surroundings): seen, and no part of the home.
 
 Light of rooms is made of what windows see of it; labels and pictures have it behind glass.
 """

@@ -99,7 +99,7 @@ def marks_in_digest(group: str, names: Iterable[str]) -> list[str]:
 
     The one way in which a plugin becomes part of a digest, so that its next version makes anew what
     it made: of `homes` and `readers` in the source (prepare/source.py), of `passes` in the house
-    (prepare/passes.py), of `furniture` in the catalogue (dress/things/families.py), of `cameras`,
+    (prepare/passes.py), of `furniture` in the catalogue (furnishings/things/families.py), of `cameras`,
     `layers` and `pictures` in their steps (run/step_cache.py).
     Raises MachineFailed for a name that no installed plugin has.
     """

@@ -38,7 +38,7 @@ from pbrs_farm.dress.part_kinds import (
     metal_of,
 )
 from pbrs_farm.dress.style import COLOURS, METALS, WOODS, Rgb, Style, Wood
-from pbrs_farm.dress.textures.families import SEEDS, Pattern, pattern_material, photographed
+from pbrs_farm.furnishings.textures.families import SEEDS, Pattern, pattern_material, photographed
 
 PASS: Final = "parts"
 _LEAST_BOARD_M2: Final = 0.05  # smaller parts of no known kind stay as they are: knobs, feet

@@ -26,9 +26,9 @@ from pbrs_farm.core.house import (
 )
 from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.style import style_for
-from pbrs_farm.dress.things.assembly import Model
-from pbrs_farm.dress.things.families import family_pieces, family_shape
-from pbrs_farm.dress.things.things import THINGS
+from pbrs_farm.furnishings.things.assembly import Model
+from pbrs_farm.furnishings.things.families import family_pieces, family_shape
+from pbrs_farm.furnishings.things.things import THINGS
 from pbrs_farm.geometry.free_air import FreeAir, mean_shadow_m2, shadow_for_share
 from pbrs_farm.geometry.moving import moved_item
 from pbrs_farm.home.room_use import MIN_LIVED_IN_M2, is_outdoors

@@ -25,10 +25,10 @@ from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.room_floor import LOWER_M, OUT_M, FloorSpot, RoomFloor, spot_at
 from pbrs_farm.dress.space import RoomSpace, house_space
 from pbrs_farm.dress.style import Style, room_style
-from pbrs_farm.dress.things import case_goods
-from pbrs_farm.dress.things.assembly import Model
-from pbrs_farm.dress.things.case_goods import CASE_GOODS
 from pbrs_farm.dress.walls.hanging import next_id
+from pbrs_farm.furnishings.things import case_goods
+from pbrs_farm.furnishings.things.assembly import Model
+from pbrs_farm.furnishings.things.case_goods import CASE_GOODS
 from pbrs_farm.geometry.swept import swept_by
 from pbrs_farm.home.room_use import RoomKind, is_cooked_in
 

@@ -13,10 +13,10 @@ from pbrs_farm.dress.box_mapping import box_mapped
 from pbrs_farm.dress.finishes import grain_pattern
 from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.style import COLOURS, Rgb, Style, mix
-from pbrs_farm.dress.textures.families import pattern_material, photographed
-from pbrs_farm.dress.things.assembly import Model
-from pbrs_farm.dress.things.case_goods import Boards
-from pbrs_farm.dress.things.materials import plain
+from pbrs_farm.furnishings.textures.families import pattern_material, photographed
+from pbrs_farm.furnishings.things.assembly import Model
+from pbrs_farm.furnishings.things.case_goods import Boards
+from pbrs_farm.furnishings.things.materials import plain
 
 _WHITE: Rgb = (0.9, 0.9, 0.88)
 

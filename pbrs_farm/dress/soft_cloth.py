@@ -27,8 +27,8 @@ from pbrs_farm.dress.finishes import tinted
 from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.part_kinds import PartKind, kind_by_name
 from pbrs_farm.dress.style import Rgb, Style, mix
-from pbrs_farm.dress.textures.families import Pattern, pattern_material, photographed
-from pbrs_farm.dress.textures.wallpaper import PATTERNS
+from pbrs_farm.furnishings.textures.families import Pattern, pattern_material, photographed
+from pbrs_farm.furnishings.textures.wallpaper import PATTERNS
 
 PASS: Final = "cloth"
 

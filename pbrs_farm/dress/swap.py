@@ -40,7 +40,7 @@ from pbrs_farm.dress.old_place import (
 )
 from pbrs_farm.dress.style import Style
 from pbrs_farm.dress.surfaces.skirting import BASEBOARD
-from pbrs_farm.dress.things.assembly import GENERATED
+from pbrs_farm.furnishings.things.assembly import GENERATED
 from pbrs_farm.geometry.surface_points import item_triangles
 from pbrs_farm.home.room_use import is_outdoors
 

@@ -10,11 +10,11 @@ from pathlib import Path
 
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house import House
-from pbrs_farm.export.form import HomeForm, form_names, form_of, new_folder
+from pbrs_farm.export.form import HomeForm, form_names, form_of
 from pbrs_farm.export.grasps import GRASPS, grasps_json
 from pbrs_farm.export.home_pieces import ExportedHome, exported_home
 from pbrs_farm.formats.house_bundle import house_from_bundle
-from pbrs_farm.regular_files import MAX_SCENE_BYTES, fault_of, read_regular
+from pbrs_farm.regular_files import MAX_SCENE_BYTES, fault_of, new_folder, read_regular
 
 
 def export_homes(folder: Path, out: Path, name: str) -> tuple[int, int, list[str]]:

@@ -18,17 +18,10 @@ from pbrs_farm.core.checked_calls import as_words, checked_call
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house_split import SPLITS, SplitShares, split_of_house
 from pbrs_farm.export.chosen_view import Choice, ChosenView
-from pbrs_farm.export.form import (
-    LEFT_OUT,
-    REMARKS,
-    ViewForm,
-    form_of,
-    forms_with_classes,
-    new_folder,
-)
+from pbrs_farm.export.form import LEFT_OUT, REMARKS, ViewForm, form_of, forms_with_classes
 from pbrs_farm.formats.class_map import class_map
 from pbrs_farm.formats.output_folder import ViewEntry, views_of
-from pbrs_farm.regular_files import fault_of, read_regular
+from pbrs_farm.regular_files import fault_of, new_folder, read_regular
 
 if TYPE_CHECKING:
     from pbrs_farm.views.views import Views

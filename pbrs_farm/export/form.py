@@ -1,16 +1,14 @@
 """What a form of export is, and the table of all forms: the modules of `forms/` and plugins.
 
-Effects: a form's module is imported when it is first asked for; new_folder writes. The table of
+Effects: a form's module is imported when it is first asked for. The table of
 docs/formats/export.md is printed from it (`python -m pbrs_farm.export.form`).
 """
 
 from __future__ import annotations
 
 import pkgutil
-import shutil
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -173,29 +171,6 @@ def name_left_out(out: Path, views: list[ChosenView], why: str) -> int:
     lines = [f"{view.house.id}/{view.id}: {why}\n" for view in views]
     (out / LEFT_OUT).write_text("".join(lines), "utf-8")
     return 1
-
-
-@contextmanager
-def new_folder(out: Path) -> Iterator[Path]:
-    """A folder beside out that becomes out at the end, and is removed on any error.
-
-    Raises BadInput where out holds something, or cannot be written.
-    """
-    if out.exists() and (not out.is_dir() or any(out.iterdir())):
-        raise BadInput(out, "", "is there already", hint="name a new folder")
-    # Write beside it, on the same file system, then rename.
-    scratch = out.with_name(f".{out.name}.partial")
-    shutil.rmtree(scratch, ignore_errors=True)
-    try:
-        scratch.mkdir(parents=True)
-        yield scratch
-        if out.exists():
-            out.rmdir()  # empty, as checked above
-        scratch.rename(out)
-    except OSError as error:
-        raise BadInput(out, "", f"cannot be written: {error.strerror or error}") from error
-    finally:
-        shutil.rmtree(scratch, ignore_errors=True)
 
 
 if __name__ == "__main__":

@@ -83,7 +83,7 @@ def _stamp(path: Path) -> int:
 
 @lru_cache(maxsize=4)
 def _catalogue(given: tuple[tuple[Path, int], ...], has_package: bool | None) -> Catalogue:
-    from pbrs_farm.dress.things.families import with_families
+    from pbrs_farm.furnishings.things.families import with_families
 
     catalogue = with_families(_of_libraries(given, has_package))
     return replace(catalogue, painted_folder=cache_folder() / "painted")

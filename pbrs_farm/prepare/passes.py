@@ -141,7 +141,7 @@ def _has_floating_things(source: SourceRef, recipe: Recipe) -> bool:
 
 
 def _float_depends(source: SourceRef, recipe: Recipe) -> list[object]:
-    from pbrs_farm.dress.things.families import families_digest
+    from pbrs_farm.furnishings.things.families import families_digest
 
     # What is generated for dressing hangs in the air, too.
     things = [families_digest(), PASS["dress"].version]
@@ -293,7 +293,7 @@ def _float(work: Preparation) -> Preparation:
 
 def _surround(work: Preparation) -> Preparation:
     """Streets, gardens and courts before the windows."""
-    from pbrs_farm.dress.surroundings import with_surroundings
+    from pbrs_farm.furnishings.surroundings import with_surroundings
 
     recipe = work.recipe
     return replace(

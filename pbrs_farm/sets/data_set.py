@@ -16,7 +16,7 @@ from pbrs_farm.core.number_ranges import range_of
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.export.chosen_view import Choice
 from pbrs_farm.run.request import Wanted
-from pbrs_farm.study.packing.packing_plan import Packing
+from pbrs_farm.views.packing.packing_plan import Packing
 
 SHIPPED: Final = Path(__file__).parent
 """Where the sets lie that come with the package: indoor-1k.toml and others."""

@@ -38,8 +38,8 @@ from pbrs_farm.sets.set_card import card_text
 from pbrs_farm.store import StoreSettings
 from pbrs_farm.store.folder import FolderStore
 from pbrs_farm.store.object_store import get_or_none
-from pbrs_farm.study.packing.pack_shards import pack
 from pbrs_farm.views.open_views import open_views
+from pbrs_farm.views.packing.pack_shards import pack
 
 SUMS: Final = "SHA256SUMS"
 _PARTS: Final = "parts"

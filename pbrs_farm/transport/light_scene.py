@@ -373,7 +373,7 @@ class LightScene:
 
     def _render_scalar(self, camera: Camera, fields: LightFields, seed: int) -> LightResult:
         """Both groups by Mitsuba's own plugins: scalar variants have no arrays for our kernels."""
-        from pbrs_farm.transport.validation.mitsuba_reference import ReferenceScene
+        from pbrs_farm.transport.scalar_scene import ScalarScene
 
         if not camera.intrinsics.lens.is_pinhole or camera.blur is not None:
             text = (
@@ -385,7 +385,7 @@ class LightScene:
             hint = "sudo apt-get install -y libllvm19, or --groups two"
             raise MachineFailed(text, hint=hint)
         # Render two half buffers of each group, with seeds of their own, for the noise estimate.
-        scene = ReferenceScene(self.tables, self.sky, self.variant)
+        scene = ScalarScene(self.tables, self.sky, self.variant)
         half = fields.model_copy(update={"spp": max(fields.spp // 2, 1)})
         halves = {
             g: tuple(scene.render(camera, g, half, seed + 2 * k + j) for j in range(2))

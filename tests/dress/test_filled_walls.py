@@ -13,7 +13,7 @@ from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.room_floor import RoomFloor
 from pbrs_farm.dress.space import house_space
 from pbrs_farm.dress.space.wall_faces import WallFace
-from pbrs_farm.dress.things.families import with_families
+from pbrs_farm.furnishings.things.families import with_families
 from pbrs_farm.read.builtin.builtin_home import builtin_home
 
 CATALOGUE = with_families(EMPTY)

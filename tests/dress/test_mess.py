@@ -31,7 +31,7 @@ from pbrs_farm.dress.gates import keep_gates
 from pbrs_farm.dress.mess import move_chairs, tilt_pictures
 from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.style import style_for
-from pbrs_farm.dress.things.book_covers import book_covers
+from pbrs_farm.furnishings.things.book_covers import book_covers
 from pbrs_farm.geometry.heights import highest_below
 from pbrs_farm.geometry.plan_grid import PlanGrid
 from pbrs_farm.geometry.scene_triangles import SceneTriangles

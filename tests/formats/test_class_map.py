@@ -7,8 +7,8 @@ import pbrs_farm
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.formats.class_map import class_map
 from pbrs_farm.store.folder import FolderStore
-from pbrs_farm.study.packing.pack_shards import pack
-from pbrs_farm.study.packing.packing_plan import Packing
+from pbrs_farm.views.packing.pack_shards import pack
+from pbrs_farm.views.packing.packing_plan import Packing
 from tests.check.roots import make_root
 from tests.views.small_roots import fill
 

@@ -11,8 +11,8 @@ from pbrs_farm.core.catalogue import EMPTY, Catalogue, Piece, Place, Shape
 from pbrs_farm.core.house import House, ItemKind, Material, Surface
 from pbrs_farm.core.made_home import MadeHome
 from pbrs_farm.core.recipe import ReadFields
-from pbrs_farm.dress.things.families import with_families
 from pbrs_farm.formats.house_bundle import bundle_from_house
+from pbrs_farm.furnishings.things.families import with_families
 from pbrs_farm.generate.drawn_plan import drawn_plan
 from pbrs_farm.generate.floor_plan import PlacedPiece, Storey
 from pbrs_farm.generate.generated_home import generate_home

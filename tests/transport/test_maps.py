@@ -16,11 +16,11 @@ from pbrs_farm.core.lighting import Group
 from pbrs_farm.core.recipe import LightFields
 from pbrs_farm.raycast.variant import choose_variant, mitsuba
 from pbrs_farm.transport.light_scene import LightScene
+from pbrs_farm.transport.scalar_scene import ScalarScene
 from pbrs_farm.transport.scene_tables.sky import Sky, dark_sky, uniform_sky
 from pbrs_farm.transport.validation import known_rooms as rooms
 from pbrs_farm.transport.validation.claims import blocks, z_scores
 from pbrs_farm.transport.validation.known_rooms import furnace
-from pbrs_farm.transport.validation.mitsuba_reference import ReferenceScene
 from tests.transport.metropolis.test_metropolis import METROPOLIS
 from tests.transport.test_path_tracer import FIELDS, RECIPE
 
@@ -174,7 +174,7 @@ def test_bumpy_matte_walls_agree_with_mitsubas_normalmap(group: Group) -> None:
     house, camera = mapped_room(roughness_texture_id=None)
     camera = rooms.camera((2.0, 2.3, 2.6), (2.0, 0.0, 2.0), 32, 24, 0.8)
     scene = LightScene.load(house, MAPS, RECIPE, uniform_sky((1, 1, 1)))
-    other = ReferenceScene(scene.tables, scene.sky, scene.variant)
+    other = ScalarScene(scene.tables, scene.sky, scene.variant)
     fields = FIELDS.model_copy(update={"spp": 256, "pilot_spp": 4, "max_depth": 2})
     ours = [blocks(scene.render(camera, "0_0", fields, k).group(group)) for k in range(4)]
     theirs = [blocks(other.render(camera, group, fields, 100 + k)) for k in range(4)]
@@ -192,7 +192,7 @@ def test_bumpy_metal_of_mapped_roughness_agrees_with_mitsubas_roughconductor() -
     house, _camera = mapped_room(**metal)
     camera = rooms.camera((2.0, 2.3, 2.6), (2.0, 0.0, 2.0), 32, 24, 0.8)
     scene = LightScene.load(house, MAPS, RECIPE, uniform_sky((1, 1, 1)))
-    other = ReferenceScene(scene.tables, scene.sky, scene.variant)
+    other = ScalarScene(scene.tables, scene.sky, scene.variant)
     fields = FIELDS.model_copy(update={"spp": 512, "pilot_spp": 4, "max_depth": 2})
     ours = np.mean([blocks(scene.render(camera, "0_0", fields, k).indoor) for k in range(4)], 0)
     theirs = np.mean([blocks(other.render(camera, Group.INDOOR, fields, k)) for k in range(4)], 0)

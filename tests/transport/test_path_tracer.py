@@ -18,13 +18,13 @@ from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.raycast.variant import choose_variant, mitsuba
 from pbrs_farm.transport.light_result import LightResult
 from pbrs_farm.transport.light_scene import LightScene
+from pbrs_farm.transport.scalar_scene import ScalarScene
 from pbrs_farm.transport.scene_tables.material_rows import FIRST_TEXEL, material_rows
 from pbrs_farm.transport.scene_tables.sky import Sky, dark_sky, sunsky, uniform_sky
 from pbrs_farm.transport.scene_tables.texture_atlas import texture_atlas
 from pbrs_farm.transport.validation import known_rooms as rooms
 from pbrs_farm.transport.validation.claims import blocks, z_scores
 from pbrs_farm.transport.validation.known_rooms import furnace
-from pbrs_farm.transport.validation.mitsuba_reference import ReferenceScene
 from pbrs_farm.truth.surface_layers import albedo_label
 
 pytestmark = pytest.mark.skipif(
@@ -155,7 +155,7 @@ def test_pictures_agree_with_mitsubas_own_path_integrator(group: Group) -> None:
     house, camera = rooms.window_room(0.6, lumen=800)
     sky = sunsky(RECIPE, elevation_rad=0.7, azimuth_rad=2.0)
     scene = LightScene.load(house, {}, RECIPE, replace(sky, sun_irradiance=np.zeros(3)))
-    other = ReferenceScene(scene.tables, scene.sky, scene.variant)
+    other = ScalarScene(scene.tables, scene.sky, scene.variant)
     fields = FIELDS.model_copy(update={"spp": 128, "pilot_spp": 4})
     ours = [blocks(scene.render(camera, "0_0", fields, k).group(group)) for k in range(4)]
     theirs = [blocks(other.render(camera, group, fields, 100 + k)) for k in range(4)]

@@ -13,8 +13,8 @@ from pbrs_farm.images import png_from_array
 from pbrs_farm.store import MemoryStore
 from pbrs_farm.store.folder import FolderStore
 from pbrs_farm.store.s3 import S3Settings, S3Store
-from pbrs_farm.study.packing.pack_shards import pack
-from pbrs_farm.study.packing.packing_plan import Packing
+from pbrs_farm.views.packing.pack_shards import pack
+from pbrs_farm.views.packing.packing_plan import Packing
 from pbrs_farm.views.view_sample import LAYERS, SampleRequest
 from tests.check.roots import make_root
 from tests.views.small_roots import MODES, SIZE, arrays_of_view, fill, remove

@@ -21,9 +21,9 @@ from pbrs_farm.dress.clutter.cushions import (
 )
 from pbrs_farm.dress.clutter.placing import Placing
 from pbrs_farm.dress.supports import plan_turn
-from pbrs_farm.dress.things import soft
-from pbrs_farm.dress.things.assembly import Model
-from pbrs_farm.dress.things.bodies import smooth
+from pbrs_farm.furnishings.things import soft
+from pbrs_farm.furnishings.things.assembly import Model
+from pbrs_farm.furnishings.things.bodies import smooth
 from pbrs_farm.geometry.heights import highest_below
 from pbrs_farm.geometry.plan_grid import PlanGrid, top_heights
 from pbrs_farm.geometry.scene_triangles import SceneTriangles

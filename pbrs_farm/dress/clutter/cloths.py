@@ -15,8 +15,8 @@ from pbrs_farm.dress.clutter.drapes import Folds, Net, drape, flat_net, lie_flat
 from pbrs_farm.dress.clutter.placing import Placing
 from pbrs_farm.dress.style import Rgb, mix
 from pbrs_farm.dress.supports import plan_turn
-from pbrs_farm.dress.things.assembly import standing_piece
-from pbrs_farm.dress.things.materials import plain
+from pbrs_farm.furnishings.things.assembly import standing_piece
+from pbrs_farm.furnishings.things.materials import plain
 from pbrs_farm.geometry.heights import highest_below
 from pbrs_farm.geometry.plan_grid import PlanGrid
 from pbrs_farm.geometry.scene_triangles import SceneTriangles

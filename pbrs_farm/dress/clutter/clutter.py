@@ -25,8 +25,8 @@ from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.space.house_space import HouseSpace, RoomSpace, house_space
 from pbrs_farm.dress.style import Style, room_style
 from pbrs_farm.dress.supports import supports_of_item
-from pbrs_farm.dress.things.book_covers import book_covers
 from pbrs_farm.dress.worktop import Worktop
+from pbrs_farm.furnishings.things.book_covers import book_covers
 from pbrs_farm.geometry.scene_triangles import SceneTriangles
 from pbrs_farm.home.names import words_of_item
 from pbrs_farm.home.room_use import RoomKind

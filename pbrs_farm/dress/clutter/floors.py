@@ -24,8 +24,8 @@ from pbrs_farm.dress.space.floor_bitmaps import (
 )
 from pbrs_farm.dress.space.house_space import HouseSpace, RoomSpace
 from pbrs_farm.dress.supports import faces_around
-from pbrs_farm.dress.things.assembly import Model
 from pbrs_farm.dress.worktop import LIFT_M
+from pbrs_farm.furnishings.things.assembly import Model
 from pbrs_farm.geometry.plan_grid import PlanGrid
 from pbrs_farm.geometry.scene_triangles import SceneTriangles
 from pbrs_farm.geometry.swept import floor_swept

@@ -9,9 +9,9 @@ import numpy as np
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.dress.clutter.placing import Placing, take_for_room
 from pbrs_farm.dress.clutter.stock import CLUTTER, KindShares
-from pbrs_farm.dress.things.assembly import Model
-from pbrs_farm.dress.things.books import leaning_book, run_of_books, stack_of_books
 from pbrs_farm.dress.worktop import TopSpot, Worktop
+from pbrs_farm.furnishings.things.assembly import Model
+from pbrs_farm.furnishings.things.books import leaning_book, run_of_books, stack_of_books
 from pbrs_farm.home.room_use import RoomKind
 
 _LEAST_BOOK_M = 0.14  # free height that upright books need

@@ -12,10 +12,10 @@ from pbrs_farm.core.catalogue import Catalogue, Place, Shape
 from pbrs_farm.core.house import ItemKind
 from pbrs_farm.core.record import Record, Several, read_csv, read_toml
 from pbrs_farm.dress.style import Style
-from pbrs_farm.dress.things.assembly import Model
-from pbrs_farm.dress.things.book_covers import Covers
-from pbrs_farm.dress.things.books import magazines, open_book, stack_of_books
-from pbrs_farm.dress.things.things import THINGS
+from pbrs_farm.furnishings.things.assembly import Model
+from pbrs_farm.furnishings.things.book_covers import Covers
+from pbrs_farm.furnishings.things.books import magazines, open_book, stack_of_books
+from pbrs_farm.furnishings.things.things import THINGS
 from pbrs_farm.home.room_use import RoomKind
 
 # Faces of one small thing of a catalogue, where its kind gives no other limit.

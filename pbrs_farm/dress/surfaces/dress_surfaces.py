@@ -40,7 +40,7 @@ from pbrs_farm.dress.surfaces.home_finish import (
 from pbrs_farm.dress.surfaces.sided_walls import RoomFinder, SidedWall, sided_wall
 from pbrs_farm.dress.surfaces.skirting import BASEBOARD, has_boards, skirting_board, wall_plans
 from pbrs_farm.dress.surfaces.wall_materials import REVEAL, RestOfWall, RoomWalls, painted_wall
-from pbrs_farm.dress.textures.families import (
+from pbrs_farm.furnishings.textures.families import (
     Pattern,
     PatternMaterial,
     pattern_material,

@@ -21,9 +21,9 @@ from pbrs_farm.dress.style import (
     mix,
     rgb,
 )
-from pbrs_farm.dress.textures.families import SEEDS, Pattern
-from pbrs_farm.dress.textures.panelling import PANELS_M
-from pbrs_farm.dress.textures.wallpaper import PATTERNS, inks
+from pbrs_farm.furnishings.textures.families import SEEDS, Pattern
+from pbrs_farm.furnishings.textures.panelling import PANELS_M
+from pbrs_farm.furnishings.textures.wallpaper import PATTERNS, inks
 from pbrs_farm.home.room_use import RoomKind
 
 _T = TypeVar("_T")

@@ -12,7 +12,7 @@ from pbrs_farm.core.house import Item, Surface
 from pbrs_farm.core.mesh import unit_normals
 from pbrs_farm.dress.surfaces.cut_triangles import cut_triangles
 from pbrs_farm.dress.surfaces.sided_walls import Side, SidedWall
-from pbrs_farm.dress.textures.families import PatternMaterial
+from pbrs_farm.furnishings.textures.families import PatternMaterial
 
 REVEAL = "reveal"
 """Name of the faces by whose material repair paints the sides of openings."""

@@ -10,8 +10,6 @@ from pbrs_farm.core.catalogue import Catalogue, Piece, Shape
 from pbrs_farm.core.classes import MIRROR, SINK
 from pbrs_farm.dress.space import HouseSpace, Passage
 from pbrs_farm.dress.style import Rgb, Style, shade
-from pbrs_farm.dress.things import hung as hung_furniture
-from pbrs_farm.dress.things.assembly import Model
 from pbrs_farm.dress.walls.hanging import WANTS, Hanging, faces_behind
 from pbrs_farm.dress.walls.hung_things import (
     SWITCH_FORMS,
@@ -20,6 +18,8 @@ from pbrs_farm.dress.walls.hung_things import (
     jpeg_texture,
     mirror,
 )
+from pbrs_farm.furnishings.things import hung as hung_furniture
+from pbrs_farm.furnishings.things.assembly import Model
 from pbrs_farm.home.room_use import RoomKind
 
 _SWITCH_M, _SOCKET_M = 1.05, 0.3  # heights of their middles above the floor

@@ -13,13 +13,13 @@ from pbrs_farm.core.classes import BED
 from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.space import HouseSpace, WallFace, house_space
 from pbrs_farm.dress.style import Style
-from pbrs_farm.dress.things import hung as hung_furniture
 from pbrs_farm.dress.walls.fittings import fit_switches, hang_clock, hang_mirrors, hang_notes
 from pbrs_farm.dress.walls.hanging import WANTS, Hanging
 from pbrs_farm.dress.walls.kitchens import hang_kitchen
 from pbrs_farm.dress.walls.pictures import Gallery, hang_pictures, hang_pin_board
 from pbrs_farm.dress.walls.radiators import hang_radiators, wants_radiators
 from pbrs_farm.dress.walls.wall_shelves import hang_cloth, hang_shelves
+from pbrs_farm.furnishings.things import hung as hung_furniture
 from pbrs_farm.home.room_use import RoomKind, is_cooked_in
 
 _HOOKS_M: Final = 1.68  # height of the hook board's lower edge above the floor

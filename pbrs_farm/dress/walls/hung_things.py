@@ -17,9 +17,9 @@ from pbrs_farm.core.arrays import F64, Srgb8Image
 from pbrs_farm.core.classes import MIRROR, OTHERPROP, PICTURE
 from pbrs_farm.core.house import Material, MaterialKind, Surface, Texture
 from pbrs_farm.dress.style import Rgb, Style, shade
-from pbrs_farm.dress.things.assembly import Model, hanging_piece
-from pbrs_farm.dress.things.hung import facing_disc, ring
-from pbrs_farm.dress.things.materials import metal, plain
+from pbrs_farm.furnishings.things.assembly import Model, hanging_piece
+from pbrs_farm.furnishings.things.hung import facing_disc, ring
+from pbrs_farm.furnishings.things.materials import metal, plain
 from pbrs_farm.geometry.solids import box, quads_surface
 from pbrs_farm.images import jpeg_from_array
 

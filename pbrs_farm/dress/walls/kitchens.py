@@ -9,10 +9,10 @@ import numpy as np
 from pbrs_farm.core.classes import CABINET, COUNTER, OTHERFURNITURE, SHELVES, SINK
 from pbrs_farm.dress.space import HouseSpace
 from pbrs_farm.dress.style import Style, mix
-from pbrs_farm.dress.things import hung as hung_furniture
-from pbrs_farm.dress.things.materials import plain
 from pbrs_farm.dress.walls.hanging import Hanging, faces_behind
 from pbrs_farm.dress.walls.hung_things import CUPBOARD_FORMS
+from pbrs_farm.furnishings.things import hung as hung_furniture
+from pbrs_farm.furnishings.things.materials import plain
 from pbrs_farm.home.names import words_of_item
 from pbrs_farm.home.room_use import RoomKind
 

@@ -16,11 +16,11 @@ from pbrs_farm.core.house import Material, Texture
 from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.space import HouseSpace
 from pbrs_farm.dress.style import Rgb, Style, room_style
-from pbrs_farm.dress.things import hung as hung_furniture
-from pbrs_farm.dress.things.assembly import Model
 from pbrs_farm.dress.walls.hanging import IN_FRONT_M, WANTS, Hanging, faces_behind
 from pbrs_farm.dress.walls.hung_things import canvas, frame_material, framed, jpeg_texture, poster
-from pbrs_farm.dress.walls.prints import print_pixels
+from pbrs_farm.furnishings.prints import print_pixels
+from pbrs_farm.furnishings.things import hung as hung_furniture
+from pbrs_farm.furnishings.things.assembly import Model
 from pbrs_farm.home.room_use import RoomKind
 from pbrs_farm.images import decode_photo
 

@@ -9,9 +9,9 @@ from pbrs_farm.dress.finish_scheme import finish_scheme
 from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.style import Style
 from pbrs_farm.dress.surface_finishes import material_of_finish
-from pbrs_farm.dress.things import radiators
-from pbrs_farm.dress.things.assembly import Model
 from pbrs_farm.dress.walls.hanging import Hanging
+from pbrs_farm.furnishings.things import radiators
+from pbrs_farm.furnishings.things.assembly import Model
 from pbrs_farm.home.names import RADIATORS, words_of_item
 from pbrs_farm.home.room_use import RoomKind
 

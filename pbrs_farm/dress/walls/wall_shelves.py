@@ -9,15 +9,15 @@ import numpy as np
 from pbrs_farm.core.classes import OTHERPROP
 from pbrs_farm.core.house import Material
 from pbrs_farm.dress.style import Style
-from pbrs_farm.dress.textiles.rug_patterns import RUGS, rug_pixels
-from pbrs_farm.dress.things import hung as hung_furniture
-from pbrs_farm.dress.things import radiators
-from pbrs_farm.dress.things.assembly import Model, Part, hanging_piece, transformed
-from pbrs_farm.dress.things.bodies import revolve
-from pbrs_farm.dress.things.materials import plain
 from pbrs_farm.dress.walls.fittings import hang_anywhere
 from pbrs_farm.dress.walls.hanging import IN_FRONT_M, WANTS, Hanging
 from pbrs_farm.dress.walls.hung_things import CUPBOARD_FORMS, faced_slab, jpeg_texture
+from pbrs_farm.furnishings.textiles.rug_patterns import RUGS, rug_pixels
+from pbrs_farm.furnishings.things import hung as hung_furniture
+from pbrs_farm.furnishings.things import radiators
+from pbrs_farm.furnishings.things.assembly import Model, Part, hanging_piece, transformed
+from pbrs_farm.furnishings.things.bodies import revolve
+from pbrs_farm.furnishings.things.materials import plain
 from pbrs_farm.home.room_use import RoomKind
 
 _RADIATORS: Final = 0.65  # share of bathrooms with a towel radiator

@@ -19,7 +19,7 @@ from pbrs_farm.dress.clutter.stock import Stock, is_known
 from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.style import style_for
 from pbrs_farm.dress.supports import supports_of_item
-from pbrs_farm.dress.things.book_covers import book_covers
+from pbrs_farm.furnishings.things.book_covers import book_covers
 from pbrs_farm.geometry.scene_triangles import SceneTriangles
 from pbrs_farm.geometry.solids import box
 from pbrs_farm.home.room_use import RoomKind

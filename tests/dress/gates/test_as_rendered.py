@@ -19,8 +19,8 @@ from pbrs_farm.dress.dressing import Dressed, refit_after_repair
 from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.report import DressReport
 from pbrs_farm.dress.space import house_space
-from pbrs_farm.dress.things.assembly import hanging_piece
 from pbrs_farm.dress.walls.hanging import Hanging
+from pbrs_farm.furnishings.things.assembly import hanging_piece
 from pbrs_farm.geometry.solids import box
 from pbrs_farm.geometry.surface_points import item_triangles
 from pbrs_farm.prepare.finished_house import finished_house

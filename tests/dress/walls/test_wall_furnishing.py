@@ -16,12 +16,12 @@ from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.space import house_space
 from pbrs_farm.dress.style import Style, style_for
 from pbrs_farm.dress.surface_finishes import material_of_finish
-from pbrs_farm.dress.things import hung, radiators
-from pbrs_farm.dress.things.maker import Thing
 from pbrs_farm.dress.walls import furnish_walls
 from pbrs_farm.dress.walls.hang_walls import hang_coats
 from pbrs_farm.dress.walls.hanging import WANTS, Hanging
 from pbrs_farm.dress.walls.radiators import hang_radiators, wants_radiators
+from pbrs_farm.furnishings.things import hung, radiators
+from pbrs_farm.furnishings.things.maker import Thing
 from pbrs_farm.home.room_use import RoomKind
 from pbrs_farm.read.builtin.builtin_home import builtin_home
 from tests.dress.furniture import solid

@@ -20,10 +20,10 @@ from pbrs_farm.core.mesh import signed_volume, triangle_corners
 from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.space import HouseSpace, WallFace, house_space
 from pbrs_farm.dress.style import Style, style_for
-from pbrs_farm.dress.things.hung import round_mirror
 from pbrs_farm.dress.walls import furnish_walls, hung_things
 from pbrs_farm.dress.walls.pictures import Gallery
-from pbrs_farm.dress.walls.prints import FAMILIES, palette_of, print_pixels
+from pbrs_farm.furnishings.prints import FAMILIES, palette_of, print_pixels
+from pbrs_farm.furnishings.things.hung import round_mirror
 from pbrs_farm.images import decode_photo, jpeg_from_array
 from pbrs_farm.read.builtin.builtin_home import builtin_home
 

@@ -21,14 +21,14 @@ from pbrs_farm.study.judging.figure_text import is_underfit, markdown, shown_fig
 from pbrs_farm.study.judging.judged_places import open_judged_place, open_judged_places
 from pbrs_farm.study.judging.others_predictions import OthersPredictions, predictions_in
 from pbrs_farm.study.judging.paper_figures import PAPER, paper_row
-from pbrs_farm.study.packing.pack_shards import pack
-from pbrs_farm.study.packing.packing_plan import Packing
 from pbrs_farm.study.photographs import crop_to_plan
 from pbrs_farm.study.real_frames import camera_of
 from pbrs_farm.study.sun_rgbd_labels import classes_of_scene
 from pbrs_farm.study.tasks.tasks import task_of
 from pbrs_farm.study.training.view_sources import TrainingSource, held_out_views, training_views
 from pbrs_farm.views.open_views import open_views
+from pbrs_farm.views.packing.pack_shards import pack
+from pbrs_farm.views.packing.packing_plan import Packing
 from tests.curate.tum_sequence import write_sequence
 from tests.study.training.made_views import TINY, small_plan
 from tests.views.small_roots import fill

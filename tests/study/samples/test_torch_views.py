@@ -10,9 +10,9 @@ import pytest
 
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.store.folder import FolderStore
-from pbrs_farm.study.packing.pack_shards import pack
-from pbrs_farm.study.packing.packing_plan import Packing
 from pbrs_farm.views.open_views import open_views
+from pbrs_farm.views.packing.pack_shards import pack
+from pbrs_farm.views.packing.packing_plan import Packing
 from pbrs_farm.views.sample_changes import flip
 from pbrs_farm.views.view_sample import LAYERS, SampleRequest
 from tests.views.small_roots import MODES, fill

@@ -8,8 +8,6 @@ import pytest
 import torch
 
 from pbrs_farm.store.folder import FolderStore
-from pbrs_farm.study.packing.pack_shards import pack
-from pbrs_farm.study.packing.packing_plan import Packing
 from pbrs_farm.study.training.checkpoint import read_tensors
 from pbrs_farm.study.training.run_folder import RunFolder
 from pbrs_farm.study.training.streamed_views import StreamedViews
@@ -17,6 +15,8 @@ from pbrs_farm.study.training.training_job import Job, train
 from pbrs_farm.study.training.training_views import ViewArrays
 from pbrs_farm.study.training.view_sources import TrainingSource, held_out_views, training_views
 from pbrs_farm.views.open_views import open_views
+from pbrs_farm.views.packing.pack_shards import pack
+from pbrs_farm.views.packing.packing_plan import Packing
 from tests.study.training.made_views import small_plan
 from tests.views.small_roots import MODES, fill
 

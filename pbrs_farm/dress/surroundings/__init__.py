@@ -1,5 +1,0 @@
-"""What lies before the windows of a home: ground, plants, buildings, hills; by a seed, no effects."""
-
-from pbrs_farm.dress.surroundings.surroundings import with_surroundings
-
-__all__ = ["with_surroundings"]

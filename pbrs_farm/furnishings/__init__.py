@@ -1,0 +1,1 @@
+"""Generated content: furniture and small items, textures, textiles, prints, surroundings; no effects."""

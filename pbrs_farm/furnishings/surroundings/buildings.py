@@ -1,0 +1,381 @@
+"""Buildings with windows, balconies and roofs, parked cars, lamp posts, fences; no effects."""
+
+from __future__ import annotations
+
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.furnishings.surroundings.facades import COLUMNS, N_ROOMS, ROWS, Facade
+from pbrs_farm.furnishings.surroundings.scenery import (
+    Rgb,
+    Scenery,
+    SceneryMaterial,
+    lit,
+    mottled,
+    paved,
+)
+
+STOREY_M: Final = 3.0
+
+_REVEAL_M: Final = 0.17  # that windows lie behind their front
+_EAVES_M: Final = 0.45
+_PLINTH_M: Final = 0.5
+_DOOR_M: Final = (1.15, 2.45)
+_PAINTS: Final[tuple[Rgb, ...]] = (
+    (0.55, 0.56, 0.58), (0.03, 0.03, 0.035), (0.20, 0.21, 0.22), (0.30, 0.03, 0.03), (0.05, 0.09, 0.20), (0.70, 0.70, 0.68),
+)  # fmt: skip
+_IRON: Final = SceneryMaterial("iron", rgb=(0.2, 0.2, 0.21))
+
+
+class Front(NamedTuple):
+    """Where a building's front stands: its left foot, along, outward (to the home), up."""
+
+    foot: F64  # (3,)
+    along: F64  # (3,) unit
+    to_home: F64  # (3,) unit
+
+    def at(self, s: F64 | float, y: F64 | float, out: F64 | float = 0.0) -> F64:
+        """World places s along, y up, out towards the home."""
+        s, y, out = np.broadcast_arrays(*(np.asarray(v, np.float64) for v in (s, y, out)))
+        return np.asarray(
+            self.foot
+            + s[..., None] * self.along
+            + y[..., None] * np.array([0.0, 1.0, 0.0])
+            + out[..., None] * self.to_home
+        )
+
+
+def _rectangles(front: Front, s0: F64, y0: F64, s1: F64, y1: F64, out: F64 | float) -> F64:
+    corners = [front.at(s, y, out) for s, y in ((s0, y0), (s1, y0), (s1, y1), (s0, y1))]
+    return np.stack(corners, -2).reshape(-1, 4, 3)
+
+
+def _front_box(
+    scenery: Scenery, thing: str, look: SceneryMaterial, front: Front, s0: float, s1: float, y0: float, y1: float,
+    out0: float, out1: float,
+) -> None:  # fmt: skip
+    low, high = np.array([s0, y0, out0]), np.array([s1, y1, out1])
+    corners = np.array([[low[0], low[1], high[2]], [high[0], low[1], high[2]], [high[0], high[1], high[2]], [low[0], high[1], high[2]],
+                        [low[0], low[1], low[2]], [high[0], low[1], low[2]], [high[0], high[1], low[2]], [low[0], high[1], low[2]]])  # fmt: skip
+    world = front.at(corners[:, 0], corners[:, 1], corners[:, 2])
+    scenery.add(thing, look, world[[[0, 1, 2, 3], [3, 2, 6, 7], [4, 0, 3, 7], [1, 5, 6, 2], [4, 5, 1, 0]]])  # fmt: skip
+
+
+class _Holes(NamedTuple):
+    """The windows of a front, metres on it, (N,) each."""
+
+    left: F64
+    low: F64
+    right: F64
+    high: F64
+    has_balcony: Any  # (N,) bool
+
+
+def block(
+    scenery: Scenery, thing: str, rng: np.random.Generator, front: Front, own: Facade, rooms: SceneryMaterial,
+    n_bays: int, n_storeys: int, *, depth_m: float = 10.0, is_lit: float = 0.3, has_balconies: bool = False,
+) -> None:  # fmt: skip
+    """A building of several storeys: a front with windows, sides, a roof and what sticks out.
+
+    rooms: the look of `lit_rooms`, for windows of lit rooms.
+    """
+    width = n_bays * own.bay_m
+    top = _PLINTH_M + n_storeys * STOREY_M
+    _body(scenery, thing, front, own, width, top, depth_m)
+    share = own.style.balconies if has_balconies else 0.0
+    holes = _front(scenery, thing, rng, front, own, n_bays, n_storeys, share)
+    _lit_windows(scenery, thing, rng, front, holes, rooms, is_lit)
+    cornice = own.style.cornice_m
+    _front_box(
+        scenery, thing, own.trim, front, -0.1, width + 0.1, top - 0.1, top + 0.22, -0.1, cornice
+    )
+    _front_box(scenery, thing, own.trim, front, -0.05, width + 0.05, top - 0.32, top - 0.1, -0.1, 0.45 * cornice)  # fmt: skip
+    if own.style.surround_m:
+        y = _PLINTH_M + STOREY_M
+        _front_box(scenery, thing, own.trim, front, 0, width, y - 0.1, y + 0.08, -0.05, 0.09)
+    _front_box(scenery, thing, _IRON, front, 0.12, 0.22, 0, top, 0.02, 0.12)
+    if own.style.is_flat:
+        _flat_roof(scenery, thing, front, own, width, top, depth_m)
+    else:
+        _roof(scenery, thing, rng, front, own, width, top, depth_m)
+    for k in np.flatnonzero(holes.has_balcony):
+        _balcony(scenery, thing, front, own, holes.left[k] - 0.35, holes.right[k] + 0.35, holes.low[k] - 0.1)  # fmt: skip
+
+
+def house(
+    scenery: Scenery, thing: str, rng: np.random.Generator, front: Front, own: Facade, rooms: SceneryMaterial,
+    *, is_lit: float = 0.3,
+) -> None:  # fmt: skip
+    """A house of one or two storeys with a gable."""
+    n_bays, n_storeys = int(rng.integers(3, 5)), int(rng.integers(1, 3))
+    width, depth = n_bays * own.bay_m, float(rng.uniform(7, 10))
+    top = _PLINTH_M + n_storeys * STOREY_M
+    ridge = top + rng.uniform(0.32, 0.48) * width if rng.random() < 0.5 else 0.0
+    _body(scenery, thing, front, own, width, top, depth)
+    holes = _front(scenery, thing, rng, front, own, n_bays, n_storeys, 0.0)
+    _lit_windows(scenery, thing, rng, front, holes, rooms, is_lit)
+    _front_box(scenery, thing, _IRON, front, width - 0.22, width - 0.12, 0, top, 0.02, 0.12)
+    if not ridge:
+        _roof(scenery, thing, rng, front, own, width, top, depth)
+        return
+    # The gable looks at the home, under slopes that reach over it.
+    middle = width / 2
+    gable = np.stack([front.at(0, top), front.at(width, top), front.at(middle, ridge), front.at(middle, ridge)])  # fmt: skip
+    uvs = np.array([[0, top], [width, top], [middle, ridge], [middle, ridge]])
+    scenery.add(thing, own.wall, gable[None], (uvs / own.wall.size_m)[None])
+    for s in (-_EAVES_M, width + _EAVES_M):
+        eave = top - (ridge - top) * _EAVES_M / middle
+        a, b = front.at(s, eave, _EAVES_M), front.at(middle, ridge + 0.05, _EAVES_M)
+        c, d = front.at(middle, ridge + 0.05, -depth), front.at(s, eave, -depth)
+        _slope(scenery, thing, own, d, a, b, c)
+        low = np.stack([a, b, b - [0, 0.2, 0], a - [0, 0.2, 0]])
+        scenery.add(thing, own.trim, low[None])
+
+
+def _body(
+    scenery: Scenery, thing: str, front: Front, own: Facade, width: float, top: float, depth: float
+) -> None:
+    """Sides without windows, and a plinth."""
+    stone = SceneryMaterial("stone", rgb=(0.46, 0.45, 0.43))
+    _front_box(scenery, thing, stone, front, 0, width, -0.5, _PLINTH_M, -0.1, 0.05)
+    for s in (0.0, width):
+        side = np.stack([front.at(s, y, o) for y, o in ((-0.5, 0), (-0.5, -depth), (top, -depth), (top, 0))])  # fmt: skip
+        uvs = np.array([[0, -0.5], [depth, -0.5], [depth, top], [0, top]]) / own.wall.size_m
+        scenery.add(thing, own.wall, side[None], uvs[None])
+
+
+def _front(
+    scenery: Scenery, thing: str, rng: np.random.Generator, front: Front, own: Facade, n_bays: int,
+    n_storeys: int, balconies: float,
+) -> _Holes:  # fmt: skip
+    """The wall of a front, with windows that lie in it, and a door; the windows are returned."""
+    x0, y0, x1, y1 = own.window
+    bay, storey = np.indices((n_bays, n_storeys), np.float64).reshape(2, -1)
+    n = len(bay)
+    left, right = bay * own.bay_m + x0, bay * own.bay_m + x1
+    floor = _PLINTH_M + storey * STOREY_M
+    has_balcony = (storey > 0) & (rng.random(n) < balconies)
+    # Windows of a balcony are doors, so they begin at its floor.
+    low, high = floor + np.where(has_balcony, 0.1, y0), floor + y1
+    is_door = (storey == 0) & (bay == int(rng.integers(0, n_bays)))
+    middle = (left + right) / 2
+    left, right = np.where(is_door, middle - _DOOR_M[0] / 2, left), np.where(is_door, middle + _DOOR_M[0] / 2, right)  # fmt: skip
+    low, high = np.where(is_door, 0.06, low), np.where(is_door, 0.06 + _DOOR_M[1], high)
+    # The wall about each window of a bay, from the storey's floor to its ceiling.
+    a, b = bay * own.bay_m, (bay + 1) * own.bay_m
+    bottom, top = np.where(storey == 0, _PLINTH_M, floor), floor + STOREY_M
+    at_sill = np.maximum(low, bottom)
+    for s0, t0, s1, t1 in ((a, bottom, left, top), (right, bottom, b, top), (left, bottom, right, at_sill), (left, high, right, top)):  # fmt: skip
+        _add_wall(scenery, thing, own.wall, front, s0, t0, s1, t1)
+    # Reveals, and what stands in them.
+    inner = own.trim if own.style.surround_m else own.wall
+    for p, q, r, t in ((left, low, left, high), (right, high, right, low), (left, high, right, high), (right, low, left, low)):  # fmt: skip
+        reveal = np.stack([front.at(p, q), front.at(r, t), front.at(r, t, -_REVEAL_M), front.at(p, q, -_REVEAL_M)], -2)  # fmt: skip
+        scenery.add(thing, inner, reveal)
+    is_glass = ~is_door
+    cells = rng.integers(0, COLUMNS * ROWS, n)
+    corner = np.stack([cells % COLUMNS / COLUMNS, cells // COLUMNS / ROWS], -1)
+    unit = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
+    uvs = corner[:, None] + unit * [1 / COLUMNS, 1 / ROWS]
+    panes = _rectangles(front, left, low, right, high, -_REVEAL_M)
+    scenery.add(thing, own.windows, panes[is_glass], uvs[is_glass])
+    if is_door.any():
+        scenery.add(thing, own.door, panes[is_door], unit[None].astype(np.float64))
+    _about_windows(scenery, thing, front, own, left[is_glass], low[is_glass], right[is_glass], high[is_glass])  # fmt: skip
+    found = left, low, right, high, has_balcony
+    return _Holes(*(v[is_glass] for v in found))
+
+
+def _add_wall(
+    scenery: Scenery, thing: str, look: SceneryMaterial, front: Front, s0: F64, y0: F64, s1: F64, y1: F64
+) -> None:  # fmt: skip
+    """Rectangles of a front, its picture in metres on it."""
+    corners = [np.stack(np.broadcast_arrays(s, y), -1) for s, y in ((s0, y0), (s1, y0), (s1, y1), (s0, y1))]  # fmt: skip
+    scenery.add(thing, look, _rectangles(front, s0, y0, s1, y1, 0.0), np.stack(corners, -2) / look.size_m)  # fmt: skip
+
+
+def _about_windows(
+    scenery: Scenery,
+    thing: str,
+    front: Front,
+    own: Facade,
+    left: F64,
+    low: F64,
+    right: F64,
+    high: F64,
+) -> None:
+    """Sills, bands about windows or lintels over them, and shutters."""
+    over = np.stack([front.at(left - 0.08, low), front.at(right + 0.08, low), front.at(right + 0.08, low, 0.1), front.at(left - 0.08, low, 0.1)], -2)  # fmt: skip
+    lip = _rectangles(front, left - 0.08, low - 0.07, right + 0.08, low, 0.1)
+    scenery.add(thing, own.trim, np.concatenate([over, lip]))
+    band = own.style.surround_m
+    if band:
+        for s0, t0, s1, t1 in ((left - band, low, left, high + band), (right, low, right + band, high + band), (left, high, right, high + band)):  # fmt: skip
+            scenery.add(thing, own.trim, _rectangles(front, s0, t0, s1, t1, 0.025))
+    elif own.style.wall == "brick":
+        scenery.add(thing, own.trim, _rectangles(front, left - 0.12, high, right + 0.12, high + 0.2, 0.015))  # fmt: skip
+    if own.shutter is not None:
+        half = (right - left) / 2
+        for s0, s1 in ((left - band - half, left - band), (right + band, right + band + half)):
+            scenery.add(thing, own.shutter, _rectangles(front, s0, low, s1, high, 0.05))
+
+
+def _balcony(
+    scenery: Scenery, thing: str, front: Front, own: Facade, s0: float, s1: float, floor: float
+) -> None:
+    """A slab with a railing of bars, of a modern building with a parapet."""
+    out = 1.15
+    _front_box(scenery, thing, own.trim, front, s0, s1, floor - 0.16, floor, 0, out)
+    if own.style.is_flat:
+        _front_box(scenery, thing, own.wall, front, s0, s1, floor, floor + 0.95, out - 0.08, out)
+        return
+    rods = np.arange(s0, s1, 0.12)
+    n = len(rods)
+    scenery.add(thing, _IRON, _rectangles(front, rods - 0.009, np.full(n, floor), rods + 0.009, np.full(n, floor + 1.0), out - 0.03))  # fmt: skip
+    _front_box(
+        scenery, thing, _IRON, front, s0, s1, floor + 0.97, floor + 1.02, out - 0.05, out - 0.01
+    )
+    for s in (s0, s1):
+        depth = np.linspace(0.1, out - 0.03, 8)
+        sides = np.stack([front.at(s, floor, depth - 0.009), front.at(s, floor, depth + 0.009), front.at(s, floor + 1.0, depth + 0.009), front.at(s, floor + 1.0, depth - 0.009)], -2)  # fmt: skip
+        scenery.add(thing, _IRON, sides)
+
+
+def _lit_windows(
+    scenery: Scenery, thing: str, rng: np.random.Generator, front: Front, holes: _Holes,
+    rooms: SceneryMaterial, share: float,
+) -> None:  # fmt: skip
+    """Light behind a share of the windows, in both halves of their frames."""
+    on = np.flatnonzero(rng.random(len(holes.left)) < share)
+    room = rng.integers(0, N_ROOMS, len(on))
+    left, low, right, high = holes.left[on], holes.low[on], holes.right[on], holes.high[on]
+    frame = 0.075 * (right - left)
+    middle = (left + right) / 2
+    unit = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
+    for half, (a, b) in enumerate(((left + frame, middle - 0.5 * frame), (middle + 0.5 * frame, right - frame))):  # fmt: skip
+        quads = _rectangles(front, a, low + frame, b, high - frame, 0.012 - _REVEAL_M)
+        first = (room + 0.5 * half) / N_ROOMS
+        uvs = np.stack([first, 0 * first], -1)[:, None] + unit * [0.5 / N_ROOMS, 1.0]
+        scenery.add(thing, rooms, quads, uvs)
+
+
+def _slope(scenery: Scenery, thing: str, own: Facade, a: F64, b: F64, c: F64, d: F64) -> None:
+    """A slope of tiles, a to b along its eaves."""
+    long_, up = float(np.linalg.norm(b - a)), float(np.linalg.norm(c - b))
+    uvs = np.array([[0, 0], [long_, 0], [long_, up], [0, up]]) / own.roof.size_m
+    scenery.add(thing, own.roof, np.stack([a, b, c, d])[None], uvs[None])
+
+
+def _flat_roof(
+    scenery: Scenery, thing: str, front: Front, own: Facade, width: float, top: float, depth: float
+) -> None:
+    """A roof that is not seen from below, and a housing on it."""
+    scenery.add(thing, own.trim, np.stack([front.at(s, top + 0.1, o) for s, o in ((0, 0), (width, 0), (width, -depth), (0, -depth))])[None])  # fmt: skip
+    _front_box(scenery, thing, own.wall, front, 0.35 * width, 0.35 * width + 2.6, top, top + 2.2, -5.5, -3.0)  # fmt: skip
+
+
+def _roof(
+    scenery: Scenery, thing: str, rng: np.random.Generator, front: Front, own: Facade, width: float,
+    top: float, depth: float,
+) -> None:  # fmt: skip
+    """Two slopes over eaves with a gutter, and chimneys."""
+    ridge = top + rng.uniform(2.2, 3.6)
+    drop = _EAVES_M * (ridge - top) / (depth / 2)
+    a, b = (front.at(s, top + 0.2 - drop, _EAVES_M) for s in (-0.2, width + 0.2))
+    c, d = front.at(width + 0.2, ridge, -depth / 2), front.at(-0.2, ridge, -depth / 2)
+    e, f = (front.at(s, top + 0.2 - drop, -depth - _EAVES_M) for s in (width + 0.2, -0.2))
+    _slope(scenery, thing, own, a, b, c, d)
+    _slope(scenery, thing, own, e, f, d, c)
+    y = top + 0.2 - drop
+    _front_box(scenery, thing, _IRON, front, -0.2, width + 0.2, y - 0.09, y + 0.03, _EAVES_M - 0.02, _EAVES_M + 0.1)  # fmt: skip
+    for s in (0.0, width):
+        gable = np.stack([front.at(s, top, 0), front.at(s, top, -depth), front.at(s, ridge, -depth / 2), front.at(s, ridge, -depth / 2)])  # fmt: skip
+        uvs = np.array([[0, top], [depth, top], [depth / 2, ridge], [depth / 2, ridge]])
+        scenery.add(thing, own.wall, gable[None], (uvs / own.wall.size_m)[None])
+    for s in rng.uniform(0.15, 0.85, int(rng.integers(1, 3))) * width:
+        _front_box(scenery, thing, own.wall, front, s, s + 0.7, ridge - 1.4, ridge + 0.9, -depth / 2 - 0.3, -depth / 2 + 0.4)  # fmt: skip
+
+
+def car(scenery: Scenery, thing: str, rng: np.random.Generator, front: Front) -> None:
+    """A parked car, its flank to the home; foot is its left end on the road."""
+    paint = _PAINTS[int(rng.integers(0, len(_PAINTS)))]
+    body = SceneryMaterial(
+        f"paint {paint[0]:.2f}{paint[2]:.2f}",
+        rgb=tuple(float(c**0.45) for c in paint),  # type: ignore[arg-type]
+        is_glossy=True,
+    )
+    glass, tyre = (
+        SceneryMaterial("car glass", rgb=(0.2, 0.23, 0.26), is_glossy=True),
+        SceneryMaterial("tyre", rgb=(0.12, 0.12, 0.12)),
+    )
+    scale = rng.uniform(0.94, 1.12)
+    flank = np.array([[0, 0.3], [0.05, 0.72], [0.75, 0.88], [3.9, 0.9], [4.2, 0.7], [4.2, 0.3]]) * scale  # fmt: skip
+    cabin = np.array([[0.85, 0.87], [1.5, 1.42], [3.0, 1.45], [3.75, 0.89]]) * scale
+    for outline, look, inset in ((flank, body, 0.0), (cabin, glass, 0.14)):
+        near, far = -inset, -1.72 * scale + inset
+        for out in (near, far):
+            points = front.at(outline[:, 0], outline[:, 1], out)
+            for k in range(1, len(points) - 2, 2):
+                scenery.add(thing, look, points[[0, k, k + 1, k + 2]][None])
+            if len(points) % 2:
+                scenery.add(thing, look, points[[0, -2, -1, -1]][None])
+        a, b = (
+            front.at(outline[:, 0], outline[:, 1], near),
+            front.at(outline[:, 0], outline[:, 1], far),
+        )
+        scenery.add(thing, look, np.stack([a[:-1], a[1:], b[1:], b[:-1]], 1))
+    roof = front.at(cabin[1:3, 0], cabin[1:3, 1] + 0.01, np.array(-0.13))
+    back = front.at(cabin[1:3, 0], cabin[1:3, 1] + 0.01, np.array(-1.72 * scale + 0.13))
+    scenery.add(thing, body, np.stack([roof[0], roof[1], back[1], back[0]])[None])
+    turn = np.linspace(0, np.pi, 5)
+    for x in (0.8 * scale, 3.35 * scale):
+        rim = np.stack([x + 0.33 * np.cos(turn), 0.33 + 0.33 * np.sin(turn)], 1)
+        low = np.stack([rim[:, 0], 0.66 - rim[:, 1]], 1)
+        ring_a, ring_b = front.at(rim[:, 0], rim[:, 1], 0.02), front.at(low[:, 0], low[:, 1], 0.02)
+        scenery.add(thing, tyre, np.stack([ring_a[:-1], ring_a[1:], ring_b[1:], ring_b[:-1]], 1))
+
+
+def lamp_post(scenery: Scenery, thing: str, front: Front) -> None:
+    """A street lamp, which shines."""
+    _front_box(scenery, thing, _IRON, front, -0.05, 0.05, 0, 5.0, -0.05, 0.05)
+    _front_box(scenery, thing, _IRON, front, -0.04, 0.04, 4.9, 5.0, -1.2, 0.0)
+    _front_box(
+        scenery, thing, lit("lamp", (0.9, 0.82, 0.68)), front, -0.1, 0.1, 4.82, 4.9, -1.3, -0.8
+    )
+
+
+def fence(
+    scenery: Scenery, thing: str, rng: np.random.Generator, front: Front, length: float, height: float
+) -> None:  # fmt: skip
+    """A fence of boards along the front's line."""
+    wood = SceneryMaterial(
+        "fence boards", picture=mottled(rng, (0.10, 0.07, 0.045), (0.30, 0.22, 0.15))
+    )
+    s = np.arange(0, length, 0.14)
+    tall = height * rng.uniform(0.97, 1.0, len(s))
+    scenery.add(thing, wood, _rectangles(front, s, np.full(len(s), 0.05), s + 0.115, tall, 0.0))
+    for y in (0.25 * height, 0.75 * height):
+        _front_box(scenery, thing, wood, front, 0, length, y, y + 0.08, -0.06, -0.01)
+
+
+def railing(scenery: Scenery, thing: str, front: Front, length: float) -> None:
+    """A railing 1 m high along the front's line."""
+    iron = SceneryMaterial("railing", rgb=(0.16, 0.16, 0.17))
+    for y in (0.08, 0.98):
+        _front_box(scenery, thing, iron, front, 0, length, y, y + 0.035, 0, 0.03)
+    s = np.linspace(0.01, length - 0.01, max(round(length / 0.11), 2))
+    scenery.add(thing, iron, _rectangles(front, s - 0.008, np.full(len(s), 0.1), s + 0.008, np.full(len(s), 0.98), 0.015))  # fmt: skip
+
+
+def ground_looks(rng: np.random.Generator) -> dict[str, SceneryMaterial]:
+    """What the ground is made of."""
+    return {
+        "lawn": SceneryMaterial("lawn", picture=mottled(rng, (0.030, 0.052, 0.014), (0.115, 0.155, 0.042), size=256, slope=1.0), size_m=(3.7, 3.7)),
+        "asphalt": SceneryMaterial("asphalt", picture=mottled(rng, (0.045, 0.045, 0.048), (0.10, 0.10, 0.10), slope=0.6), size_m=(3.1, 3.1)),
+        "slabs": SceneryMaterial("slabs", picture=paved(rng, (0.33, 0.31, 0.28), 4), size_m=(2.0, 2.0)),
+        "gravel": SceneryMaterial("gravel", picture=mottled(rng, (0.14, 0.13, 0.11), (0.42, 0.39, 0.34), slope=0.1), size_m=(1.0, 1.0)),
+        "kerb": SceneryMaterial("kerb", rgb=(0.58, 0.57, 0.55)),
+        "line": SceneryMaterial("road line", rgb=(0.85, 0.85, 0.83)),
+    }  # fmt: skip

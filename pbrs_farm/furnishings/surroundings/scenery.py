@@ -1,0 +1,206 @@
+"""Quads and textures of what lies outside, gathered by thing and material; no effects.
+
+Light takes these surfaces as both-sided and matte; a material whose name begins with LIT shines by
+itself (core/house.py).
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from typing import Final, Generic, NamedTuple, TypeVar
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely.geometry.base import BaseGeometry
+
+from pbrs_farm.core.arrays import F32, F64
+from pbrs_farm.core.frames import srgb_from_linear
+from pbrs_farm.core.house import LIT, OUTSIDE, Item, ItemKind, Material, Surface, Texture
+from pbrs_farm.core.mesh import faces_with_area, triangle_corners
+from pbrs_farm.furnishings.textures.maps import colour_bytes, texture_from_pixels
+from pbrs_farm.furnishings.textures.noise import noise
+from pbrs_farm.geometry.plan_surfaces import horizontal
+from pbrs_farm.geometry.solids import quads_surface
+from pbrs_farm.images import png_from_array
+
+Rgb = tuple[float, float, float]
+
+_QUALITY: Final = 85  # JPEG quality
+_TABLE: Final = (1 << 14) - 1  # steps of linear light, finer than bytes of sRGB
+
+T = TypeVar("T")
+
+
+class Drawn(Generic[T]):
+    """Looks that are drawn where they are asked for, each by a seed of its own."""
+
+    def __init__(self, seed: int, n: int, draw: Callable[[np.random.Generator, int], T]) -> None:
+        """draw: of number k, 0 to n - 1, with the generator of its seed."""
+        self._seed, self._n, self._draw = seed, n, draw
+        self._found: dict[int, T] = {}
+
+    def __len__(self) -> int:
+        return self._n
+
+    def __getitem__(self, k: int) -> T:
+        if k not in self._found:
+            self._found[k] = self._draw(np.random.default_rng([self._seed, k]), k)
+        return self._found[k]
+
+
+class SceneryMaterial(NamedTuple):
+    """A material of the outside: its colour or picture, and how many metres the picture covers."""
+
+    name: str
+    rgb: Rgb = (1.0, 1.0, 1.0)  # sRGB-encoded, times the picture
+    picture: F32 | None = None  # (H, W, 3) linear, with alpha (H, W, 4) of leaves with holes
+    size_m: tuple[float, float] = (1.0, 1.0)
+    is_glossy: bool = False  # a clear coat mirrors the sky
+
+
+class Scenery:
+    """Quads by thing and look; becomes items once all is there."""
+
+    def __init__(self) -> None:
+        self._looks: dict[str, SceneryMaterial] = {}
+        self._quads: dict[str, dict[str, list[tuple[F64, F64 | None]]]] = {}
+        self._level: dict[str, list[tuple[str, Surface]]] = {}
+
+    def add(self, thing: str, look: SceneryMaterial, quads: F64, uvs: F64 | None = None) -> None:
+        """Add quads (N, 4, 3) in the world; uvs (N, 4, 2), without them metres over the look's size."""
+        quads = np.asarray(quads, np.float64).reshape(-1, 4, 3)
+        if len(quads):
+            self._looks.setdefault(look.name, look)
+            self._quads.setdefault(thing, {}).setdefault(look.name, []).append((quads, uvs))
+
+    def lay(self, thing: str, look: SceneryMaterial, area: BaseGeometry, y: float) -> None:
+        """Add the polygons of a plan area at a height, to be seen from above."""
+        polygons = [
+            p for p in shapely.get_parts(area) if p.geom_type == "Polygon" and p.area > 0.01
+        ]
+        if not polygons:
+            return
+        rings = [
+            [shapely.get_coordinates(r)[:-1] for r in (p.exterior, *p.interiors)] for p in polygons
+        ]
+        self._looks.setdefault(look.name, look)
+        surface = horizontal(look.name, rings, y, 0, up=True)
+        assert surface.uvs is not None
+        surface = replace(surface, uvs=(surface.uvs / np.array(look.size_m)).astype(np.float32))
+        self._level.setdefault(thing, []).append((look.name, surface))
+
+    def keep_off(self, area: BaseGeometry, by_m: float) -> None:
+        """Take out quads that reach within by_m of a plan area: leaves of a tree that leans to it."""
+        shapely.prepare(area)
+        for looks in self._quads.values():
+            for rows in looks.values():
+                for k, (quads, uvs) in enumerate(rows):
+                    off = shapely.distance(area, shapely.multipoints(quads[:, :, [0, 2]])) > by_m
+                    rows[k] = quads[off], None if uvs is None else uvs[off]
+
+    @property
+    def n_faces(self) -> int:
+        """Triangles of all things."""
+        quads = (q for looks in self._quads.values() for rows in looks.values() for q, _ in rows)
+        level = (surface for rows in self._level.values() for _name, surface in rows)
+        return sum(2 * len(q) for q in quads) + sum(len(s.faces) for s in level)
+
+    def items(
+        self, level_id: str, first_material: int
+    ) -> tuple[list[Item], list[Material], dict[str, Texture]]:
+        """The items, and the materials and pictures that the house is to have beside its own."""
+        materials: list[Material] = []
+        textures: dict[str, Texture] = {}
+        index: dict[str, int] = {}
+        for look in self._looks.values():
+            texture = None
+            if look.picture is not None:
+                texture = _texture(look.name, look.picture)
+                textures[texture.id] = texture
+            index[look.name] = first_material + len(materials)
+            gloss = {"specular": (0.5, 0.5, 0.5), "shininess": 2000.0} if look.is_glossy else {}
+            materials.append(
+                Material(
+                    look.name, diffuse=look.rgb, texture_id=texture.id if texture else None,
+                    alpha_cutout=look.picture is not None and look.picture.shape[2] == 4,
+                    **gloss,  # type: ignore[arg-type]
+                )
+            )  # fmt: skip
+        items = []
+        for thing in dict.fromkeys((*self._level, *self._quads)):
+            surfaces = [replace(s, material=index[name]) for name, s in self._level.get(thing, [])]
+            surfaces += [
+                _surface_of_quads(self._looks[name], rows, index[name])
+                for name, rows in self._quads.get(thing, {}).items()
+            ]
+            items.append(
+                Item(
+                    id=f"{OUTSIDE}_{thing}", name=thing.replace("_", " "), kind=ItemKind.GROUND,
+                    level_id=level_id, surfaces=tuple(surfaces), source_class=OUTSIDE, tags=(OUTSIDE,),
+                )
+            )  # fmt: skip
+        return items, materials, textures
+
+
+@cache
+def _bytes() -> NDArray[np.uint8]:
+    """(_TABLE + 1,) sRGB-encoded bytes of linear 0..1."""
+    return colour_bytes(srgb_from_linear(np.arange(_TABLE + 1) / _TABLE).astype(np.float32))
+
+
+def _texture(name: str, picture: F32) -> Texture:
+    """A linear picture as a JPEG, one with alpha as a PNG."""
+    pixels = _bytes()[(np.clip(picture[..., :3], 0, 1) * _TABLE).astype(np.uint16)]
+    if picture.shape[2] == 3:
+        return texture_from_pixels(name, pixels, _QUALITY)
+    alpha = np.uint8(255) * (picture[..., 3:] > 0.5)
+    data = png_from_array(np.concatenate([pixels, alpha], -1))
+    return Texture(hashlib.sha256(data).hexdigest()[:16], name, "image/png", data)
+
+
+def _surface_of_quads(
+    look: SceneryMaterial, rows: list[tuple[F64, F64 | None]], material: int
+) -> Surface:
+    made = quads_surface(look.name, np.concatenate([q for q, _ in rows]), material)
+    assert made.uvs is not None
+    own = made.uvs.reshape(-1, 4, 2) / np.array(look.size_m, np.float32)
+    start = 0
+    for quads, uvs in rows:
+        if uvs is not None:
+            own[start : start + len(quads)] = uvs
+        start += len(quads)
+    # A quad of three corners has one triangle without an area.
+    faces = made.faces[faces_with_area(triangle_corners(made.positions, made.faces), 1e-6)]
+    return Surface(
+        made.name, made.positions, faces, material, own.reshape(-1, 2).astype(np.float32)
+    )
+
+
+def mottled(
+    rng: np.random.Generator, dark: Rgb, light: Rgb, *, size: int = 128, slope: float = 1.4
+) -> F32:
+    """(size, size, 3) linear: two colours in clouds and grains."""
+    tone = 0.5 + 0.22 * noise(rng, (size, size), slope=slope) + 0.12 * noise(rng, (size, size), slope=0.2)  # fmt: skip
+    tone = np.clip(tone, 0, 1)[..., None]
+    return np.asarray(np.array(dark) * (1 - tone) + np.array(light) * tone, np.float32)
+
+
+def paved(rng: np.random.Generator, rgb: Rgb, n: int) -> F32:
+    """(192, 192, 3) linear: n by n slabs with joints."""
+    picture = mottled(rng, tuple(0.85 * c for c in rgb), rgb, size=192)  # type: ignore[arg-type]
+    step = 192 // n
+    for row in range(n):
+        for column in range(n):
+            own = picture[row * step : (row + 1) * step, column * step : (column + 1) * step]
+            own *= rng.uniform(0.88, 1.08)
+            own[:2], own[:, :2] = 0.55 * own[:2], 0.55 * own[:, :2]
+    return np.clip(picture, 0, 1)
+
+
+def lit(name: str, rgb: Rgb = (1.0, 1.0, 1.0), picture: F32 | None = None) -> SceneryMaterial:
+    """A look that shines by itself."""
+    return SceneryMaterial(f"{LIT} {name}", rgb, picture)

@@ -1,0 +1,369 @@
+"""Every kind of procedural surface by name, and the material it gives a house.
+
+Effects: JPEGs are encoded through a temporary file; a house keeps what was made for it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Final
+
+import numpy as np
+
+from pbrs_farm.core.catalogue import Catalogue
+from pbrs_farm.core.frames import linear_from_srgb, srgb_from_linear
+from pbrs_farm.core.house import Material, Texture
+from pbrs_farm.dress.mutable_house import MutableHouse
+from pbrs_farm.dress.painted_materials import Painted
+from pbrs_farm.dress.style import WOODS, Rgb, Wood
+from pbrs_farm.furnishings.textures.laid_tiles import (
+    Glaze,
+    Laying,
+    brick_maps,
+    cut_from,
+    marble,
+    terracotta_maps,
+    tile_grid,
+    tile_maps,
+)
+from pbrs_farm.furnishings.textures.maps import SurfaceMaps, encode_maps
+from pbrs_farm.furnishings.textures.noise import Shape2
+from pbrs_farm.furnishings.textures.panelling import (
+    PANELS_M,
+    board_maps,
+    panel_maps,
+    slat_maps,
+    wall_plank_maps,
+)
+from pbrs_farm.furnishings.textures.photographs import photograph_for, photograph_material
+from pbrs_farm.furnishings.textures.plain_surfaces import (
+    carpet_maps,
+    concrete_maps,
+    leather_maps,
+    paint_maps,
+    plaster_maps,
+    weave_maps,
+)
+from pbrs_farm.furnishings.textures.planks import (
+    BoardLayout,
+    PlankLook,
+    chevron,
+    grain_maps,
+    herringbone,
+    plank_maps,
+    rows_of_planks,
+)
+from pbrs_farm.furnishings.textures.wallpaper import (
+    PATTERNS,
+    WIDTH_M,
+    printed_carpet_maps,
+    wallpaper_maps,
+)
+
+SEEDS: Final = 8
+"""Of how many seeds a home draws one: patterns of other homes come again, and are painted once."""
+
+_TEXEL_M: Final = 0.0015  # greatest texel: what a camera of 640 pixels resolves from a metre away
+_STEP_PX: Final = 128
+_COARSE = (512, 512)  # pixels of one repeat of what is finer by itself
+_FLOOR_M = (2.0, 2.0)
+_SIZE_M: Final = {
+    "strip": _FLOOR_M, "planks": (2.4, 2.4), "laminate": (2.6, 1.92), "herringbone": _FLOOR_M,
+    "chevron": _FLOOR_M, "marble": (2.4, 2.4), "terracotta": _FLOOR_M, "brick": _FLOOR_M,
+    "painted brick": _FLOOR_M, "paint": (1.0, 1.0), "plaster": _FLOOR_M,
+    "smooth plaster": _FLOOR_M, "concrete": _FLOOR_M, "carpet": (1.0, 1.0),
+    "loop carpet": (0.64, 0.64), "printed carpet": (0.8, 0.8), "wallpaper": (WIDTH_M, WIDTH_M), "grain": (1.0, 1.0),
+    "weave": (0.25, 0.25), "twill": (0.25, 0.25), "leather": (0.3, 0.3),
+    "upright boards": (1.2, 1.2), "level boards": (1.2, 1.2), "wall planks": (1.6, 1.6),
+    "slats": (1.2, 1.2),
+}  # fmt: skip
+"""Width and height of one repeat by family; tiles have that of their laying, panels their variant's."""
+
+
+@dataclass(frozen=True, slots=True)
+class Pattern:
+    """What a procedural surface looks like: equal patterns give equal pixels."""
+
+    family: str  # of FAMILIES
+    seed: int
+    tints: tuple[Rgb, ...] = ((0.9, 0.9, 0.9),)  # sRGB-encoded, the main one first
+    wood: Wood = WOODS["oak"]  # of wood
+    variant: str = ""  # of tiles and wallpaper: how they are laid or printed
+    darkness: float = 0.0  # of wood: -1 bleached .. 1 stained
+    photograph: str = ""  # id of a picture's texture that is shown instead: photographed()
+
+
+@dataclass(frozen=True, slots=True)
+class PatternMaterial:
+    """A pattern as a house has it."""
+
+    number: int  # in MutableHouse.materials
+    size_m: tuple[float, float]  # of one repeat: uv = metres / size
+    mean: Callable[[], Rgb]  # gives the mean linear colour once it is painted
+
+    @property
+    def mean_rgb(self) -> Rgb:
+        """The mean linear colour; waits for a material that is still painted."""
+        return self.mean()
+
+
+def pixels_of(size_m: tuple[float, float]) -> Shape2:
+    """Rows and columns of a repeat of that size: texels of 1.5 mm or less."""
+    width, height = (_STEP_PX * math.ceil(side / _TEXEL_M / _STEP_PX) for side in size_m)
+    return height, width
+
+
+# Families of one tint are painted in few lightnesses and tinted by their material's diffuse colour.
+_TINTED: Final = (
+    "paint", "plaster", "smooth plaster", "concrete", "carpet", "loop carpet", "weave", "twill",
+    "leather", "painted brick", "upright boards", "level boards", "panels",
+)  # fmt: skip
+_LIGHTNESSES: Final = (0.4, 0.6, 0.75, 0.87, 0.97)
+
+_Painter = Callable[[np.random.Generator, Pattern], SurfaceMaps]
+
+
+def maps_of(pattern: Pattern) -> SurfaceMaps:
+    """The pattern's pixels; KeyError for an unknown family."""
+    return FAMILIES[pattern.family](np.random.default_rng(pattern.seed), pattern)
+
+
+def size_of(pattern: Pattern) -> tuple[float, float]:
+    """Width and height of one repeat of the pattern, metres; KeyError for an unknown family."""
+    if pattern.family == "tiles":
+        return _TILES[_laid(pattern)[0]][0]
+    if pattern.family == "panels":
+        return PANELS_M.get(pattern.variant, PANELS_M["low"])
+    return _SIZE_M[pattern.family]
+
+
+def pattern_material(house: MutableHouse, pattern: Pattern) -> PatternMaterial:
+    """The pattern as a material of the house; equal patterns give the same number.
+
+    A thread paints it meanwhile: reading `mean_rgb` waits for it. Map surfaces in repeats of `size_m`.
+
+        veneer = pattern_material(house, Pattern("grain", seed=7, wood=WOODS["oak"]))
+        mapped = box_mapped(surface, axes, veneer.size_m)
+        surface = replace(mapped, material=veneer.number)
+
+    KeyError for an unknown family.
+    """
+    key = f"pattern {pattern!r}"
+    kept = house.kept.get(key)
+    if isinstance(kept, PatternMaterial):
+        return kept
+    if pattern.photograph:
+        number, size, mean = photograph_material(house, pattern.photograph, pattern.family)
+        made = PatternMaterial(number, size, lambda: mean)
+    else:
+        number, painting = house.materials.paint(partial(_paint_pattern, house, pattern))
+        made = PatternMaterial(number, size_of(pattern), lambda: painting.painted().mean_rgb)
+    house.kept[key] = made
+    return made
+
+
+def _paint_pattern(house: MutableHouse, pattern: Pattern) -> Painted:
+    """The pattern as a material: taken out of the house's bank, or painted."""
+    if pattern.family in _TINTED and len(pattern.tints) == 1:
+        return _tinted(house, pattern)
+    return house.bank.painted(repr(pattern), partial(_painted, pattern))
+
+
+def _painted(pattern: Pattern) -> Painted:
+    maps = maps_of(pattern)
+    material, textures = material_from_maps(maps, f"{pattern.family}-{pattern.seed:08x}")
+    return Painted(material, textures, maps.mean_rgb)
+
+
+def _tinted(house: MutableHouse, pattern: Pattern) -> Painted:
+    """The pattern painted in a grey that is lighter than its tint, times the tint's part of it."""
+    tint = pattern.tints[0]
+    grey = next((c for c in _LIGHTNESSES if c >= max(tint)), _LIGHTNESSES[-1])
+    plain = replace(pattern, tints=((grey, grey, grey),))
+    made = house.bank.painted(repr(plain), partial(_painted, plain))
+    part = np.minimum(linear_from_srgb(np.array(tint)) / linear_from_srgb(np.array(grey)), 1.0)
+    r, g, b = (round(float(c), 4) for c in srgb_from_linear(part))
+    means = [float(m) for m in np.array(made.mean_rgb) * linear_from_srgb(np.array((r, g, b)))]
+    diffuse = replace(made.material, diffuse=(r, g, b))
+    return Painted(diffuse, made.textures, (means[0], means[1], means[2]))
+
+
+def photographed(house: MutableHouse, catalogue: Catalogue, pattern: Pattern) -> Pattern:
+    """The pattern, or a photograph of the catalogue in its place, drawn by its family and seed.
+
+    With n photographs that fit, one is shown with probability n / (n + 12).
+    """
+    found = photograph_for(house, catalogue, pattern.family, pattern.seed)
+    return replace(pattern, photograph=found) if found else pattern
+
+
+def material_from_maps(maps: SurfaceMaps, name: str) -> tuple[Material, tuple[Texture, ...]]:
+    """A material that shows the maps, and the textures it names."""
+    colour, rough, normal = encode_maps(maps, name)
+    # Keep the Phong lobe that matches, for who reads no roughness.
+    alpha = max(maps.mean_roughness, 0.1) ** 2
+    gloss = maps.gloss
+    material = Material(
+        name=name,
+        specular=(gloss, gloss, gloss),
+        shininess=round(2.0 / alpha**2 - 2.0, 1) if gloss else 0.0,
+        texture_id=colour.id,
+        roughness=1.0 if rough is not None else round(maps.mean_roughness, 4),
+        roughness_texture_id=None if rough is None else rough.id,
+        normal_texture_id=None if normal is None else normal.id,
+    )
+    return material, tuple(t for t in (colour, rough, normal) if t is not None)
+
+
+def _strip_parquet(rng: np.random.Generator, p: Pattern) -> SurfaceMaps:
+    layout = rows_of_planks(rng, pixels_of(size_of(p)), size_of(p), 28, 4)
+    return _planks(rng, p, layout, PlankLook(variation=0.05))
+
+
+def _board_floor(rng: np.random.Generator, p: Pattern) -> SurfaceMaps:
+    # Long boards: a wide repeat, a joint or two in each row.
+    layout = rows_of_planks(
+        rng, pixels_of(size_of(p)), size_of(p), int(rng.choice([12, 14, 17])), 1
+    )
+    look = PlankLook(bevel_m=0.003, variation=0.04, roughness=0.42)
+    return _planks(rng, p, layout, look)
+
+
+def _laminate(rng: np.random.Generator, p: Pattern) -> SurfaceMaps:
+    layout = rows_of_planks(rng, pixels_of(size_of(p)), size_of(p), 10, 2)
+    return _planks(rng, p, layout, PlankLook(0.0006, 0.0, 0.03, 0.34, 0.5))
+
+
+def _herringbone(rng: np.random.Generator, p: Pattern) -> SurfaceMaps:
+    layout = herringbone(pixels_of(size_of(p)), size_of(p), int(rng.choice([5, 6, 7])), 2)
+    return _planks(rng, p, layout, PlankLook(variation=0.05))
+
+
+def _chevron(rng: np.random.Generator, p: Pattern) -> SurfaceMaps:
+    layout = chevron(pixels_of(size_of(p)), size_of(p), 4, int(rng.choice([14, 16])))
+    return _planks(rng, p, layout, PlankLook(variation=0.045))
+
+
+def _planks(
+    rng: np.random.Generator, p: Pattern, layout: BoardLayout, look: PlankLook
+) -> SurfaceMaps:
+    return plank_maps(rng, p.wood, layout, size_of(p), look, p.darkness)
+
+
+# Rows and columns in one repeat of that size, shift of every other row, joint, bevel; pixels.
+_TILES: dict[str, tuple[tuple[float, float], Laying, float]] = {
+    "10": ((1.0, 1.0), Laying(10, 10, 0.0, 0.003), 0.003),
+    "15": ((1.2, 1.2), Laying(8, 8, 0.0, 0.003), 0.003),
+    "20": ((1.6, 1.6), Laying(8, 8, 0.0, 0.003), 0.003),
+    "30": ((1.8, 1.8), Laying(6, 6, 0.0, 0.003), 0.002),
+    "45": ((1.8, 1.8), Laying(4, 4, 0.0, 0.003), 0.002),
+    "60": ((2.4, 2.4), Laying(4, 4, 0.0, 0.002), 0.001),
+    "30x60": ((2.4, 2.4), Laying(8, 4, 0.5, 0.002), 0.001),
+    "20x40": ((1.6, 1.6), Laying(8, 4, 0.0, 0.002), 0.002),
+    "subway": ((1.2, 1.2), Laying(16, 8, 0.5, 0.002), 0.006),
+    "mosaic": ((0.5, 0.5), Laying(20, 20, 0.0, 0.002), 0.002),
+}
+
+
+def _tile_floor(rng: np.random.Generator, p: Pattern) -> SurfaceMaps:
+    """Variant: `<laying>[-checker|-mixed|-stone]`; the last tint is the grout where there are more."""
+    laid, kind = _laid(p)
+    size, laying, bevel = _TILES[laid]
+    grout = p.tints[-1] if len(p.tints) > 1 else (0.72, 0.71, 0.68)
+    colours = p.tints[:-1] if len(p.tints) > 1 else p.tints
+    if kind == "stone":
+        # Stone ware: clouds through the whole tile, dull.
+        glaze = Glaze(colours, "plain", 0.03, 0.02, 0.45, 0.4, bevel, grout)
+    else:
+        mottle = 0.004 if min(colours[0]) > 0.8 else 0.012
+        glaze = Glaze(colours, kind or "plain", mottle, 0.009, 0.14, 0.5, bevel, grout)
+    return tile_maps(rng, pixels_of(size), size, laying, glaze)
+
+
+def _laid(p: Pattern) -> tuple[str, str]:
+    """How tiles are laid, a key of _TILES, and their kind."""
+    laid, _, kind = p.variant.partition("-")
+    return laid or "30", kind
+
+
+def _marble(rng: np.random.Generator, p: Pattern) -> SurfaceMaps:
+    size, laying = size_of(p), Laying(4, 4, 0.0, 0.002)
+    shape = pixels_of(size)
+    sheet = marble(rng, shape, p.tints[0], p.tints[-1])
+    body = cut_from(rng, sheet, tile_grid(shape, size, laying))
+    grout = p.tints[0]
+    return tile_maps(rng, shape, size, laying, Glaze((), "plain", 0.004, 0.008, 0.1, 0.5, 0.001, grout), body)  # fmt: skip
+
+
+def _terracotta(rng: np.random.Generator, p: Pattern) -> SurfaceMaps:
+    n = int(rng.choice([7, 8, 10]))
+    return terracotta_maps(
+        rng, pixels_of(size_of(p)), size_of(p), Laying(n, n, 0.0, 0.007), p.tints[0]
+    )
+
+
+def _wallpaper(rng: np.random.Generator, p: Pattern) -> SurfaceMaps:
+    """Variant: a name of wallpaper.PATTERNS; tints: ground, print, accent."""
+    return wallpaper_maps(rng, _COARSE, p.variant, p.tints[0], p.tints[1], p.tints[2])
+
+
+def _woven_cloth(rng: np.random.Generator, p: Pattern, *, twill: bool) -> SurfaceMaps:
+    second = p.tints[1] if len(p.tints) > 1 else None
+    return weave_maps(rng, _COARSE, size_of(p), p.tints[0], second=second, twill=twill)
+
+
+FAMILIES: dict[str, _Painter] = {
+    "strip": _strip_parquet,
+    "planks": _board_floor,
+    "laminate": _laminate,
+    "herringbone": _herringbone,
+    "chevron": _chevron,
+    "tiles": _tile_floor,
+    "marble": _marble,
+    "terracotta": _terracotta,
+    "brick": lambda r, p: brick_maps(
+        r, pixels_of(size_of(p)), size_of(p), p.tints[0], painted=False
+    ),
+    "painted brick": lambda r, p: brick_maps(
+        r, pixels_of(size_of(p)), size_of(p), p.tints[0], painted=True
+    ),
+    "paint": lambda r, p: paint_maps(r, pixels_of(size_of(p)), size_of(p), p.tints[0]),
+    "plaster": lambda r, p: plaster_maps(r, pixels_of(size_of(p)), size_of(p), p.tints[0]),
+    "smooth plaster": lambda r, p: plaster_maps(
+        r, pixels_of(size_of(p)), size_of(p), p.tints[0], depth=0.35
+    ),
+    "concrete": lambda r, p: concrete_maps(r, pixels_of(size_of(p)), size_of(p), p.tints[0]),
+    "carpet": lambda r, p: carpet_maps(
+        r, pixels_of(size_of(p)), size_of(p), p.tints[0], loops=False
+    ),
+    "loop carpet": lambda r, p: carpet_maps(
+        r, pixels_of(size_of(p)), size_of(p), p.tints[0], loops=True
+    ),
+    "wallpaper": _wallpaper,
+    "printed carpet": lambda r, p: printed_carpet_maps(
+        r,
+        pixels_of(size_of(p)),
+        size_of(p),
+        p.variant if p.variant in PATTERNS else PATTERNS[0],
+        (p.tints[0], p.tints[1], p.tints[2]),
+    ),
+    "grain": lambda r, p: grain_maps(r, p.wood, edge_px=pixels_of(size_of(p))[0]),
+    "weave": lambda r, p: _woven_cloth(r, p, twill=False),
+    "twill": lambda r, p: _woven_cloth(r, p, twill=True),
+    "leather": lambda r, p: leather_maps(r, _COARSE, size_of(p), p.tints[0]),
+    "upright boards": lambda r, p: board_maps(
+        r, pixels_of(size_of(p)), size_of(p), p.tints[0], upright=True
+    ),
+    "level boards": lambda r, p: board_maps(
+        r, pixels_of(size_of(p)), size_of(p), p.tints[0], upright=False
+    ),
+    "wall planks": lambda r, p: wall_plank_maps(
+        r, p.wood, pixels_of(size_of(p)), size_of(p), p.darkness, upright=p.variant != "level"
+    ),
+    "slats": lambda r, p: slat_maps(r, p.wood, pixels_of(size_of(p)), size_of(p), p.darkness),
+    "panels": lambda r, p: panel_maps(r, pixels_of(size_of(p)), size_of(p), p.tints[0]),
+}
+"""Painters by family; docs/dress.md shows them all."""

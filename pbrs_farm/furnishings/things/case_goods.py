@@ -1,0 +1,367 @@
+"""Furniture of boards: bookcases, racks, chests, cupboards, tables for walls, a chair, a bench; no effects.
+
+Sizes here are width, height, depth; boards are 18 mm thick, backs 6 mm.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import pairwise, product
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from pbrs_farm.core.catalogue import Place
+from pbrs_farm.core.classes import (
+    BOOKSHELF,
+    CABINET,
+    CHAIR,
+    DESK,
+    DRESSER,
+    NIGHT_STAND,
+    SHELVES,
+    TABLE,
+)
+from pbrs_farm.core.frames import LYING_ALONG_Z
+from pbrs_farm.core.house import Material
+from pbrs_farm.dress.style import Rgb
+from pbrs_farm.furnishings.things.bodies import frustum, revolve, slab
+from pbrs_farm.furnishings.things.cloth import bulged
+from pbrs_farm.furnishings.things.joints import drawer_box, hollow, is_drawer, opens, shelves
+from pbrs_farm.furnishings.things.maker import Maker, Pair, Size, Thing, thing
+from pbrs_farm.furnishings.things.materials import plain
+from pbrs_farm.furnishings.things.outlines import spaced
+
+_BOARD_M: Final = 0.018
+
+
+class Space(NamedTuple):
+    """What is behind a column of fronts."""
+
+    x: Pair  # between its sides
+    back: float  # z of its back's inner face
+    rail: Material | None = None  # for clothes, where it is tall
+    is_filled: bool = False  # it has its shelves already
+
+
+class Boards(NamedTuple):
+    """What a piece is made of."""
+
+    body: Material
+    front: Material
+    top: Material
+    cloth: Rgb = (0.6, 0.58, 0.55)
+
+
+@thing(group="bookcase", nyu40=BOOKSHELF, place=Place.FLOOR)
+def bookcase(m: Maker, boards: Boards, size: Size) -> None:
+    """Open shelves between two sides; some have doors below, some no back."""
+    w, h, d = size
+    hw, hd = w / 2, d / 2
+    sides(m, boards, size)
+    has_doors = h > 1.5 and m.chance(0.25)
+    plinth = m.uniform(0.05, 0.09)
+    with m.of(boards.body):
+        m.add(slab((-hw + 0.018, 0.0, hd - 0.04), (hw - 0.018, plinth, hd - 0.025)))
+        if has_doors or m.chance(0.75):
+            m.add(slab((-hw + 0.018, plinth, -hd), (hw - 0.018, h - 0.018, -hd + 0.006)))
+        # Shelves are as far apart as large books need, evenly; longer ones sag and get an upright.
+        n = max(2, round((h - plinth) / m.uniform(0.28, 0.37)))
+        levels = spaced(plinth, h - 0.018, n + 1)
+        for y in levels:
+            m.add(slab((-hw + 0.018, y, -hd + 0.006), (hw - 0.018, y + 0.018, hd - 0.002)))
+        for low, high in pairwise(levels) if w > 0.95 else ():
+            m.add(slab((-0.009, low + 0.018, -hd + 0.006), (0.009, high, hd - 0.004)))
+    if has_doors:
+        doors(m, boards, (-hw, hw), (levels[0], levels[2] + 0.018), hd, 2 if w > 0.55 else 1, -hd)
+
+
+@thing(group="shelves", nyu40=SHELVES, place=Place.FLOOR)
+def cube_shelf(m: Maker, boards: Boards, size: Size) -> None:
+    """A grid of open boxes of 34 cm, a board of 45 mm around it; up to five above one another."""
+    columns = max(1, int(size[0] / 0.36))
+    rows = min(max(1, int(size[1] / 0.36)), 5 if columns > 1 else 4)
+    inner, outer, d = 0.34, 0.045, 0.38
+    hd = d / 2
+    w, h = (columns * inner + (columns - 1) * 0.018 + 2 * outer,
+        rows * inner + (rows - 1) * 0.018 + 2 * outer)  # fmt: skip
+    hw = w / 2
+    with m.of(boards.body):
+        m.add(slab((-hw, 0.0, -hd), (hw, outer, hd)))
+        m.add(slab((-hw, h - outer, -hd), (hw, h, hd)))
+        m.add(slab((-hw, outer, -hd), (-(hw - outer), h - outer, hd)))
+        m.add(slab((hw - outer, outer, -hd), (hw, h - outer, hd)))
+        for k in range(1, columns):
+            x = -hw + outer + k * (inner + 0.018) - 0.018
+            m.add(slab((x, outer, -hd + 0.002), (x + 0.018, h - outer, hd - 0.002)))
+        # Shelves run from upright to upright.
+        for i, k in product(range(1, rows), range(columns)):
+            x, y = -hw + outer + k * (inner + 0.018), outer + i * (inner + 0.018) - 0.018
+            m.add(slab((x, y, -hd + 0.002), (x + inner, y + 0.018, hd - 0.002)))
+
+
+@thing(group="shelves", nyu40=SHELVES, place=Place.FLOOR)
+def rack(m: Maker, boards: Boards, size: Size) -> None:
+    """Boards between four posts of metal, open on all sides; a rail under each end carries them."""
+    w, h, d = size
+    hw, hd = w / 2, d / 2
+    post, thick = 0.022, 0.024
+    for x, z in product((-(hw - post / 2), hw - post / 2), (-(hd - post / 2), hd - post / 2)):
+        m.add(slab((x - post / 2, 0.0, z - post / 2), (x + post / 2, h, z + post / 2)), of=m.metal)
+    for y in spaced(0.09, h - thick - 0.004, max(3, round(h / m.uniform(0.34, 0.42)))):
+        m.add(slab((-hw + post, y, -hd + 0.004), (hw - post, y + thick, hd - 0.004)),
+            of=boards.body)  # fmt: skip
+        for a, b in ((-(hw - 0.004), -(hw - post)), (hw - post, hw - 0.004)):
+            m.add(slab((a, y, -hd + post), (b, y + thick, hd - post)), of=m.metal)
+
+
+@thing(group="dresser", nyu40=DRESSER, place=Place.FLOOR)
+def chest(m: Maker, boards: Boards, size: Size) -> None:
+    """A chest of drawers, one or two of them side by side."""
+    chest_of_drawers(m, boards, size)
+
+
+@thing(group="nightstand", nyu40=NIGHT_STAND, place=Place.FLOOR)
+def nightstand(m: Maker, boards: Boards, size: Size) -> None:
+    """A chest of drawers beside a bed."""
+    chest_of_drawers(m, boards, size)
+
+
+def chest_of_drawers(m: Maker, boards: Boards, size: Size) -> None:
+    """Drawers of equal height, in two columns where it is wide."""
+    w, h, _d = size
+    column = ("drawer",) * max(1, round((h - 0.12) / m.uniform(0.17, 0.25)))
+    cupboard(m, boards, size, True, [column] * (2 if w > 0.95 else 1))
+
+
+@thing(group="cabinet", nyu40=CABINET, place=Place.FLOOR)
+def sideboard(m: Maker, boards: Boards, size: Size) -> None:
+    """A long low cupboard with doors, and drawers in one column."""
+    n = max(2, round(size[0] / 0.46))
+    k = m.integers(0, n)
+    cupboard(m, boards, size, True, [("door",)] * k + [("drawer",) * 3] + [("door",)] * (n - k - 1))
+
+
+@thing(group="wardrobe", nyu40=CABINET, place=Place.FLOOR)
+def wardrobe(m: Maker, boards: Boards, size: Size) -> None:
+    """A tall cupboard of two to four doors; some have drawers below."""
+    column = ("door", "drawer") if m.chance(0.3) else ("door",)
+    cupboard(m, boards, size, False, [column] * max(2, round(size[0] / 0.48)))
+
+
+@thing(group="cabinet", nyu40=CABINET, place=Place.FLOOR)
+def tall_cabinet(m: Maker, boards: Boards, size: Size) -> None:
+    """A narrow cupboard: shelves that are open in the middle, doors above and below."""
+    w, h, d = size
+    hw, hd = w / 2, d / 2
+    low, high = 0.4 * h, 0.62 * h
+    sides(m, boards, size)
+    with m.of(boards.body):
+        m.add(slab((-hw + 0.018, 0.06, -hd), (hw - 0.018, h - 0.018, -hd + 0.006)))
+        m.add(slab((-hw + 0.018, 0.0, hd - 0.03), (hw - 0.018, 0.06, hd - 0.015)))
+        for y in (0.06, low, (low + high) / 2, high, h - 0.018):
+            m.add(slab((-hw + 0.018, y, -hd + 0.006), (hw - 0.018, y + 0.018, hd - 0.002)))
+    for span in ((0.06, low + 0.018), (high, h)):
+        doors(m, boards, (-hw, hw), span, hd, 1, -hd)
+
+
+@thing(group="cabinet", nyu40=CABINET, place=Place.FLOOR)
+def shoe_cabinet(m: Maker, boards: Boards, size: Size) -> None:
+    """A flat cupboard with flaps one above another."""
+    cupboard(m, boards, size, False,
+        [("flap",) * max(2, round(size[1] / 0.42))] * (2 if size[0] > 0.85 else 1))  # fmt: skip
+
+
+@thing(group="coffee_table", nyu40=TABLE, place=Place.FLOOR)
+def console(m: Maker, boards: Boards, size: Size) -> None:
+    """A narrow table on four legs, some with a board near the floor."""
+    w, _h, d = size
+    table(m, boards, size, m.uniform(0.03, 0.045))
+    if m.chance(0.6):
+        y = m.uniform(0.12, 0.2)
+        m.add(slab((-w / 2 + 0.03, y, -d / 2 + 0.025), (w / 2 - 0.03, y + 0.018, d / 2 - 0.025)),
+            of=boards.body)  # fmt: skip
+
+
+@thing(group="desk", nyu40=DESK, place=Place.FLOOR)
+def desk(m: Maker, boards: Boards, size: Size) -> None:
+    """A table to write at, drawers under one end of it."""
+    w, h, d = size
+    table(m, boards, size, 0.04)
+    # Three drawers hang between the legs of one end, or stand on the floor.
+    if m.chance(0.7):
+        side = m.pick(-1.0, 1.0)
+        x0, x1 = sorted((side * (w / 2 - 0.06), side * (w / 2 - 0.44)))
+        low, high = 0.06 if m.chance(0.5) else h - 0.24, h - 0.026
+        hollow(m, (x0, x1), (low, high), (-d / 2 + 0.03, d / 2 - 0.04), _BOARD_M, boards.body)
+        column_of_fronts(m, boards, (x0, x1), (low, high), d / 2 - 0.04,
+            ("drawer",) * max(1, round((high - low) / 0.19)), m.chance(0.4), True,
+            Space((x0 + _BOARD_M, x1 - _BOARD_M), -d / 2 + 0.038))  # fmt: skip
+
+
+@thing(group="chair", nyu40=CHAIR, place=Place.FLOOR)
+def desk_chair(m: Maker, boards: Boards) -> None:
+    """A plain chair of wood: four legs, a seat, two bars as its back."""
+    w, d, seat, h, leg = 0.43, 0.44, 0.46, m.uniform(0.8, 0.92), 0.034
+    hw, hd = w / 2, d / 2
+    with m.of(boards.body):
+        for x, front in product((-(hw - leg / 2), hw - leg / 2), (True, False)):
+            z, high = hd - leg / 2 if front else -hd + leg / 2, seat - 0.022 if front else h
+            m.add(slab((x - leg / 2, 0.0, z - leg / 2), (x + leg / 2, high, z + leg / 2)))
+        m.add(slab((-hw + leg, seat - 0.022, -hd + 0.003), (hw - leg, seat, hd)))
+        for a, b in ((-hw, -(hw - leg)), (hw - leg, hw)):
+            m.add(slab((a, seat - 0.022, -hd + leg), (b, seat, hd)))
+        for y in (h - 0.09, h - 0.24):
+            m.add(slab((-hw + leg, y, -hd + 0.006), (hw - leg, y + 0.07, -hd + 0.024)))
+
+
+@thing(group="ottoman", nyu40=CHAIR, place=Place.FLOOR)
+def bench(m: Maker, boards: Boards, size: Size) -> None:
+    """A bench for two with a cushion on it."""
+    w, h, d = size
+    table(m, boards, (w, h - 0.05, d), 0.045)
+    m.add(bulged((w - 0.02, 0.05, d - 0.02), n=8, edge=0.6, bulge=8.0), at=(0.0, h - 0.0255, 0.0),
+        of=plain("bench cushion", boards.cloth, 0.95))  # fmt: skip
+
+
+def sides(m: Maker, boards: Boards, size: Size) -> None:
+    """Two uprights from the floor to the top."""
+    w, h, d = size
+    m.add(slab((-w / 2, 0.0, -d / 2), (-w / 2 + 0.018, h, d / 2)), of=boards.body)
+    m.add(slab((w / 2 - 0.018, 0.0, -d / 2), (w / 2, h, d / 2)), of=boards.body)
+
+
+def table(m: Maker, boards: Boards, size: Size, leg: float) -> None:
+    """A top on four legs with rails under it."""
+    w, h, d = size
+    thick, x, z = 0.025, w / 2 - 0.01 - leg / 2, d / 2 - 0.01 - leg / 2
+    m.add(slab((-w / 2, h - thick, -d / 2), (w / 2, h, d / 2)), of=boards.top)
+    with m.of(boards.body):
+        for a, c in product((-x, x), (-z, z)):
+            m.add(slab((a - leg / 2, 0.0, c - leg / 2), (a + leg / 2, h - thick, c + leg / 2)))
+        to_x, to_z = w / 2 - 0.01 - leg, d / 2 - 0.01 - leg
+        for c in (-z, z):
+            m.add(slab((-to_x, h - thick - 0.06, c - 0.009), (to_x, h - thick, c + 0.009)))
+        for a in (-x, x):
+            m.add(slab((a - 0.009, h - thick - 0.06, -to_z), (a + 0.009, h - thick, to_z)))
+
+
+def cupboard(m: Maker, boards: Boards, size: Size, may_have_legs: bool,
+    columns: Sequence[Sequence[str]]) -> None:  # fmt: skip
+    """A closed box behind columns of fronts, which are named from the top downwards."""
+    w, h, d = size
+    foot = carcass(m, boards, size, may_have_legs)
+    step, back = w / len(columns), -d / 2 + 0.008
+    has_knobs = bool(np.random.default_rng(m.integers(0, 1 << 30)).random() < 0.4)
+    for k, kinds in enumerate(columns):
+        a, b, t = -w / 2 + k * step, -w / 2 + (k + 1) * step, _BOARD_M
+        space = (a + (t / 2 if k else t), b - (t / 2 if k < len(columns) - 1 else t))
+        if k:
+            m.add(slab((a - t / 2, foot + t, back), (a + t / 2, h - 0.026, d / 2 - 0.018)),
+                of=boards.body)  # fmt: skip
+        column_of_fronts(m, boards, (a, b), (foot, h - 0.026), d / 2 - 0.018, kinds, has_knobs,
+            k % 2 == 0, Space(space, back, rail=m.metal if k % 2 == 0 else None))  # fmt: skip
+
+
+def carcass(m: Maker, boards: Boards, size: Size, may_have_legs: bool) -> float:
+    """The box behind fronts, a top over it, a plinth or legs that taper under it.
+
+    The box comes first.
+    """
+    w, h, d = size
+    hw, hd = w / 2, d / 2
+    thick = m.pick(0.018, 0.025)
+    has_legs = may_have_legs and m.chance(0.55)
+    foot = m.uniform(0.09, 0.16) if has_legs else m.uniform(0.04, 0.07)
+    hollow(m, (-hw, hw), (foot, h - thick), (-hd, hd - 0.018), _BOARD_M, boards.body)
+    m.add(slab((-hw - 0.004, h - thick, -hd), (hw + 0.004, h, hd + 0.006)), of=boards.top)
+    if not has_legs:
+        m.add(slab((-hw + 0.01, 0.0, -hd), (hw - 0.01, foot, hd - 0.05)), of=boards.body)
+    else:
+        for x, z in product((-hw + 0.06, hw - 0.06), (-hd + 0.05, hd - 0.08)):
+            m.add(frustum((0.013, 0.0), (0.022, foot), n=12), at=(x, 0.0, z), of=boards.top)
+    return float(np.float32(foot))
+
+
+def column_of_fronts(m: Maker, boards: Boards, x: Pair, y: Pair, z: float, kinds: Sequence[str],
+    has_knobs: bool, opens_left: bool, space: Space) -> None:  # fmt: skip
+    """Fronts from the top downwards before z; a door is 3.2 times as high as a drawer."""
+    total, below = 0.0, 0.0
+    for kind in kinds:
+        total += 3.2 if kind == "door" and len(kinds) > 1 else 1.0
+    for kind in kinds:
+        above = below
+        below += 3.2 if kind == "door" and len(kinds) > 1 else 1.0
+        front(m, boards, x, (y[1] - (y[1] - y[0]) * (below / total),
+            y[1] - (y[1] - y[0]) * (above / total)), z, kind, has_knobs, opens_left, space)  # fmt: skip
+
+
+def doors(m: Maker, boards: Boards, x: Pair, y: Pair, z: float, n: int, back: float) -> None:
+    """Doors side by side before z, shelves behind them already; back: of what is behind."""
+    has_knobs, space = m.chance(0.4), Space(x, back, is_filled=True)
+    for k in range(n):
+        front(m, boards, (x[0] + (x[1] - x[0]) * k / n, x[0] + (x[1] - x[0]) * (k + 1) / n), y, z,
+            "door", has_knobs, k % 2 == 0, space)  # fmt: skip
+
+
+def front(m: Maker, boards: Boards, x: Pair, y: Pair, z: float, kind: str, has_knobs: bool,
+    opens_left: bool, space: Space) -> None:  # fmt: skip
+    """A door, drawer or flap that opens, with what is behind it."""
+    with opens(m, kind, x, y, z + 0.0165, space.back, opens_left):
+        face(m, boards, x, y, z, kind, has_knobs, opens_left)
+        if is_drawer(kind, y):
+            drawer_box(m, space.x, y, (space.back, z + 0.0005), boards.body)
+    if not space.is_filled and not is_drawer(kind, y):
+        shelves(m, space.x, y, (space.back, z), boards.body, space.rail)
+
+
+def face(m: Maker, boards: Boards, x: Pair, y: Pair, z: float, kind: str, has_knobs: bool,
+    opens_left: bool) -> None:  # fmt: skip
+    """A front 16 mm thick, 2 mm from its neighbours, and what opens it.
+
+    That stands at the side of a door that has no hinges, and lies across a drawer.
+    """
+    m.add(slab((x[0] + 0.002, y[0] + 0.002, z + 0.0005), (x[1] - 0.002, y[1] - 0.002, z + 0.0165)),
+        of=boards.front)  # fmt: skip
+    z, wide, tall, middle = z + 0.0165, x[1] - x[0], y[1] - y[0], (x[0] + x[1]) / 2
+    if kind == "door":
+        a, long = x[1] - 0.035 if opens_left else x[0] + 0.035, min(0.16, 0.3 * tall)
+        high = y[0] + 0.55 * tall if tall > 0.9 else y[1] - 0.05 - long
+        if has_knobs:
+            knob(m, a, high, z)
+        else:
+            bar(m, (a - 0.005, high - long), (a + 0.005, high + long), z)
+    else:
+        high = y[1] - 0.035 if kind == "flap" else (y[0] + y[1]) / 2
+        out, half = 0.25 * wide if wide > 0.5 else 0.0, min(0.08, 0.3 * wide)
+        if has_knobs:
+            for a in (-out, out) if out else (0.0,):
+                knob(m, middle + a, high, z)
+        else:
+            bar(m, (middle - half, high - 0.005), (middle + half, high + 0.005), z)
+
+
+def knob(m: Maker, x: float, y: float, z: float) -> None:
+    """A round knob on a front at z."""
+    m.add(revolve([(0.0, 0.0), (0.006, 0.0), (0.006, 0.012), (0.014, 0.016), (0.012, 0.026),
+        (0.0, 0.028)], n=12), turn=LYING_ALONG_Z, at=(x, y, z), of=m.metal)  # fmt: skip
+
+
+def bar(m: Maker, low: Pair, high: Pair, z: float) -> None:
+    """A bar on two short feet."""
+    m.add(slab((low[0], low[1], z + 0.018), (high[0], high[1], z + 0.028)), of=m.metal)
+    wide, tall = high[0] - low[0], high[1] - low[1]
+    for end in (0.1, 0.9):
+        x, y = (low[0] + wide * (end if wide > tall else 0.5),
+            low[1] + tall * (0.5 if wide > tall else end))  # fmt: skip
+        m.add(slab((x - 0.004, y - 0.004, z), (x + 0.004, y + 0.004, z + 0.018)), of=m.metal)
+
+
+CASE_GOODS: Final[Mapping[str, Thing[[Boards, Size]]]] = {
+    one.name: one
+    for one in (
+        bookcase, cube_shelf, rack, chest, nightstand, sideboard, wardrobe, tall_cabinet,
+        shoe_cabinet, console, desk, bench,
+    )
+}  # fmt: skip
+"""What furniture.toml may name as a model; desk_chair has one size."""

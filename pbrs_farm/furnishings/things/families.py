@@ -1,0 +1,205 @@
+"""The generated catalogue: families of furniture, many variations each.
+
+A variation is known by its family, its number and its style (`generated#cooker-07-nordic`). Its size
+is drawn at once, its shape when it is used. Variations of a set (a kitchen) that have one number share
+what the set draws. Effects: imports the modules of installed plugins that add furniture.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+from typing import Any, Final
+
+import numpy as np
+
+from pbrs_farm.core import keys
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.catalogue import Catalogue, Piece, Place, Shape
+from pbrs_farm.core.classes import LAMP
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.house import ItemKind, LightPart, MaterialKind, Surface
+from pbrs_farm.core.lighting import PowerUnit
+from pbrs_farm.core.plugins import marks_in_digest, plugins
+from pbrs_farm.dress.style import Style, style_for
+from pbrs_farm.furnishings.things import (
+    bathroom,
+    beds,
+    bins,
+    chandeliers,
+    fitted,
+    joints,
+    kitchen,
+    lamps,
+    plants,
+    radiators,
+    seating,
+    storage,
+    tables,
+)
+from pbrs_farm.furnishings.things.assembly import GENERATED
+from pbrs_farm.furnishings.things.maker import Family, described_in
+
+VERSION: Final = 8
+"""Of what families are written with: part of the catalogue's digest. Raised when a shape changes."""
+
+# The order decides which piece a seed draws.
+_MODULES: Final = (
+    kitchen, bathroom, seating, tables, storage, beds, lamps, radiators, bins, chandeliers, plants,
+    fitted,
+)  # fmt: skip
+
+_WARM: Final = (1.0, 0.79, 0.55)  # linear, of a lamp of about 3000 K
+_FLUX_LM: Final = 1000.0  # of a lamp; homes give it what their rooms need
+
+
+def with_families(catalogue: Catalogue) -> Catalogue:
+    """The catalogue and every variation of every family, behind its own pieces."""
+    return replace(
+        catalogue,
+        pieces=(*catalogue.pieces, *family_pieces()),
+        load=lambda piece: family_shape(piece) if is_of_family(piece) else catalogue.load(piece),
+        digest=keys.digest(catalogue.digest, families_digest()),
+    )
+
+
+@cache
+def families() -> Mapping[str, Family]:
+    """Every family by name, ours first, then those of installed plugins.
+
+    Raises BadInput where two families have one name or a plugin names no module with families,
+    MachineFailed where a plugin's module cannot be imported.
+    """
+    modules = []
+    for plugin in plugins("furniture").values():
+        module = plugin.load()
+        if not isinstance(module, ModuleType) or not described_in((module,), Family):
+            raise BadInput(plugin.mark, plugin.entry.value, "is no module with a family in it")
+        modules.append(module)
+    return described_in((*_MODULES, *modules), Family)
+
+
+def is_of_family(piece: Piece) -> bool:
+    """Whether a piece is a variation of a family."""
+    return piece.id in family_numbers()
+
+
+@cache
+def family_pieces() -> tuple[Piece, ...]:
+    """Every variation, in the order of the files."""
+    return tuple(
+        _piece(name, number)
+        for name, family in families().items()
+        for number in range(1, family.variants + 1)
+    )
+
+
+@cache
+def family_numbers() -> dict[str, tuple[str, int]]:
+    """Of each variation's id: its family, its number."""
+    rows = (
+        (name, number)
+        for name, family in families().items()
+        for number in range(1, family.variants + 1)
+    )
+    return {piece.id: row for piece, row in zip(family_pieces(), rows, strict=True)}
+
+
+def family_shape(piece: Piece) -> Shape:
+    """The shape of a variation, as large as it says."""
+    return _lit(_sized(_drawn(piece), piece), piece)
+
+
+def drawn_size(piece: Piece) -> tuple[float, float, float]:
+    """Width, depth and height of a variation as its steps draw it, metres."""
+    low, high = _drawn(piece).bounds
+    width, height, depth = (float(v) for v in high - low)
+    return width, depth, height
+
+
+def _drawn(piece: Piece) -> Shape:
+    name, number = family_numbers()[piece.id]
+    family = families()[name]
+    style, shared = _shared(family, number)
+    rng = np.random.default_rng(keys.seed("family", "shape", name, number))
+    _, shape = family.make(rng, style, piece.size, *shared)
+    return shape
+
+
+def _shared(family: Family, number: int) -> tuple[Style, tuple[Any, ...]]:
+    # The taste of a variation, and what it has in common with those of its set.
+    of = family.of_set.__name__ if family.of_set else family.name
+    rng = np.random.default_rng(keys.seed("family", of, number))
+    style = style_for(rng)
+    return style, family.shared(rng, style)
+
+
+def _piece(name: str, number: int) -> Piece:
+    family = families()[name]
+    style, shared = _shared(family, number)
+    own = np.random.default_rng(keys.seed("family", "size", name, number))
+    taste = style.name.replace(" ", "-")
+    return Piece(
+        f"{GENERATED}{name}-{number:02d}-{taste}", family.called.replace("_", " ").capitalize(),
+        family.group, family.place, family.nyu40, family.size(own, style, *shared),
+        ItemKind.LAMP if family.nyu40 == LAMP else ItemKind.OBJECT,
+        of_set=f"{family.of_set.__name__} {number}" if family.of_set else "",
+    )  # fmt: skip
+
+
+def _sized(shape: Shape, piece: Piece) -> Shape:
+    """The shape as wide, deep and high as the piece says, with what hangs on a wall before z = 0."""
+    low, high = shape.bounds
+    wanted = np.array([piece.size[0], piece.size[2], piece.size[1]])
+    scale = wanted / np.maximum(high - low, 1e-6)
+    base = np.array([(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])
+    if piece.place is Place.WALL:
+        base[2] = low[2]
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = np.diag(scale), -scale * base
+    return replace(
+        shape,
+        surfaces=tuple(_scaled(s, scale, base) for s in shape.surfaces),
+        joints=tuple(joint.placed(matrix) for joint in shape.joints),
+    )
+
+
+def _scaled(surface: Surface, scale: F64, base: F64) -> Surface:
+    points = (surface.positions.astype(np.float64) - base) * scale
+    normals = surface.normals
+    if normals is not None:
+        turned = normals.astype(np.float64) / scale
+        turned /= np.maximum(np.linalg.norm(turned, axis=1, keepdims=True), 1e-12)
+        normals = turned.astype(np.float32)
+    return replace(surface, positions=points.astype(np.float32), normals=normals)
+
+
+def _lit(shape: Shape, piece: Piece) -> Shape:
+    """The shape with the light that its surfaces of opal glass give together."""
+    bulbs = tuple(
+        k
+        for k, surface in enumerate(shape.surfaces)
+        if shape.materials[surface.material].kind is MaterialKind.BULB
+    )
+    if piece.kind is not ItemKind.LAMP or not bulbs:
+        return shape
+    points = shape.surfaces[bulbs[0]].positions.astype(np.float64)
+    low, high = points.min(0), points.max(0)
+    x, y, z = (float(v) for v in (low + high) / 2)
+    light = LightPart(
+        (x, y, z), float((high - low).min()) / 2, _FLUX_LM, PowerUnit.LUMEN, rgb_linear=_WARM,
+        emitting=bulbs,
+    )  # fmt: skip
+    return replace(shape, lights=(light,))
+
+
+@cache
+def families_digest() -> str:
+    """Of everything that families are written with, and of the plugins that add some."""
+    texts = [Path(str(module.__file__)).read_bytes() for module in (joints, *_MODULES)]
+    known = [hashlib.sha256(text).hexdigest() for text in texts]
+    return keys.digest(VERSION, *known, *marks_in_digest("furniture", plugins("furniture")))

@@ -1,0 +1,236 @@
+"""What fills a wall from side to side and up to the ceiling: wardrobes, bookcases, show cases; no effects.
+
+Furnishing stretches them to the wall they are for (generate/furnish/fitted_walls.py), and so does dressing.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from pbrs_farm.core.catalogue import Place
+from pbrs_farm.core.classes import BOOKSHELF, CABINET
+from pbrs_farm.core.house import Material
+from pbrs_farm.furnishings.things.bodies import bevelled, frustum, revolve, slab
+from pbrs_farm.furnishings.things.joints import (
+    Inside,
+    Look,
+    fronts_of,
+    hollow,
+    opens,
+    pull,
+    shelves,
+)
+from pbrs_farm.furnishings.things.maker import Maker, Pair, Size, family
+from pbrs_farm.furnishings.things.materials import (
+    BLACK_STEEL,
+    CHROME,
+    CLEAR,
+    SILVERED,
+    STEEL,
+    WHITE,
+    WHITE_STEEL,
+    glossy,
+)
+
+_BOARD_M: Final = 0.018
+_BACK_M: Final = 0.008
+
+
+def _stuff(m: Maker, dark_share: float) -> Material:
+    """White, a paint, the home's wood, or the same stained dark."""
+    if m.chance(dark_share):
+        return m.dark_timber
+    return m.pick(m.timber, WHITE, WHITE, glossy("paint", m.paint(), 0.4))
+
+
+def _filled_in(m: Maker, size: Size, front: float, foot: float, of: Material) -> tuple[Pair, Pair]:
+    """A plinth, and strips at both ends and at the ceiling; x and y of what is between."""
+    w, d, h = size
+    side, top = m.uniform(0.02, 0.05), m.uniform(0.02, 0.06)
+    with m.of(of):
+        m.add(slab((-w / 2, 0.0, -d / 2), (w / 2, foot, front - 0.03)))
+        for a, b in ((-w / 2, -w / 2 + side), (w / 2 - side, w / 2)):
+            m.add(bevelled((a, foot, front - 0.02), (b, h, front + 0.02), 0.001))
+        m.add(bevelled((-w / 2 + side, h - top, front - 0.02), (w / 2 - side, h, front + 0.02),
+            0.001))  # fmt: skip
+    return (-w / 2 + side, w / 2 - side), (foot, h - top)
+
+
+@family(group="fitted_wardrobe", nyu40=CABINET, place=Place.FLOOR, called="fitted_wardrobe", variants=36,
+    size=lambda m: (m.pick(1.5, 1.8, 2.1, 2.5, 2.9, 3.4, 3.9), m.pick(0.56, 0.6, 0.62), m.pick(2.4, 2.5, 2.6)))  # fmt: skip
+def fitted_wardrobe(m: Maker, size: Size) -> None:
+    """Doors from wall to wall: as high as the room, in two rows, or sliding, some of mirror."""
+    _w, d, _h = size
+    body = _stuff(m, 0.2)
+    front = m.pick(body, body, WHITE, m.timber)
+    form = m.weighted(0.4, 0.28, 0.32)
+    kinds = ("flat", "flat", "raised") if form == 1 else ("flat", "shaker", "shaker", "grooved")
+    look = Look(m.pick(*kinds), front, body, body, m.pick("square", "none", "edge", "disc"), m.metal)  # fmt: skip
+    f = d / 2 - 0.02
+    x, y = _filled_in(m, size, f, m.pick(0.05, 0.07, 0.1), body)
+    hollow(m, x, y, (-d / 2, f), _BOARD_M, body)
+    inside = Inside(-d / 2 + _BACK_M, rail=CHROME)
+    n = max(2, round((x[1] - x[0]) / (0.62 if look.kind == "grooved" else 0.5)))
+    match form:
+        case 0:
+            fronts_of(m, look, x, y, f, [("door",)] * n, False, inside)
+        case 1:  # small doors over tall ones
+            cut = y[1] - m.uniform(0.42, 0.55)
+            fronts_of(m, look, x, (y[0], cut), f, [("door",)] * n, False, inside)
+            m.add(slab((x[0] + _BOARD_M, cut, -d / 2 + _BACK_M), (x[1] - _BOARD_M, cut + 0.016, f)),
+                of=body)  # fmt: skip
+            fronts_of(m, look, x, (cut, y[1]), f, [("door",)] * n, True, inside)
+        case 2:
+            _leaves(m, x, y, f - 0.03, -d / 2 + _BACK_M, front, body)
+
+
+def _leaves(
+    m: Maker, x: Pair, y: Pair, z: float, back: float, front: Material, body: Material
+) -> None:
+    """Leaves that slide one before the other on two rails; every other one may be a mirror."""
+    n = max(2, round((x[1] - x[0]) / 1.0))
+    step, rail = (x[1] - x[0]) / n, m.pick(STEEL, BLACK_STEEL, WHITE_STEEL, body)
+    mirror, is_panelled = m.pick(-1, -1, 0, 1), m.chance(0.4)
+    for a, b in ((y[0] + _BOARD_M, y[0] + _BOARD_M + 0.03), (y[1] - _BOARD_M - 0.04, y[1] - _BOARD_M)):  # fmt: skip
+        m.add(slab((x[0] + _BOARD_M, a, z - 0.022), (x[1] - _BOARD_M, b, z + 0.048)), of=rail)
+    low, high = y[0] + _BOARD_M + 0.031, y[1] - _BOARD_M - 0.041
+    for k in range(n):
+        a = max(x[0] + k * step - 0.03, x[0] + _BOARD_M)
+        b = min(x[0] + (k + 1) * step + 0.03, x[1] - _BOARD_M)
+        at = z + 0.024 * (k % 2)
+        with m.sliding("leaf", along=(1.0 if k < n - 1 else -1.0, 0.0, 0.0), upper_m=step - 0.08):
+            m.add(bevelled((a + 0.002, low, at), (b - 0.002, high, at + 0.018), 0.0015), of=front)
+            if k % 2 == mirror:
+                m.add(slab((a + 0.03, low + 0.03, at + 0.0182), (b - 0.03, high - 0.03, at + 0.0192)),
+                    of=SILVERED)  # fmt: skip
+            elif is_panelled:
+                for c in (1, 2):
+                    mid = low + (high - low) * c / 3
+                    m.add(slab((a + 0.002, mid - 0.006, at + 0.0182), (b - 0.002, mid + 0.006, at + 0.0192)),
+                        of=rail)  # fmt: skip
+            for grip in (a + 0.002, b - 0.024):
+                m.add(slab((grip, low, at + 0.0182), (grip + 0.022, high, at + 0.0198)), of=rail)
+        inner = (
+            x[0] + k * step + (0.008 if k else _BOARD_M),
+            x[0] + (k + 1) * step - (0.008 if k < n - 1 else _BOARD_M),
+        )
+        if k:
+            m.add(slab((inner[0] - 0.016, y[0] + _BOARD_M, back),
+                (inner[0], y[1] - _BOARD_M, z - 0.03)), of=body)  # fmt: skip
+        shelves(m, inner, y, (back, z - 0.03), body, CHROME if k % 2 == 0 else None)
+
+
+@family(group="fitted_bookcase", nyu40=BOOKSHELF, place=Place.FLOOR, called="fitted_bookcase", variants=36,
+    size=lambda m: (m.pick(1.5, 1.8, 2.1, 2.5, 2.9, 3.4, 3.9), m.pick(0.28, 0.3, 0.34), m.pick(2.4, 2.5, 2.6)))  # fmt: skip
+def fitted_bookcase(m: Maker, size: Size) -> None:
+    """Shelves from wall to wall: down to the floor, over cupboards or drawers, or beside a closed bay."""
+    _w, d, _h = size
+    body = _stuff(m, 0.3)
+    look = Look(m.pick("flat", "flat", "shaker"), m.pick(body, body, WHITE), body, body,
+        m.pick("none", "edge", "square"), m.metal)  # fmt: skip
+    form = m.weighted(0.4, 0.4, 0.2)
+    t, f = m.pick(0.018, 0.022, 0.03, 0.038), d / 2 - 0.02
+    x, y = _filled_in(m, size, f, m.pick(0.05, 0.08), body)
+    back = -d / 2 + 0.008
+    n = max(2, round((x[1] - x[0]) / m.uniform(0.55, 0.8)))
+    cut = y[0] + (m.uniform(0.55, 0.8) if form == 1 else 0.0)
+    rows = max(3, round((y[1] - cut) / m.uniform(0.3, 0.38)))
+    step = (x[1] - x[0] - t) / n
+    closed = m.integers(0, n) if form == 2 else -1
+    with m.of(body):
+        m.add(slab((x[0], y[0], -d / 2), (x[1], y[1], back)))
+        for k in range(n + 1):
+            a = x[0] + k * step
+            m.add(bevelled((a, y[0], back), (a + t, y[1], f), 0.0012))
+        for k in range(n):
+            a, b = x[0] + k * step + t, x[0] + (k + 1) * step
+            # Boards at the foot and the top, and shelves not all at the heights of the next bay's.
+            shift = m.pick(0.0, 0.0, 0.0, 0.06)
+            for j in range(rows + 1):
+                at = cut + (y[1] - t - cut) * j / rows - (shift if 1 < j < rows else 0.0)
+                m.add(slab((a, at, back), (b, at + t, f - 0.004)))
+    if form == 1:
+        kinds = m.pick(("door",), ("door",), ("drawer", "drawer"))
+        fronts_of(m, look, (x[0], x[1]), (y[0], cut + t), f, [kinds] * n, False,
+            Inside(back, has_boards=False))  # fmt: skip
+    elif closed >= 0:
+        a = x[0] + closed * step + t / 2
+        fronts_of(m, look, (a, a + step), (y[0], y[1]), f, [("door",)] * 2, False,
+            Inside(back, has_boards=False))  # fmt: skip
+
+
+@family(group="fitted_cabinet", nyu40=CABINET, place=Place.FLOOR, called="fitted_show_case", variants=24,
+    size=lambda m: (m.pick(1.3, 1.5, 1.8, 2.1), m.pick(0.4, 0.44, 0.48), m.pick(2.1, 2.3, 2.5)))  # fmt: skip
+def fitted_cabinet(m: Maker, size: Size) -> None:
+    """Doors of glass with china behind them over a deeper row of cupboards or drawers."""
+    w, d, h = size
+    hw = w / 2
+    body = _stuff(m, 0.55)
+    look = Look(m.pick("flat", "raised"), body, body, body, m.pick("edge", "square", "none"),
+        m.metal)  # fmt: skip
+    n, f = max(2, round(w / 0.56)), d / 2 - 0.025
+    low, cut, shallow = m.pick(0.05, 0.08), m.uniform(0.8, 0.95), f - m.uniform(0.08, 0.14)
+    has_crown = m.chance(0.6)
+    top = h - 0.045 if has_crown else h
+    m.add(slab((-hw + 0.01, 0.0, -d / 2), (hw - 0.01, low, f - 0.03)), of=body)
+    hollow(m, (-hw, hw), (low, cut - 0.025), (-d / 2, f), _BOARD_M, body)
+    fronts_of(m, look, (-hw, hw), (low, cut - 0.025), f,
+        [m.pick(("door",), ("door",), ("drawer", "drawer"))] * n, False,
+        Inside(-d / 2 + _BACK_M))  # fmt: skip
+    m.add(
+        bevelled((-hw, cut - 0.025, -d / 2), (hw, cut, d / 2), 0.004),
+        of=m.pick(body, body, m.timber),
+    )
+    hollow(m, (-hw + 0.004, hw - 0.004), (cut, top), (-d / 2, shallow), _BOARD_M, body)
+    if has_crown:
+        m.add(bevelled((-hw, top, -d / 2), (hw, h, shallow + 0.05), 0.01), of=body)
+    back, rows = -d / 2 + _BACK_M, max(2, round((top - cut) / 0.42))
+    ware = m.china()
+    for k in range(n):
+        a, b = -hw + 0.004 + (w - 0.008) * k / n, -hw + 0.004 + (w - 0.008) * (k + 1) / n
+        x = (a + (0.008 if k else _BOARD_M), b - (0.008 if k < n - 1 else _BOARD_M))
+        if k:
+            m.add(slab((a - 0.008, cut + _BOARD_M, back), (a + 0.008, top - _BOARD_M, shallow)),
+                of=body)  # fmt: skip
+        with opens(m, "door", (a, b), (cut, top), shallow + 0.02, back, k % 2 == 0):
+            _glass_door(m, look, (a, b), (cut, top), shallow, k % 2 == 0)
+        for j in range(rows):
+            y = cut + _BOARD_M + (top - 2 * _BOARD_M - cut) * j / rows
+            if j:
+                m.add(slab((x[0], y - 0.016, back), (x[1], y, shallow - 0.02)), of=body)
+            _china(m, ware, x, y, (back + shallow - 0.02) / 2)
+
+
+def _glass_door(m: Maker, look: Look, x: Pair, y: Pair, z: float, opens_left: bool) -> None:
+    """A frame of wood about a pane, 20 mm thick before z."""
+    a, b, c, e = x[0] + 0.0015, x[1] - 0.0015, y[0] + 0.0015, y[1] - 0.0015
+    r = 0.05
+    with m.of(look.front):
+        m.add(bevelled((a, c, z), (a + r, e, z + 0.02), 0.0015))
+        m.add(bevelled((b - r, c, z), (b, e, z + 0.02), 0.0015))
+        m.add(bevelled((a + r, c, z), (b - r, c + r, z + 0.02), 0.0015))
+        m.add(bevelled((a + r, e - r, z), (b - r, e, z + 0.02), 0.0015))
+    m.add(slab((a + r, c + r, z + 0.008), (b - r, e - r, z + 0.012)), of=CLEAR)
+    pull(m, "square", b - r / 2 if opens_left else a + r / 2, (c + e) / 2, z + 0.02, False, 0.12,
+        look.pull_material)  # fmt: skip
+
+
+def _china(m: Maker, ware: Material, x: Pair, y: float, z: float) -> None:
+    """One or two things that stand behind glass on a shelf at y."""
+    n = m.weighted(0.35, 0.35, 0.3)
+    for k in range(n):
+        at = (x[0] + (x[1] - x[0]) * (k + 0.5) / n, y + 0.0002, z + m.normal(0, 0.01))
+        r = min(0.1, 0.42 * (x[1] - x[0]) / n)
+        match m.integers(0, 4):
+            case 0:  # plates on each other
+                high = m.uniform(0.03, 0.09)
+                m.add(revolve([(0.0, 0.0), (0.6 * r, 0.0), (r, 0.012), (r, high), (0.0, high - 0.01)],
+                    n=10), at=at, of=ware)  # fmt: skip
+            case 1:  # a jug or a vase
+                high = m.uniform(0.14, 0.22)
+                m.add(revolve([(0.0, 0.0), (0.5 * r, 0.0), (0.75 * r, 0.35 * high), (0.35 * r, 0.8 * high),
+                    (0.45 * r, high), (0.0, high - 0.01)], n=10), at=at, of=m.pick(ware, m.china()))  # fmt: skip
+            case _:  # bowls, cups upside down
+                high = m.uniform(0.07, 0.11)
+                wide, narrow = min(0.06, 0.7 * r), min(0.035, 0.4 * r)
+                m.add(frustum((wide, 0.0), (narrow, high), n=10), at=at, of=ware)

@@ -1,0 +1,319 @@
+"""What furniture is put together from: carcasses, fronts that open, pulls, legs; no effects."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
+from itertools import product
+from typing import Final, NamedTuple
+
+from numpy import pi
+
+from pbrs_farm.core.frames import LYING_ALONG_Z, rotation_x, rotation_z
+from pbrs_farm.core.house import Material
+from pbrs_farm.furnishings.things.bodies import bevelled, loft, revolve, slab, tube
+from pbrs_farm.furnishings.things.maker import Maker, Pair
+from pbrs_farm.furnishings.things.materials import FROSTED
+from pbrs_farm.furnishings.things.outlines import (
+    Outline,
+    bent,
+    d_shape,
+    rect,
+    ring_path,
+    rings,
+    scaled,
+)
+
+_HEIGHTS: Final = {"door": 3.4, "low": 0.7}  # of fronts in one column, against a drawer's
+_FRONT_M: Final = 0.019  # thickness of a front
+_BOARD_M: Final = 0.016  # of a carcass
+_BACK_M: Final = 0.008
+_DOOR_RAD: Final = 95 * pi / 180  # as far as cupboard hinges go: most open so far beside a wall
+_FLAP_RAD: Final = 95 * pi / 180
+_FLAP_M: Final = 0.2  # lower fronts are drawers, whatever they are called
+_DRAWN_OUT: Final = 0.75  # of the depth that a drawer comes out
+_SLIDE_M: Final = 0.013  # of a drawer's rail, at either side
+_LEAST_BOX_M: Final = 0.03  # a lower space behind a front holds no drawer
+_SHELF_STEP_M: Final = 0.36
+_HANGING_M: Final = 1.2  # from which a space has a rail for clothes
+
+
+class Inside(NamedTuple):
+    """What lies behind fronts."""
+
+    back: float  # z of the back's inner face
+    has_boards: bool = True  # uprights between columns, shelves behind doors
+    rail: Material | None = None  # of a rail for clothes
+    top: float = 10.0  # y that nothing of drawers reaches: of a sink's bowl
+
+
+class Look(NamedTuple):
+    """What the doors and drawers of a piece look like."""
+
+    kind: str  # of a front: flat, shaker, grooved, raised, glazed
+    front: Material
+    body: Material
+    top: Material
+    pull: str  # what opens them: bar, bow, square, knob, disc, ring, cup, edge, none
+    pull_material: Material
+
+
+def hollow(m: Maker, x: Pair, y: Pair, z: Pair, t: float, material: Material) -> None:
+    """A box of boards t thick, open to the front: sides, bottom, top, back."""
+    with m.of(material):
+        for a in (x[0], x[1] - t):
+            m.add(slab((a, y[0], z[0]), (a + t, y[1], z[1])))
+        for b in (y[0], y[1] - t):
+            m.add(slab((x[0] + t, b, z[0]), (x[1] - t, b + t, z[1])))
+        m.add(slab((x[0] + t, y[0] + t, z[0]), (x[1] - t, y[1] - t, z[0] + min(_BACK_M, t))))
+
+
+def shell(m: Maker, x: Pair, y: Pair, z: Pair, wall: float, material: Material, r: float = 0.004,
+    liner: Material | None = None) -> None:  # fmt: skip
+    """A body of thick walls, open to the front, r: of its edges; liner: of its inside."""
+    middle, size = ((x[0] + x[1]) / 2, -(y[0] + y[1]) / 2), (x[1] - x[0], y[1] - y[0])
+
+    def ring(inset: float, at: float) -> tuple[Outline, float]:
+        return (rect(size[0] - 2 * inset, size[1] - 2 * inset, max(r - inset, 0.002),
+            x=middle[0], z=middle[1], n=3), at)  # fmt: skip
+
+    m.add(loft([ring(0.0, z[0]), ring(0.0, z[1]), ring(wall, z[1]), ring(wall, z[0] + wall)]),
+        turn=LYING_ALONG_Z, of=material)  # fmt: skip
+    if liner is not None:
+        m.add(loft([ring(wall + 0.0002, z[0] + wall + 0.0002), ring(wall + 0.0002, z[1] - 0.001),
+            ring(wall + 0.002, z[1] - 0.001), ring(wall + 0.002, z[0] + wall + 0.002)]),
+            turn=LYING_ALONG_Z, of=liner)  # fmt: skip
+
+
+def opens(m: Maker, kind: str, x: Pair, y: Pair, z: float, back: float, opens_left: bool = True,
+    is_high: bool = False) -> AbstractContextManager[None]:  # fmt: skip
+    """What is added inside opens as a front of its kind does: 'door', 'drawer', 'low', 'flap'.
+
+    z: of its outer face; back: where the space behind it ends. A door's hinges are at its left
+    where opens_left, a flap's above where is_high.
+    """
+    if kind == "door":
+        return m.hinged("door", at=(x[0] if opens_left else x[1], y[0], z),
+            axis=(0.0, -1.0 if opens_left else 1.0, 0.0), upper_rad=_DOOR_RAD)  # fmt: skip
+    if kind == "flap" and y[1] - y[0] > _FLAP_M:
+        return m.hinged("flap", at=(x[0], y[1] if is_high else y[0], z),
+            axis=(-1.0 if is_high else 1.0, 0.0, 0.0), upper_rad=_FLAP_RAD)  # fmt: skip
+    return m.sliding("drawer", along=(0.0, 0.0, 1.0), upper_m=_DRAWN_OUT * (z - back))
+
+
+def is_drawer(kind: str, y: Pair) -> bool:
+    """Whether a front of that kind and height is one of a drawer."""
+    return kind in ("drawer", "low") or (kind == "flap" and y[1] - y[0] <= _FLAP_M)
+
+
+def drawer_box(m: Maker, x: Pair, y: Pair, z: Pair, material: Material, top: float = 10.0) -> None:
+    """A drawer without its front between two sides, in the space x, y, z."""
+    a, b = x[0] + _SLIDE_M, x[1] - _SLIDE_M
+    low, high = y[0] + 0.018, min(y[0] + 0.75 * (y[1] - y[0]), y[1] - 0.03, top - 0.01)
+    back, t = z[0] + 0.012, 0.012
+    if high - low < _LEAST_BOX_M:
+        return
+    with m.of(material):
+        for c in (a, b - t):
+            m.add(slab((c, low, back), (c + t, high, z[1])))
+        m.add(slab((a + t, low, back), (b - t, high, back + t)))
+        m.add(slab((a + t, low + 0.006, back + t), (b - t, low + 0.014, z[1])))
+
+
+def shelves(m: Maker, x: Pair, y: Pair, z: Pair, material: Material,
+    rail: Material | None = None) -> None:  # fmt: skip
+    """Shelves in the space x, y, z; rail: one shelf above, a rail for clothes under it."""
+    tall = y[1] - y[0]
+    levels = [y[0] + tall * k / n for n in (round(tall / _SHELF_STEP_M),) for k in range(1, n)]
+    if rail is not None and tall > _HANGING_M:
+        levels = [y[1] - 0.3]
+        m.add(tube([(x[0], y[1] - 0.36, (z[0] + z[1]) / 2), (x[1], y[1] - 0.36, (z[0] + z[1]) / 2)],
+            0.0125, n=8), of=rail)  # fmt: skip
+    for at in levels:
+        m.add(slab((x[0], at, z[0]), (x[1], at + _BOARD_M, z[1] - 0.02)), of=material)
+
+
+def panel(m: Maker, kind: str, x: Pair, y: Pair, z: float, material: Material) -> None:
+    """A front 19 mm thick before z, 2 mm within its edges.
+
+    Flat, shaker, grooved, raised or glazed.
+    """
+    a, b, c, d = x[0] + 0.0015, x[1] - 0.0015, y[0] + 0.0015, y[1] - 0.0015
+    rail = min(0.065, 0.22 * (b - a), 0.3 * (d - c))
+    with m.of(material):
+        if kind in ("shaker", "glazed"):
+            m.add(bevelled((a, c, z), (a + rail, d, z + 0.019), 0.0015))
+            m.add(bevelled((b - rail, c, z), (b, d, z + 0.019), 0.0015))
+            m.add(bevelled((a + rail, c, z), (b - rail, c + rail, z + 0.019), 0.0015))
+            m.add(bevelled((a + rail, d - rail, z), (b - rail, d, z + 0.019), 0.0015))
+            if kind == "shaker":
+                m.add(slab((a + rail, c + rail, z), (b - rail, d - rail, z + 0.011)))
+            else:
+                m.add(slab((a + rail, c + rail, z + 0.006), (b - rail, d - rail, z + 0.01)),
+                    of=FROSTED)  # fmt: skip
+        elif kind == "grooved":
+            m.add(slab((a, c, z), (b, d, z + 0.012)))
+            n = max(2, round((b - a) / 0.11))
+            for k in range(n):
+                m.add(bevelled((a + (b - a) * k / n + 0.001, c, z + 0.012),
+                    (a + (b - a) * (k + 1) / n - 0.001, d, z + 0.019), 0.002))  # fmt: skip
+        else:
+            m.add(bevelled((a, c, z), (b, d, z + 0.019), 0.002))
+            if kind == "raised" and b - a > 0.16 and d - c > 0.12:
+                m.add(bevelled((a + rail * 0.8, c + rail * 0.8, z + 0.019),
+                    (b - rail * 0.8, d - rail * 0.8, z + 0.025), 0.006))  # fmt: skip
+
+
+def pull(m: Maker, kind: str, x: float, y: float, z: float, across: bool, long: float,
+    material: Material) -> None:  # fmt: skip
+    """What a front is opened by, its foot at z.
+
+    Bar, bow, knob, cup, edge, ring or none. across: it lies along x.
+    """
+    h = long / 2
+    with m.of(material), m.moved(at=(x, y, z)):
+        match kind:
+            case "knob":
+                m.add(revolve([(0.0, 0.0), (0.006, 0.0), (0.006, 0.012), (0.015, 0.016),
+                    (0.013, 0.025), (0.0, 0.027)], n=10), turn=LYING_ALONG_Z)  # fmt: skip
+            case "disc":
+                m.add(revolve([(0.0, 0.0), (0.007, 0.0), (0.007, 0.014), (0.019, 0.015),
+                    (0.019, 0.022), (0.0, 0.023)], n=12), turn=LYING_ALONG_Z)  # fmt: skip
+        with m.moved(turn=rotation_z(0.0 if across else pi / 2)):
+            match kind:
+                case "bar":
+                    m.add(tube([(-h, 0.0, 0.027), (h, 0.0, 0.027)], 0.006, n=8))
+                    for s in (-0.8 * h, 0.8 * h):
+                        m.add(tube([(s, 0.0, 0.0), (s, 0.0, 0.027)], 0.0045, n=6))
+                case "bow":
+                    m.add(tube(bent([(-h, 0.0, 0.0), (-0.8 * h, 0.0, 0.027), (0.8 * h, 0.0, 0.027),
+                        (h, 0.0, 0.0)], 0.02, n=3), 0.0055, n=8))  # fmt: skip
+                case "square":
+                    m.add(bevelled((-h, -0.005, 0.02), (h, 0.005, 0.028), 0.0015))
+                    for s in (-h + 0.006, h - 0.006):
+                        m.add(slab((s - 0.005, -0.005, 0.0), (s + 0.005, 0.005, 0.021)))
+                case "cup":
+                    m.add(loft(rings(d_shape, [(min(long, 0.09), 0.024, 0.0),
+                        (min(long, 0.085), 0.022, 0.022), (0.05, 0.012, 0.03)], share=0.9)),
+                        at=(0.0, -0.012, 0.0))  # fmt: skip
+                case "edge":
+                    m.add(bevelled((-h, -0.002, 0.0), (h, 0.002, 0.022), 0.0008))
+                    m.add(bevelled((-h, -0.014, 0.019), (h, 0.0015, 0.022), 0.0008))
+                case "ring":
+                    m.add(bevelled((-0.012, -0.016, 0.0), (0.012, 0.016, 0.003), 0.001))
+                    m.add(tube(ring_path(0.018, n=14), 0.0028, n=6), turn=rotation_x(pi / 2),
+                        at=(0.0, -0.016, 0.012))  # fmt: skip
+                    m.add(tube([(0.0, 0.0, 0.0), (0.0, 0.0, 0.016)], 0.004, n=6))
+
+
+def door_front(m: Maker, look: Look, x: Pair, y: Pair, z: float, opens_left: bool,
+    is_high: bool) -> None:  # fmt: skip
+    """A front with a pull at the side away from its hinges.
+
+    At its upper end below, its lower end above eyes.
+    """
+    panel(m, look.kind, x, y, z, look.front)
+    tall = y[1] - y[0]
+    a = x[1] - 0.04 if opens_left else x[0] + 0.04
+    long = min(0.16, 0.4 * tall)
+    b = y[0] + 0.06 + long / 2 if is_high else y[1] - 0.06 - long / 2
+    b = y[0] + 0.5 * tall if tall > 1.1 else b
+    if look.pull == "edge":
+        pull(m, "edge", (x[0] + x[1]) / 2, y[0] if is_high else y[1] - 0.004, z + 0.012, True,
+            0.7 * (x[1] - x[0]), look.pull_material)  # fmt: skip
+    elif look.pull == "cup":
+        pull(m, "knob", a, b, z + 0.019, False, long, look.pull_material)
+    else:
+        pull(m, look.pull, a, b, z + 0.019, False, long, look.pull_material)
+
+
+def drawer_front(m: Maker, look: Look, x: Pair, y: Pair, z: float) -> None:
+    """The front of a drawer or flap with its pull, or two on wide ones."""
+    wide, tall = x[1] - x[0], y[1] - y[0]
+    # What has a frame on doors is flat on low drawers.
+    is_flat = (tall < 0.17 and look.kind != "grooved") or look.kind == "glazed"
+    panel(m, "flat" if is_flat else look.kind, x, y, z, look.front)
+    middle, high, long = ((x[0] + x[1]) / 2, y[1] - 0.045 if tall > 0.2 else (y[0] + y[1]) / 2,
+        min(0.16 if wide < 0.5 else 0.24, 0.5 * wide))  # fmt: skip
+    if look.pull == "edge":
+        pull(m, "edge", middle, y[1] - 0.004, z + 0.012, True, 0.7 * wide, look.pull_material)
+    elif look.pull in ("knob", "disc", "ring") and wide > 0.6:
+        for s in (-0.25, 0.25):
+            pull(m, look.pull, middle + s * wide, high, z + 0.019, True, long, look.pull_material)
+    else:
+        pull(m, look.pull, middle, high, z + 0.019, True, long, look.pull_material)
+
+
+def fronts_of(m: Maker, look: Look, x: Pair, y: Pair, z: float, columns: Sequence[Sequence[str]],
+    is_high: bool, inside: Inside, add_to: Callable[[int], None] | None = None) -> None:  # fmt: skip
+    """Columns of fronts before z that open, each column named from the top, and what is behind them.
+
+    'door', 'drawer', 'low' (a lower drawer), 'flap', 'open'. add_to: adds to a front of the column of
+    that number what moves with it.
+    """
+    n, t = len(columns), _BOARD_M
+    for k, kinds in enumerate(columns):
+        a, b = x[0] + (x[1] - x[0]) * k / n, x[0] + (x[1] - x[0]) * (k + 1) / n
+        space = (a + (t / 2 if k else t), b - (t / 2 if k < n - 1 else t))
+        if k and inside.has_boards:
+            m.add(slab((a - t / 2, y[0] + t, inside.back), (a + t / 2, min(y[1], inside.top), z)),
+                of=look.body)  # fmt: skip
+        total, below = sum(_HEIGHTS.get(kind, 1.0) for kind in kinds), 0.0
+        for kind in kinds:
+            above = below
+            below += _HEIGHTS.get(kind, 1.0)
+            c, d = y[1] - (y[1] - y[0]) * below / total, y[1] - (y[1] - y[0]) * above / total
+            if kind == "open":
+                continue
+            left = k % 2 == 0 if n > 1 else True
+            with opens(m, kind, (a, b), (c, d), z + _FRONT_M, inside.back, left, is_high):
+                if kind == "door":
+                    door_front(m, look, (a, b), (c, d), z, left, is_high)
+                else:
+                    drawer_front(m, look, (a, b), (c, d), z)
+                if is_drawer(kind, (c, d)):
+                    drawer_box(m, space, (c, d), (inside.back, z), look.body, inside.top)
+                if add_to is not None:
+                    add_to(k)
+            if inside.has_boards and not is_drawer(kind, (c, d)):
+                shelves(m, space, (c, min(d, inside.top)), (inside.back, z), look.body,
+                    inside.rail if k % 2 == 0 else None)  # fmt: skip
+
+
+def leg(m: Maker, kind: str, foot: Pair, top: Pair, high: float, thick: float,
+    material: Material) -> None:  # fmt: skip
+    """One of furniture's legs from foot (x, z) to top (x, z) at a height.
+
+    Square, round, tapered, hairpin or bun.
+    """
+    a, b = (foot[0], 0.0, foot[1]), (top[0], high, top[1])
+    with m.of(material):
+        match kind:
+            case "square":
+                m.add(bevelled((top[0] - thick / 2, 0.0, top[1] - thick / 2),
+                    (top[0] + thick / 2, high, top[1] + thick / 2), 0.003))  # fmt: skip
+            case "round":
+                m.add(tube([a, b], thick / 2, n=12))
+            case "tapered":
+                m.add(tube([a, b], 0.3 * thick, n=12, end=0.55 * thick))
+            case "bun":
+                m.add(revolve(scaled(thick, high, [(0, 0), (0.3, 0), (0.62, 0.3), (0.62, 0.6),
+                    (0.35, 0.85), (0.5, 1), (0, 1)]), n=16), at=(top[0], 0.0, top[1]))  # fmt: skip
+            case "hairpin":
+                for s in (-1.0, 1.0):
+                    m.add(tube([(foot[0], 0.004, foot[1]), (top[0] + s * 0.035, high, top[1])],
+                        0.005, n=6))  # fmt: skip
+                m.add(tube([(foot[0] - 0.008, 0.005, foot[1]), (foot[0] + 0.008, 0.005, foot[1])],
+                    0.005, n=6))  # fmt: skip
+            case "turned":
+                m.add(revolve(scaled(thick, high, [(0, 0), (0.35, 0), (0.4, 0.06), (0.28, 0.1),
+                    (0.5, 0.3), (0.42, 0.62), (0.55, 0.7), (0.4, 0.74), (0.55, 0.78), (0.55, 1),
+                    (0, 1)]), n=14), at=(top[0], 0.0, top[1]))  # fmt: skip
+
+
+def four_legs(m: Maker, kind: str, w: float, d: float, high: float, thick: float, inset: float,
+    splay: float, material: Material) -> None:  # fmt: skip
+    """Under what is w wide and d deep, inset from its edges, leaning outwards by splay."""
+    for sx, sz in product((-1.0, 1.0), (-1.0, 1.0)):
+        leg(m, kind, (sx * (w / 2 - inset + splay), sz * (d / 2 - inset + splay)),
+            (sx * (w / 2 - inset), sz * (d / 2 - inset)), high, thick, material)  # fmt: skip

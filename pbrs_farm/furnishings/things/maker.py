@@ -1,0 +1,363 @@
+"""How generated things are written: functions that draw and add solids; no effects.
+
+A thing is a function with a decorator. It draws numbers and materials from its maker and adds
+solids, which are plain functions of bodies.py and cloth.py:
+
+    @thing(group="vase")
+    def vase(m: Maker) -> None:
+        \"\"\"A vase, a third of them of glass.\"\"\"
+        r, tall = m.uniform(0.04, 0.08), m.uniform(0.15, 0.33)
+        with m.of(glass() if m.chance(0.3) else m.china()):
+            m.add(vessel([(0, 0), (r, 0), (r, tall)], 0.004))
+
+A function without a decorator is a part that several things share; it takes the maker too. With
+`@family` a function describes furniture of the generated catalogue: it also takes the size that was
+drawn for a variation, and pbrs_farm.plugin has these names for packages of one's own.
+
+Metres, y up. What stands has its back at -z and its front at +z; what hangs has its back at z = 0. The
+order of draws decides what a seed gives: a draw put in between changes all that follow.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from types import ModuleType
+from typing import Any, Concatenate, Generic, ParamSpec, TypeVar, overload
+
+import numpy as np
+
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.catalogue import Place
+from pbrs_farm.core.classes import OTHERPROP
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.house import Material, Surface
+from pbrs_farm.core.joints import Joint, JointKind
+from pbrs_farm.core.mesh import triangle_corners
+from pbrs_farm.dress.style import COLOURS, Rgb, Style
+from pbrs_farm.furnishings.things.assembly import (
+    Model,
+    Part,
+    hanging_piece,
+    standing_piece,
+    transformed,
+)
+from pbrs_farm.furnishings.things.materials import any_colour, metal, plain
+from pbrs_farm.home.masses import mass_kg
+
+P = ParamSpec("P")
+T = TypeVar("T")
+S = TypeVar("S")  # what a set draws once for all its families
+Triple = tuple[float, float, float]
+Pair = tuple[float, float]
+Size = Triple
+"""Width, depth and height of a variation, metres."""
+
+_PAINTS = ("whites", "greys", "paints", "darks", "boards")
+_PAINT_SHARES = (0.42, 0.18, 0.2, 0.1, 0.1)
+
+
+class Maker:
+    """What a thing is made with: random draws, the materials of a home's style, and its parts so far.
+
+    rng: every draw of the thing comes from it. style: the home's or the room's taste.
+    """
+
+    def __init__(self, rng: np.random.Generator, style: Style) -> None:
+        self.rng, self.style = rng, style
+        self.name = ""  # of the piece where a form has its own: "elephant" for an ornament
+        self._parts: list[tuple[Surface, Material | None]] = []
+        self._joints: list[Joint] = []
+        self._counted: Counter[str] = Counter()  # parts by what they are called
+
+    def uniform(self, low: float, high: float) -> float:
+        """A number between low and high."""
+        return float(self.rng.uniform(low, high))
+
+    def normal(self, middle: float, spread: float) -> float:
+        """A number of a normal distribution."""
+        return float(self.rng.normal(middle, spread))
+
+    def integers(self, low: int, high: int) -> int:
+        """A whole number from low to high - 1."""
+        return int(self.rng.integers(low, high))
+
+    def chance(self, share: float) -> bool:
+        """True in that share (0..1) of all cases."""
+        return bool(self.rng.random() < share)
+
+    def pick(self, *choices: T) -> T:
+        """One of the choices, each equally likely; name one twice to make it twice as likely."""
+        return choices[int(self.rng.integers(len(choices)))]
+
+    def weighted(self, *shares: float) -> int:
+        """The index of one of the shares, which sum to 1."""
+        return int(self.rng.choice(len(shares), p=shares))
+
+    @property
+    def wood(self) -> Rgb:
+        """The colour of the home's wood from afar."""
+        return self.style.wood.mean
+
+    @property
+    def dark_wood(self) -> Rgb:
+        """The colour of its late wood."""
+        return self.style.wood.dark
+
+    @property
+    def accent(self) -> Rgb:
+        """The loud colour of the style."""
+        return self.style.accent
+
+    @property
+    def timber(self) -> Material:
+        """The home's wood, varnished."""
+        return plain(f"{self.style.wood.name} wood", self.style.wood.mean, 0.45)
+
+    @property
+    def dark_timber(self) -> Material:
+        """The same, stained."""
+        return plain(f"dark {self.style.wood.name} wood", self.style.wood.dark, 0.45)
+
+    @property
+    def metal(self) -> Material:
+        """The metal of the home's fittings."""
+        return metal(self.style)
+
+    def textile(self, n: int | None = None) -> Rgb:
+        """A colour of the style's cloth; n: of the n calmest alone."""
+        known = self.style.textiles
+        return known[int(self.rng.integers(len(known) if n is None else min(n, len(known))))]
+
+    def cloth(self) -> Material:
+        """Cloth of one of those colours."""
+        return plain("fabric", self.textile(), 0.95)
+
+    def any_colour(self) -> Rgb:
+        """A colour for a small thing: of the style, calm or loud, or any at all."""
+        return any_colour(self.rng, self.style)
+
+    def colour_within(self, low: float, high: float) -> Rgb:
+        """A colour whose channels lie between low and high (sRGB, 0..1)."""
+        r, g, b = (float(v) for v in self.rng.uniform(low, high, 3))
+        return (r, g, b)
+
+    def china(self) -> Material:
+        """Glazed ceramic, white more often than coloured."""
+        colour = (0.9, 0.89, 0.86) if self.rng.random() >= 0.45 else self.any_colour()
+        return plain("china", colour, (0.12, 0.25)[int(self.rng.integers(2))])
+
+    def paint(self) -> Rgb:
+        """A colour that furniture is painted with: whites and greys more often than colours."""
+        known = COLOURS[_PAINTS[int(self.rng.choice(5, p=_PAINT_SHARES))]]
+        return known[int(self.rng.integers(len(known)))]
+
+    def add(
+        self, solid: Surface, *, of: Material | None = None, at: Triple | None = None,
+        turn: F64 | None = None, name: str = "",
+    ) -> None:  # fmt: skip
+        """Put a solid there.
+
+        of: its material; else that of the nearest `with m.of(...)` around it. turn: a rotation
+        (3, 3) about the origin. at: where its origin comes to after that, metres. name: of its
+        surface, where something must find it again.
+        """
+        if at is not None or turn is not None:
+            solid = transformed(solid, np.eye(3) if turn is None else turn, at or (0, 0, 0))
+        self._parts.append((replace(solid, name=name) if name else solid, of))
+
+    @contextmanager
+    def of(self, material: Material) -> Iterator[None]:
+        """What is added inside is of this material, unless it names its own."""
+        outer, self._parts = self._parts, []
+        yield
+        outer += [(solid, material if own is None else own) for solid, own in self._parts]
+        self._parts = outer
+
+    @contextmanager
+    def moved(self, *, at: Triple | None = None, turn: F64 | None = None) -> Iterator[None]:
+        """What is added inside is turned and then moved together, as a solid is by `add`."""
+        outer, self._parts = self._parts, []
+        known, self._joints = self._joints, []
+        yield
+        inner, self._parts = self._parts, outer
+        for solid, own in inner:
+            self.add(solid, of=own, at=at, turn=turn)
+        matrix = np.eye(4)
+        matrix[:3, :3] = np.eye(3) if turn is None else turn
+        matrix[:3, 3] = at or (0.0, 0.0, 0.0)
+        self._joints = [*known, *(joint.placed(matrix) for joint in self._joints)]
+
+    @contextmanager
+    def hinged(self, name: str, *, at: Triple, axis: Triple, upper_rad: float) -> Iterator[None]:
+        """What is added inside is a part that turns about an axis, anticlockwise, shut as it is added.
+
+        name: what it is: "door", "lid"; a number tells it from others. at: a point of the axis.
+        """
+        with self._part(name, JointKind.REVOLUTE, at, axis, upper_rad):
+            yield
+
+    @contextmanager
+    def sliding(self, name: str, *, along: Triple, upper_m: float) -> Iterator[None]:
+        """What is added inside is a part that slides along an axis, shut as it is added."""
+        with self._part(name, JointKind.PRISMATIC, (0.0, 0.0, 0.0), along, upper_m):
+            yield
+
+    @contextmanager
+    def _part(
+        self, name: str, kind: JointKind, at: Triple, axis: Triple, upper: float
+    ) -> Iterator[None]:
+        outer, self._parts = self._parts, []
+        yield
+        inner, self._parts = self._parts, outer
+        self._counted[name] += 1
+        part = f"{name} {self._counted[name]}"
+        self._parts += [(replace(solid, part=part), own) for solid, own in inner]
+        self._joints.append(Joint(part, kind, at, axis, upper))
+
+    def joints(self) -> tuple[Joint, ...]:
+        """The joints of what was added, by the names of their parts, with what the parts weigh."""
+        return tuple(replace(joint, mass_kg=self._mass_kg(joint.part)) for joint in self._joints)
+
+    def _mass_kg(self, part: str) -> float:
+        return sum(
+            mass_kg(triangle_corners(solid.positions, solid.faces), material)
+            for solid, material in self._parts
+            if solid.part == part and material is not None
+        )
+
+    def finished(self, file: str, name: str) -> list[Part]:
+        """All parts; BadInput where there is none, or one without a material."""
+        parts = [(solid, material) for solid, material in self._parts if material is not None]
+        if not parts or len(parts) != len(self._parts):
+            raise BadInput(file, name, "has nothing in it, or a part without a material")
+        return parts
+
+
+@dataclass(frozen=True, slots=True)
+class Thing(Generic[P]):
+    """A thing that a function describes; what the function takes after the maker, `make` takes too."""
+
+    name: str
+    called: str  # what its pieces are named after
+    group: str  # what it is, as Piece.group
+    nyu40: int
+    place: Place
+    build: Callable[Concatenate[Maker, P], None]
+
+    def make(
+        self, rng: np.random.Generator, style: Style, *args: P.args, **kwargs: P.kwargs
+    ) -> Model:
+        """One of them as a piece of the catalogue and its shape; BadInput where it has no solids."""
+        m = Maker(rng, style)
+        self.build(m, *args, **kwargs)
+        return put_together(m, self)
+
+
+@dataclass(frozen=True, slots=True)
+class Family:
+    """Furniture of the generated catalogue: as many variations of one thing."""
+
+    name: str
+    called: str  # what its pieces are named after
+    group: str
+    nyu40: int
+    place: Place
+    variants: int
+    draw_size: Callable[..., Size]  # (maker, values of the set if it is of one)
+    build: Callable[..., None]  # (maker, size, values of the set if it is of one)
+    of_set: Callable[[Maker], Any] | None = None
+
+    def shared(self, rng: np.random.Generator, style: Style) -> tuple[Any, ...]:
+        """What all families of its set have in common, as further arguments: () without a set."""
+        return () if self.of_set is None else (self.of_set(Maker(rng, style)),)
+
+    def size(self, rng: np.random.Generator, style: Style, *shared: Any) -> Size:
+        """Width, depth and height of a variation without making it, metres to 0.1 mm."""
+        width, depth, height = (
+            round(float(v), 4) for v in self.draw_size(Maker(rng, style), *shared)
+        )
+        return width, depth, height
+
+    def make(self, rng: np.random.Generator, style: Style, size: Size, *shared: Any) -> Model:
+        """A variation of that size; BadInput where it has no solids."""
+        m = Maker(rng, style)
+        self.build(m, size, *shared)
+        return put_together(m, self)
+
+
+D = TypeVar("D", Thing[...], Family)
+
+
+def put_together(m: Maker, of: Thing[...] | Family) -> Model:
+    """What was added, as a piece and its shape."""
+    parts, name = m.finished(of.build.__module__, of.name), m.name or of.called
+    if of.place in (Place.WALL, Place.CEILING):
+        return hanging_piece(name, of.group, of.nyu40, parts, (), of.place, m.joints())
+    return standing_piece(
+        name, parts, group=of.group, nyu40=of.nyu40, place=of.place, joints=m.joints()
+    )
+
+
+def thing(
+    *, group: str, nyu40: int = OTHERPROP, place: Place = Place.SURFACE, called: str = ""
+) -> Callable[[Callable[Concatenate[Maker, P], None]], Thing[P]]:
+    """The decorator of a function that describes a thing.
+
+    group: what it is; docs/dress/catalogue.md lists all. nyu40: its class. place: where it stands or hangs.
+    called: what its pieces are named after, the function's name unless given.
+    """
+
+    def described(build: Callable[Concatenate[Maker, P], None]) -> Thing[P]:
+        return Thing(build.__name__, called or build.__name__, group, nyu40, place, build)
+
+    return described
+
+
+@overload
+def family(
+    *, group: str, variants: int, size: Callable[[Maker], Size], nyu40: int = ...,
+    place: Place = ..., called: str = ...,
+) -> Callable[[Callable[[Maker, Size], None]], Family]: ...  # fmt: skip
+@overload
+def family(
+    *, group: str, variants: int, size: Callable[[Maker, S], Size], of_set: Callable[[Maker], S],
+    nyu40: int = ..., place: Place = ..., called: str = ...,
+) -> Callable[[Callable[[Maker, Size, S], None]], Family]: ...  # fmt: skip
+def family(
+    *, group: str, variants: int, size: Callable[..., Size], nyu40: int = OTHERPROP,
+    place: Place = Place.SURFACE, called: str = "", of_set: Callable[[Maker], Any] | None = None,
+) -> Callable[[Callable[..., None]], Family]:  # fmt: skip
+    """The decorator of a function that describes a family of the generated catalogue.
+
+    variants: how many there are. size: draws width, depth and height of one. called: what its
+    pieces are named after, the function's name unless given. of_set: draws what families have in
+    common that are sold together, a kitchen's units; those of one number share what it returns,
+    and `size` and the function take it as their last argument.
+    """
+
+    def described(build: Callable[..., None]) -> Family:
+        name = build.__name__
+        return Family(
+            name, called or name, group, nyu40, place, variants, size, build, of_set
+        )  # fmt: skip
+
+    return described
+
+
+def described_in(modules: Iterable[ModuleType], kind: type[D]) -> dict[str, D]:
+    """The things or families of some modules by name, in the order they are written.
+
+    kind: Thing or Family. BadInput where two have one name.
+    """
+    found: dict[str, D] = {}
+    for module in modules:
+        for value in vars(module).values():
+            if not isinstance(value, kind) or value.build.__module__ != module.__name__:
+                continue
+            if value.name in found:
+                raise BadInput(module.__name__, value.name, "is the name of another thing already")
+            found[value.name] = value
+    return found

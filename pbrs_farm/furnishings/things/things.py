@@ -1,0 +1,40 @@
+"""The small things that are generated, by name; no effects. maker.py says how they are written."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Final
+
+from pbrs_farm.furnishings.things import (
+    appliances,
+    bath_things,
+    bins,
+    bottles,
+    bowls,
+    boxes,
+    clocks,
+    clothes,
+    cups,
+    desk_things,
+    floor_things,
+    food,
+    frames_and_candles,
+    glasses,
+    ornaments,
+    papers,
+    seating,
+    soft,
+    tableware,
+    toys,
+    vases,
+)
+from pbrs_farm.furnishings.things.maker import Thing, described_in
+
+THINGS: Final[Mapping[str, Thing[[]]]] = described_in(
+    (
+        appliances, bath_things, bins, bottles, bowls, boxes, clocks, clothes, cups, desk_things,
+        floor_things, food, frames_and_candles, glasses, ornaments, papers, seating, soft, tableware, toys, vases,
+    ),
+    Thing,
+)  # fmt: skip
+"""What lies about: a style and a generator make one of them."""

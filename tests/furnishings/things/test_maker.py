@@ -1,0 +1,84 @@
+"""What is added to a maker gets the material and the place of what is around it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pbrs_farm.core.catalogue import Place
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.frames import rotation_y
+from pbrs_farm.core.house import Surface
+from pbrs_farm.dress.style import style_for
+from pbrs_farm.furnishings.things.bodies import slab
+from pbrs_farm.furnishings.things.maker import Maker, Triple, thing
+from pbrs_farm.furnishings.things.materials import BRASS, STEEL, WHITE
+
+_STYLE = style_for(np.random.default_rng(1))
+
+
+def _maker(seed: int = 1) -> Maker:
+    return Maker(np.random.default_rng(seed), _STYLE)
+
+
+def _cube(x: float = 0.0) -> Surface:
+    return slab((x, 0.0, 0.0), (x + 1.0, 1.0, 1.0))
+
+
+def _low(solid: Surface) -> Triple:
+    x, y, z = (float(v) for v in solid.positions.min(0))
+    return (x, y, z)
+
+
+def test_the_nearest_material_holds_unless_a_solid_names_its_own() -> None:
+    m = _maker()
+    with m.of(STEEL):
+        m.add(_cube())
+        with m.of(WHITE):
+            m.add(_cube())
+        m.add(_cube(), of=BRASS)
+    assert [material for _solid, material in m.finished("file", "name")] == [STEEL, WHITE, BRASS]
+
+
+def test_what_is_moved_together_is_turned_and_then_shifted() -> None:
+    m = _maker()
+    quarter = rotation_y(np.pi / 2)
+    with m.of(STEEL), m.moved(at=(0.0, 2.0, 0.0)):
+        m.add(_cube(), turn=quarter, at=(5.0, 0.0, 0.0))
+        with m.moved(turn=quarter):
+            m.add(_cube(), at=(5.0, 0.0, 0.0))
+    first, second = (_low(solid) for solid, _material in m.finished("file", "name"))
+    # A quarter turn takes +x to -z and +z to +x.
+    assert first == pytest.approx((5.0, 2.0, -1.0))
+    assert second == pytest.approx((0.0, 2.0, -6.0))
+
+
+def test_a_thing_is_made_of_what_its_function_takes() -> None:
+    @thing(group="box", place=Place.FLOOR)
+    def block(m: Maker, edge: float) -> None:
+        m.name = "small_block" if edge < 0.5 else ""
+        m.add(slab((0.0, 0.0, 0.0), (edge, edge, edge)), of=STEEL, name="side")
+
+    piece, shape = block.make(np.random.default_rng(1), _STYLE, 0.25)
+    assert (piece.name, piece.group, piece.place) == ("Small block", "box", Place.FLOOR)
+    assert piece.size == pytest.approx((0.25, 0.25, 0.25))
+    assert [surface.name for surface in shape.surfaces] == ["side"]
+    assert block.make(np.random.default_rng(1), _STYLE, 1.0)[0].name == "Block"
+
+
+def test_a_solid_without_a_material_is_an_error_that_names_the_thing() -> None:
+    @thing(group="box")
+    def bare(m: Maker) -> None:
+        m.add(_cube())
+
+    with pytest.raises(BadInput, match="bare: has nothing in it, or a part without a material"):
+        bare.make(np.random.default_rng(1), _STYLE)
+
+
+def test_a_share_of_chances_holds_and_a_choice_named_twice_is_twice_as_likely() -> None:
+    m, n = _maker(), 4000
+    # Five standard deviations of a binomial share.
+    margin = 5 * (0.25 / n) ** 0.5
+    assert sum(m.chance(0.3) for _ in range(n)) / n == pytest.approx(0.3, abs=margin)
+    picked = [m.pick("wood", "wood", "metal") for _ in range(n)]
+    assert picked.count("wood") / n == pytest.approx(2 / 3, abs=margin)
