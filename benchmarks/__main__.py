@@ -25,6 +25,7 @@ DEFAULT: Final = {
 }
 OWN_TARGET: Final = {
     "house": "house",
+    "bytes": "stored_bytes",
     "dress": "dress.dress",
     "cloths": "dress.cloths",
     "house_cost": "homes.house_cost",
