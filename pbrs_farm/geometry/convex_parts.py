@@ -1,4 +1,4 @@
-"""Convex parts of a mesh, for collision: boards and legs as they are, or by CoACD; no effects."""
+"""Convex decomposition of a mesh for collision: exact for boards and legs, CoACD for the rest; no effects."""
 
 from __future__ import annotations
 
@@ -27,19 +27,19 @@ from pbrs_farm.installation import install_command
 _NEARLY_CONVEX = 0.95  # share of its hull that a mesh fills which needs no decomposition
 _MOST_MOVES = 200  # of a point back into a hull, plane by plane
 _BEYOND_M = 1e-6  # of a hull, where a point may stay
-_FLAT_M = 5e-4  # half the thickness of a flat thing
-_SPACING_M = 0.008  # of points on a thing that hulls are measured against
+_FLAT_M = 5e-4  # half the thickness given to a flat mesh, metres
+_SPACING_M = 0.008  # spacing of the surface samples that hulls are compared with, metres
 _MOST_POINTS, _FEW = 200_000, 2_000
 _HULL_SPACING_M, _HULL_STEPS = 0.02, 16  # of points on hulls
-_FAR_M = 0.03  # beyond a thing, from which distances are rough
+_FAR_M = 0.03  # distances beyond this are approximate, metres
 _CLOSED = 0.9  # share of paired edges from which triangles bound a solid
-_LEAST_WIDE_M = 0.004  # a part that is thinner is not cut across
+_LEAST_WIDE_M = 0.004  # thinner parts are not cut across, metres
 _HOLLOW = 0.2  # what depth of hollows counts beside volume, in choosing a cut
-_SLIVER_M = 1e-3  # faces that are narrower have no slab
-_LEVEL = 0.99  # cosine from which a face lies across an axis
+_SLIVER_M = 1e-3  # narrower faces get no slab, metres
+_LEVEL = 0.99  # minimum cosine between a face's normal and an axis to count as perpendicular to it
 _SAME_M = 1e-3  # faces that near lie in one plane
 _MOST_PLANES = 1  # along an axis, beside its middle
-_STRAIGHT = 0.5  # of the commonest direction's faces: what lies along its axes is not turned
+_STRAIGHT = 0.5  # minimum share of axis-aligned faces for a mesh to keep its axes
 
 
 def connected(triangles: F64) -> list[F64]:
@@ -59,15 +59,15 @@ class _Part:
 
     groups: tuple[F64, ...]  # (F, 3, 3) each, which hang together
     hull: F64  # (V, 3)
-    beyond_m: float  # how far the hull reaches beyond the thing
+    beyond_m: float  # distance that the hull extends beyond the mesh, metres
 
 
 def close_parts(triangles: F64, *, within_m: float = 0.005, most: int = 32) -> tuple[F64, ...]:
-    """Convex parts (V, 3) that hold all of triangles (F, 3, 3); never none.
+    """Decompose triangles (F, 3, 3) into convex parts (V, 3); returns at least one part.
 
-    Parts that hang together are told apart, and cut along their axes until no hull reaches more than
-    within_m beyond the thing, the worst ones first, into no more than `most`. What is hollow stays
-    so. Boards and legs come out as they are.
+    Connected components are separated, then cut along their axes, worst first, until no hull extends
+    more than within_m beyond the mesh or there are `most` parts. Hollows stay open; boards and legs
+    are reproduced exactly.
     """
     turn = rotation_y(_level_turn(triangles))
     groups = [_fronts_outwards(group) for group in connected(triangles @ turn)]
@@ -89,7 +89,7 @@ def close_parts(triangles: F64, *, within_m: float = 0.005, most: int = 32) -> t
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Thing:
-    """What parts are measured against: points on its faces."""
+    """Surface samples of a mesh, to measure hulls against."""
 
     points: F64  # (N, 3)
     normals: F64  # (N, 3) unit, outwards of solids
@@ -120,7 +120,7 @@ class _Thing:
         return _Part(groups, hull, self._beyond(hull))
 
     def _beyond(self, hull: F64) -> float:
-        """How far the hull's faces lie from the thing, on its outside."""
+        """Largest distance from the hull's faces to the mesh, on its outside."""
         corners = hull[hull_faces(hull)]
         if not len(corners):
             return 0.0
@@ -135,7 +135,7 @@ class _Thing:
         above = ((points - self.points[near]) * self.normals[near]).sum(1)
         # Between points on a face, what counts is how far off its plane.
         far = np.where(far < self.within_m + self.spacing_m, np.abs(above), far)
-        # What lies deep in a solid is far from its faces as well.
+        # Points deep inside a solid are also far from its faces.
         is_outside = (above >= 0) | ~self.bounds_solid[near]
         return float(far[is_outside].max(initial=0.0))
 
@@ -154,7 +154,7 @@ class _Thing:
             if len(sides) < 2:
                 continue
             halves = tuple(self.part((half,)) for half in sides)
-            # What is left to cut, by volume; of equals that which reaches the least far beyond.
+            # Halves to cut further, by volume; ties go to the smaller excess.
             left = [h for h in halves if h.beyond_m > self.within_m]
             cost = sum(hull_volume(h.hull) * (1 + _HOLLOW * h.beyond_m / size) for h in left)
             if cost < least:
@@ -228,7 +228,7 @@ def _planes(triangles: F64) -> Iterator[tuple[int, float]]:
 
 
 def _cut_in_two(triangles: F64, axis: int, place: float) -> tuple[F64, F64]:
-    """What of triangles lies below a plane and what above; what lies in it by its fronts, outwards."""
+    """Split triangles by a plane; coplanar triangles go to the side behind their front."""
     return _above(triangles, axis, place, -1.0), _above(triangles, axis, place, 1.0)
 
 
@@ -257,7 +257,7 @@ def _above(triangles: F64, axis: int, place: float, sign: float) -> F64:
 
 
 def _level_turn(triangles: F64) -> float:
-    """The angle about y, radians, by which the most of upright faces lies along x and z."""
+    """Rotation about y, radians, that aligns most upright faces with x and z."""
     normals = area_vectors(triangles)
     area = np.hypot(normals[:, 0], normals[:, 2])
     upright = area > _LEVEL * lengths(normals)
@@ -305,7 +305,7 @@ def convex_parts(triangles: F64, *, most: int = 24, threshold: float = 0.05) -> 
         raise MachineFailed("physics needs coacd", hint=install_command("physics")) from None
     points = triangles.reshape(-1, 3)
     whole = hull_of(points)
-    # What is nearly its hull needs no decomposition.
+    # Skip the decomposition of nearly convex meshes.
     volume = abs(signed_volume(triangles, np.zeros(3)))
     if whole is not None and volume > _NEARLY_CONVEX * ConvexHull(whole).volume:
         return (whole,)
@@ -328,7 +328,7 @@ def _within(points: F64, body: F64) -> F64:
         return points
     moved = points.copy()
     for _ in range(_MOST_MOVES):
-        # Move each point back through the plane that it lies farthest beyond.
+        # Project each point onto the plane that it violates most.
         beyond = moved @ planes[:, :3].T + planes[:, 3]
         worst = beyond.argmax(axis=1)
         by = np.maximum(beyond[np.arange(len(moved)), worst], 0.0)
@@ -378,10 +378,10 @@ def hull_faces(points: F64) -> I64:
 
 
 def thickened(points: F64) -> F64:
-    """A flat thing as the corners (8, 3) of a box a millimetre thicker than it on every side.
+    """Axis-aligned box (8, 3) around points, a millimetre larger on every side.
 
-    points: (N, 3), metres. The box lies along the axes, so a flat thing that stands askew becomes a
-    thick one: for physics engines that need a volume, not for measuring.
+    points: (N, 3), metres. A tilted flat mesh becomes a thick box: suitable for physics engines that
+    need a volume, not for measurements.
     """
     low, high = points.min(0) - _FLAT_M, points.max(0) + _FLAT_M
     return np.array(

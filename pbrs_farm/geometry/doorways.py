@@ -25,15 +25,17 @@ _OFF_M: Final = 1e-3  # off the end itself
 _SQUARE: Final = 0.9  # least cosine between a wall's sides and the way out of its end
 _AT_EDGE_M: Final = 0.15  # walls nearer to the edge of a ground are its own
 HALF_M: Final = 0.05  # half the thickness that walls without one are given
-_JOIN_M: Final = 0.1  # between walls that were meant to meet
-_REACH_M: Final = 0.02  # into the walls at both ends, so that what is parted is parted whole
+_JOIN_M: Final = 0.1  # maximum gap between walls that were meant to touch, metres
+_REACH_M: Final = (
+    0.02  # extension into the walls at both ends, so that rooms are fully separated, metres
+)
 
 
 def doorways(walls: Any, reach_m: float = _REACH_M) -> list[LineString]:
-    """A line across each gap between the end of a wall and what stands before it, doors wide.
+    """A line across each door-sized gap between the end of a wall and the wall facing it.
 
-    walls: their ground, a shapely area in metres. reach_m: by how much a line goes on into the walls. A
-    gap between two ends may be there twice.
+    walls: their ground area as a shapely geometry, metres. reach_m: extension of each line into the
+    walls. A gap between two wall ends may be returned twice.
     """
     found = []
     rings = [shapely.get_coordinates(ring) for ring in _rings(walls)]
@@ -100,13 +102,13 @@ def _ends(corners: F64) -> list[tuple[F64, F64]]:
     before, after = np.roll(ways, 1, 0), np.roll(ways, -1, 0)
     is_end = (lengths >= _THINNEST_M) & (lengths <= _THICKEST_M)
     is_end &= (np.roll(lengths, 1) >= _LEAST_LONG_M) & (np.roll(lengths, -1) >= _LEAST_LONG_M)
-    # It turns left at both of its corners, about square: the wall lies behind it.
+    # A wall end has two left turns of about 90 degrees, with the wall behind it.
     is_end &= ((before * out).sum(1) > _SQUARE) & ((after * out).sum(1) < -_SQUARE)
     return [(corners[k] + sides[k] / 2, out[k]) for k in np.flatnonzero(is_end)]
 
 
 def _gap_before(start: F64, way: F64, faces: shapely.STRtree) -> float | None:
-    """Metres from a wall's end to the face that stands before it, where that is as wide as a doorway."""
+    """Distance in metres from a wall's end to the face in front of it; None unless door-sized."""
     ahead = LineString([start + way * _OFF_M, start + way * (WIDEST_M + _OFF_M)])
     hit = shapely.intersection(faces.geometries[faces.query(ahead, "intersects")], ahead)
     if not len(hit):

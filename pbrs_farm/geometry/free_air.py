@@ -1,7 +1,7 @@
-"""Free places in the air of rooms, where a thing at any turn touches nothing; state: what was put there.
+"""Free places in the air of rooms for items in any orientation; state: the items placed so far.
 
-A thing counts by the box around it, which turns with it, CLEAR_M wider on all sides. No face of
-anything reaches into that box, so whatever hangs in the air is CLEAR_M or more from all else.
+An item is represented by its oriented box, CLEAR_M wider on all sides. No face of another item may
+reach into that box, so items in the air keep a distance of at least CLEAR_M.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ from pbrs_farm.geometry.solids import box_quads
 CLEAR_M: Final = 0.05
 """From what hangs in the air to anything else, at least."""
 
-_TRIES: Final = 30  # places and turns of one thing before it is given up
-_MOST_M3: Final = 12.0  # a thing whose box is larger is a building's shell: its inside is air
+_TRIES: Final = 30  # attempts at a place and orientation before an item is given up
+_MOST_M3: Final = 12.0  # maximum box volume; larger items are shells of buildings, with air inside
 _SHADOW_CELL_M: Final = 0.01
 
 
@@ -50,10 +50,10 @@ class FreeAir:
         self._spheres = np.zeros((0, 4))  # around these: middle and radius
 
     def put(self, room: Room, points: F64, rng: np.random.Generator) -> Matrix4 | None:
-        """Take a place in a room for a thing: (4, 4) world_from_thing, rigid; None where it fits nowhere.
+        """Place an item in a room: (4, 4) rigid world_from_item, or None if no place is found.
 
-        points: (V, 3) of its mesh in its own frame, metres. Every place and every turn is as likely
-        as any other. All of it lies over the room's floor, between floor and ceiling, in nothing.
+        points: (V, 3) of its mesh in its own frame, metres. Positions and orientations are uniformly
+        distributed. The whole item is above the room's floor, below its ceiling, and touches nothing.
         """
         low, high = points_bounds(points)
         middle, half = (low + high) / 2, (high - low) / 2
@@ -100,7 +100,7 @@ class FreeAir:
         return bool(inside.all(1).any())
 
     def _is_over_floor(self, point: F64) -> bool:
-        """Whether a floor, and no roof and no wall, is the first thing below a point."""
+        """True if the first item below a point is a floor, not a roof or wall."""
         place, y = point[None, [0, 2]], float(point[1])
         floor, roof = (highest_below(place, c, y)[0] for c in (self._floors, self._roofs))
         return bool(floor >= roof)
@@ -136,9 +136,9 @@ def random_turn(rng: np.random.Generator) -> F64:
 
 
 def mean_shadow_m2(corners: F64) -> float:
-    """The area of a thing's outline, mean over the directions of the three axes, square metres.
+    """Mean area of an item's silhouette along the three axes, square metres.
 
-    corners: (F, 3, 3). Of a thing at a random turn it is on average what one sees of it from afar.
+    corners: (F, 3, 3). Approximates the mean visible area of a randomly oriented item.
     """
     areas = []
     for axes in ((0, 1, 2), (1, 0, 2), (0, 2, 1)):
@@ -150,10 +150,10 @@ def mean_shadow_m2(corners: F64) -> float:
 
 
 def shadow_for_share(room: Room, share: float) -> float:
-    """Square metres of outlines that hide a share of what one sees in an empty room, on average.
+    """Total silhouette area that hides a share of the view in an empty room, on average, square metres.
 
-    A straight way through a room is 4 V / S long on average (Cauchy; V its volume, S the surface
-    around it), and meets one of n things of outline A that lie anywhere with 1 - exp(-n A 4 / S).
+    The mean free path in a room is 4 V / S (Cauchy; V its volume, S its surface). A ray meets one of n
+    randomly placed items of silhouette A with probability 1 - exp(-n A 4 / S).
     """
     outline = shapely.Polygon(room.polygon)
     height = room.ceiling_y - room.floor_y

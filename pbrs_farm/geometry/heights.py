@@ -15,13 +15,13 @@ from pbrs_farm.core.mesh import triangle_bounds
 
 _EDGE: Final = 1e-9  # barycentric coordinates by which a place may lie beyond an edge
 _UPRIGHT_M2: Final = 1e-12  # twice the area in plan of a triangle that has no height
-_PAIRS: Final = 1_000_000  # of place and triangle at once: bounds memory
+_PAIRS: Final = 1_000_000  # maximum pairs of position and triangle per batch, to bound memory
 
 
 def highest_below(places: F64, triangles: F64, limit_y: float | F64 = np.inf) -> F64:
-    """(N,) y of the highest place of triangles (F, 3, 3) at plan places (N, 2); -inf = none.
+    """(N,) y of the highest surface of triangles (F, 3, 3) at plan positions (N, 2); -inf if none.
 
-    limit_y: what lies above it, (N,) or one for all, does not count; what touches it does.
+    limit_y: upper bound, (N,) or one for all; surfaces above it are ignored, at it included.
     """
     limit = np.broadcast_to(np.asarray(limit_y, np.float64), (len(places),))
     found = np.full(len(places), -np.inf)
@@ -35,9 +35,9 @@ def highest_below(places: F64, triangles: F64, limit_y: float | F64 = np.inf) ->
 
 
 def lowest_above(places: F64, triangles: F64, least_y: float | F64) -> F64:
-    """(N,) y of the lowest place of triangles (F, 3, 3) at plan places (N, 2); inf = none.
+    """(N,) y of the lowest surface of triangles (F, 3, 3) at plan positions (N, 2); inf if none.
 
-    least_y: what lies below it or touches it, (N,) or one for all, does not count.
+    least_y: lower bound, (N,) or one for all; surfaces at or below it are ignored.
     """
     least = np.broadcast_to(np.asarray(least_y, np.float64), (len(places),))
     found = np.full(len(places), np.inf)

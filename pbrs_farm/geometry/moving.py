@@ -1,6 +1,6 @@
-"""A home at another time: what moves stands where its motions say; no effects.
+"""A home at a point in time: animated parts are moved by their motions; no effects.
 
-What stands still is shared: surfaces, and rows of the triangles that rays see.
+Static geometry is shared between times: surfaces, and the triangle rows for ray casting.
 """
 
 from __future__ import annotations
@@ -62,10 +62,10 @@ def _moved_light(light: LightPart, matrix: F64) -> LightPart:
 
 
 def matrices_at(item: Item, motions: Mapping[str, Motion], time_s: float) -> dict[str, Matrix4]:
-    """Part -> (4, 4) rigid, from where it stands at rest to where it is at a time, of all that move.
+    """Rigid (4, 4) matrices by part, from its pose at rest to its pose at a time.
 
-    motions: of the item, by part; "" is the whole item. Parts that are not there stand still, the
-    body (""), too, where nothing moves the whole item.
+    motions: of the item, by part; "" is the whole item. Parts without a motion are omitted, including
+    the body ("") if the item as a whole does not move.
     """
     whole = motions.get("")
     of_item = None if whole is None else whole.matrix_at(time_s)
@@ -80,9 +80,9 @@ def matrices_at(item: Item, motions: Mapping[str, Motion], time_s: float) -> dic
 
 
 def item_at_time(item: Item, motions: Mapping[str, Motion], time_s: float) -> Item:
-    """The item where its motions have it at a time: box, joints, lights and pose follow.
+    """The item at a time, with box, joints, lights and pose updated.
 
-    motions: as of `matrices_at`. A box holds its opened parts where they stand.
+    motions: see `matrices_at`. The box includes opened parts.
     """
     matrices = matrices_at(item, motions, time_s)
     joints = tuple(
@@ -110,7 +110,7 @@ def motions_by_item(house: House) -> dict[str, dict[str, Motion]]:
 
 
 def house_at(house: House, time_s: float) -> House:
-    """The house at a time, seconds; what moves stands there, the motions stay with it as they are."""
+    """The house at a time in seconds; the motions themselves are kept unchanged."""
     of_item = motions_by_item(house)
     return house.with_items(
         item_at_time(item, of_item[item.id], time_s) if item.id in of_item else item
@@ -120,9 +120,9 @@ def house_at(house: House, time_s: float) -> House:
 
 @dataclass(frozen=True)
 class MovingHouse:
-    """A house whose parts move, and its triangles, at one time after another.
+    """A house with motions and its triangles, evaluated at successive times.
 
-    All that stands still is gathered once; each time costs what moves.
+    Static triangles are collected once; each time costs only the moving ones.
     """
 
     house: House
@@ -176,9 +176,9 @@ class MovingHouse:
         )
 
     def face_motions(self, from_s: float, to_s: float) -> tuple[I64, F64]:
-        """(F,) numbers and (M, 4, 4) matrices: matrices[numbers[f]] takes face f from one time to another.
+        """(F,) indices and (M, 4, 4) matrices: matrices[indices[f]] moves face f from one time to another.
 
-        Matrix 0 is the identity, of all that stands still.
+        Matrix 0 is the identity, for static faces.
         """
         of_item = motions_by_item(self.house)
         of_surface = np.zeros(1 + max(self.geometry.face_surface, default=-1), np.int64)

@@ -18,13 +18,13 @@ from pbrs_farm.core.mesh import triangle_bounds, triangle_corners
 from pbrs_farm.geometry.scene_triangles import SceneTriangles
 from pbrs_farm.geometry.surface_points import surface_points
 
-_CELL_M: Final = 0.008  # of the grid in which a part and what it may meet are compared
+_CELL_M: Final = 0.008  # cell size of the grid that compares a part with its obstacles, metres
 _SPACING_M: Final = 0.005  # of points on both
-_APART_M: Final = 0.004  # at which a part stops before a thing
+_APART_M: Final = 0.004  # clearance between an opened part and an obstacle, metres
 _NEAR_AXIS_M: Final = (
-    0.1  # of a hinge, within which ways are too short to stop so far before things
+    0.1  # radius around a hinge within which the clearance is not enforced, metres
 )
-_PIN_M: Final = 0.03  # what is nearer to a hinge's axis stops nothing
+_PIN_M: Final = 0.03  # obstacles closer to a hinge's axis are ignored, metres
 _STEPS: Final = 12  # of a way whose bounds are wanted
 
 
@@ -38,10 +38,10 @@ def moved_surface(surface: Surface, matrix: Matrix4) -> Surface:
 
 
 def item_at(item: Item, part: str, value: float) -> Item:
-    """The item with one of its parts at another value of its joint: radians or metres from shut.
+    """The item with one part at another joint value, in radians or metres from closed.
 
-    Its box keeps its axes and holds the part where it stands. KeyError where no joint moves that
-    part. The value is not held to the joint's limits.
+    The box keeps its axes and includes the moved part. Raises KeyError if the part has no joint. Joint
+    limits are not enforced.
     """
     joint = joint_of(item, part)
     matrix = joint.motion(value)
@@ -70,17 +70,18 @@ def box_around(item: Item) -> Item:
 
 
 def part_triangles(item: Item, part: str) -> F64:
-    """(F, 3, 3) corners of the faces of one part where they stand, metres."""
+    """(F, 3, 3) corners of one part's faces in their current pose, metres."""
     own = [triangle_corners(s.positions, s.faces) for s in item.surfaces if s.part == part]
     return np.concatenate([np.zeros((0, 3, 3)), *own])
 
 
 def free_value(scene: SceneTriangles, index: int, part: str, wanted: float) -> tuple[float, str]:
-    """(value, id) how far towards a wanted value a part of scene.items[index] goes, and what stops it.
+    """Furthest free value of a part of scene.items[index] towards wanted, and the id of its obstacle.
 
-    "" where nothing does. It stops 4 mm before faces of other items and of other parts of its own
-    item that stand open; its own body and what is shut never stop it, and rugs and mats give way. What its rim alone would graze, by less than about a
-    centimetre, is let pass: neighbours' fronts, a rug below a door. Closing is never stopped.
+    The id is "" if there is no obstacle. A part stops 4 mm before other items and before other open
+    parts of its own item; its own body, closed parts, rugs and mats are ignored. Contacts of its rim
+    alone by less than about a centimetre are ignored too: neighbouring fronts, a rug below a door.
+    Closing is never blocked.
     """
     item = scene.items[index]
     joint = joint_of(item, part)
@@ -151,7 +152,7 @@ class _Track:
         local = (points - np.array(joint.point)) @ axes
         zero = 0.0
         if joint.kind is JointKind.REVOLUTE:
-            # Measure angles from the part's middle, so that it lies in one piece.
+            # Measure angles from the part's centre, so that its range does not wrap around.
             x, y = local[:, :2].mean(0)
             zero = float(np.arctan2(y, x))
         plane, way = _split(joint, local, zero)
@@ -164,7 +165,7 @@ class _Track:
         return cls(joint, axes, low, front, inner, zero)
 
     def way_to(self, corners: F64, box: F64) -> float:
-        """How far the part goes before it meets faces (F, 3, 3) in a box (2, 3); inf where it does not."""
+        """Free travel of the part before it hits faces (F, 3, 3) within a box (2, 3); inf if it hits none."""
         points = surface_points(corners, _SPACING_M, box)
         if not len(points):
             return np.inf
@@ -177,7 +178,7 @@ class _Track:
         cell, way, plane = cell[counts], way[counts], plane[counts]
         ahead = way - self.front[cell[:, 0], cell[:, 1]]
         if self.joint.kind is JointKind.REVOLUTE:
-            # What lies behind comes round only after a whole turn.
+            # Faces behind the part are reached only after a full turn.
             ahead = np.where(ahead < -np.pi, ahead + 2 * np.pi, ahead)
             ahead = ahead - _APART_M / np.maximum(plane[:, 0], _NEAR_AXIS_M)
             behind = (ahead * plane[:, 0] < -2 * _APART_M) | (plane[:, 0] < _PIN_M)

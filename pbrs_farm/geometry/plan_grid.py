@@ -12,7 +12,7 @@ from pbrs_farm.core.arrays import F64, Bools, Points2
 from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.mesh import triangle_bounds
 
-_FLAT = 1e-9  # square metres in plan: a triangle with less stands upright
+_FLAT = 1e-9  # maximum plan area of a vertical triangle, square metres
 _MAX_SLOPE = 50.0  # height over distance; steeper faces take their whole height in every cell
 
 Ints = NDArray[np.intp]
@@ -84,7 +84,7 @@ class PlanGrid:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CellHits:
-    """Which triangle lies over which cell, and between which heights there."""
+    """Pairs of triangle and grid cell below it, with the height range of each."""
 
     triangle: NDArray[np.intp]  # (N,)
     row: NDArray[np.intp]
@@ -140,11 +140,10 @@ def _cells_over(grid: PlanGrid, local: F64, *, touched: bool) -> tuple[Ints, Int
 
 
 def covered(grid: PlanGrid, corners: F64, *, touched: bool = False) -> Bools:
-    """(rows, columns) whether a triangle covers the cell's middle, or touches the cell.
+    """(rows, columns) true where a triangle covers the cell's centre, or touches the cell.
 
-    corners: (T, 3, 3) world, metres; triangles that stand upright cover no middle. Cells of the
-    outside are left out. touched: also true where a triangle only reaches into the cell, so that
-    nothing thin is lost.
+    corners: (T, 3, 3) world, metres; vertical triangles cover no centre. Cells outside the grid are
+    ignored. touched: also true if a triangle only touches the cell, so that thin shapes count.
     """
     mask = np.zeros(grid.shape, np.bool_)
     _triangle, row, column, _doubled = _cells_over(grid, grid.local(corners), touched=touched)
@@ -153,10 +152,10 @@ def covered(grid: PlanGrid, corners: F64, *, touched: bool = False) -> Bools:
 
 
 def covered_by_each(grid: PlanGrid, groups: Sequence[F64]) -> Bools:
-    """(G, rows, columns) whether a triangle of each group (T, 3, 3) covers the cell's middle.
+    """(G, rows, columns) true where a triangle of each group (T, 3, 3) covers the cell's centre.
 
-    One pass over the triangles of all groups, where a loop of `covered` makes one for each. All
-    masks are held at once: mind the memory of many groups on a large grid.
+    One pass over all groups, faster than calling `covered` for each. All masks are in memory at the
+    same time.
     """
     masks = np.zeros((len(groups), *grid.shape), np.bool_)
     if groups:

@@ -13,10 +13,9 @@ from pbrs_farm.core.house import Room, Surface
 
 
 def signed_area(polygon: Points2) -> float:
-    """Area of (N, 2), positive if counter-clockwise with the second axis up.
+    """Signed area of a polygon (N, 2), positive if counter-clockwise with the second axis up.
 
-    polygon: without its first corner repeated at the end; the sign tells the sense, so take abs()
-    for a size. Square metres when the polygon is in metres. In plan the axes are (x, z).
+    polygon: without a repeated first corner. Square metres for metres. In plan the axes are (x, z).
     """
     x, z = polygon[:, 0], polygon[:, 1]
     return float(0.5 * np.sum(x * np.roll(z, -1) - np.roll(x, -1) * z))

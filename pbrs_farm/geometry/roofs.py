@@ -60,7 +60,7 @@ def _cloth(points: Points2, heights: F64) -> I64 | None:
 
 
 def _spanned(rings: Sequence[Points2], points: Points2, heights: F64, cloth: I64) -> Roof | None:
-    # The cloth cut along the outline; None if a given height lies too far under it.
+    # Delaunay surface cut along the outline; None if a given height is too far below it.
     outline = shapely.Polygon(rings[0], list(rings[1:]))
     all_points, all_heights, all_faces, n = [], [], [], 0
     worst = 0.0
@@ -69,7 +69,7 @@ def _spanned(rings: Sequence[Points2], points: Points2, heights: F64, cloth: I64
         # Fit the plane height = a x + b z + c through the triangle's corners.
         plane = np.linalg.solve(np.column_stack([corners, np.ones(3)]), heights[face])
         triangle = shapely.Polygon(corners)
-        # Measure how far it lies above the heights given there.
+        # Measure its height above the given heights.
         on_it = shapely.intersects_xy(triangle.buffer(1e-9), points)
         over = points[on_it] @ plane[:2] + plane[2] - heights[on_it]
         worst = max(worst, float(over.max(initial=0.0)))

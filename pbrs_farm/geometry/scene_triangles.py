@@ -1,4 +1,4 @@
-"""The triangles of a house by item, found again by place; state: what was asked for is kept."""
+"""The triangles of a house by item, with spatial look-up; state: a cache of requested items."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from pbrs_farm.geometry.surface_points import item_triangles
 
 
 class SceneTriangles:
-    """Corners of the items' faces in double precision, and which items meet a box.
+    """Faces of items in double precision, and look-up of items by box.
 
-    Items are named by their place in the sequence it was made from, which must not change meanwhile.
-    Faces are gathered when an item is first asked for, so that a room costs what stands near it.
+    Items are identified by their index in the sequence given, which must not change. Faces are
+    collected on first use, so that a room costs only its own items.
 
         scene = SceneTriangles(house.items)
-        corners, owner = scene.in_box(low, high)  # (T, 3, 3) metres, (T,) places in house.items
+        corners, owner = scene.in_box(low, high)  # (T, 3, 3) metres, (T,) indices into house.items
     """
 
     def __init__(self, items: Sequence[Item]) -> None:
@@ -46,11 +46,7 @@ class SceneTriangles:
         return self._of_faces[index]
 
     def items_in(self, low: F64, high: F64) -> list[int]:
-        """Indices of the items whose bounds meet the box low..high (3,).
-
-        low, high: metres, in the world. A bounding box that only touches counts; whether a face
-        lies in the box is `in_box`'s question.
-        """
+        """Indices of the items whose bounding box touches the box low..high (3,), metres, world frame."""
         meets = boxes_meeting(self.bounds[:, 0], self.bounds[:, 1], low, high)
         return [int(i) for i in np.flatnonzero(meets)]
 

@@ -27,10 +27,10 @@ _BOX_FACES = (_QUAD + 4 * np.arange(6, dtype=np.int32)[:, None, None]).reshape(-
 
 
 def boxes_surface(name: str, boxes: Sequence[tuple[Triple, Triple]], material: int) -> Surface:
-    """A surface of boxes along the axes, each by its low and its high corner in metres.
+    """A surface of axis-aligned boxes, each given by its low and high corner in metres.
 
-    Boxes that overlap stay as they are: inner faces are not removed, as for a sofa that is put
-    together from cushions. material: index into the house's materials.
+    Overlapping boxes keep their inner faces, as in a sofa made of cushions. material: index into the
+    house's materials.
     """
     corners = np.asarray(boxes, np.float64).reshape(-1, 2, 3)
     quads = [box_quads((low + high) / 2, (high - low) / 2) for low, high in corners]
@@ -184,7 +184,7 @@ def _lifted(plan: Points2, y: F64 | float) -> F64:
 
 
 def _quads_between(near: F64, far: F64) -> F64:
-    # Quads between two polylines; counter-clockwise when far lies to the left of near's direction.
+    # Quads between two polylines; counter-clockwise if far is left of near's direction.
     return np.stack([near[:-1], near[1:], far[1:], far[:-1]], 1)
 
 

@@ -19,7 +19,7 @@ from pbrs_farm.core.mesh import (
 
 SPACING_M = 0.03
 _MOST_POINTS = 200_000  # of one item: larger ones are spread more thinly
-_LEAST_M = 1e-9  # a row that is flatter along an axis lies across it
+_LEAST_M = 1e-9  # minimum extent along an axis; flatter rows are perpendicular to it
 _SPARSE = 32  # cubes for each point: with more, sorting the points is faster
 
 
@@ -42,12 +42,12 @@ def surface_points(corners: F64, spacing_m: float = SPACING_M, box: F64 | None =
         return np.zeros((0, 3))
     area = float(lengths(area_vectors(corners)).sum()) / 2
     spacing_m = max(spacing_m, float(np.sqrt(area / _MOST_POINTS)))
-    # The middle stands for a small triangle.
+    # Represent a small triangle by its centroid.
     low, high = triangle_bounds(corners)
     size = high - low
     is_small = np.maximum(np.maximum(size[:, 0], size[:, 1]), size[:, 2]) < spacing_m / 2
     middles, grids = corners[is_small].sum(1) / 3, _grids(corners[~is_small], spacing_m)
-    # A cube that the box cuts counts whole: which point stands for it does not change.
+    # Keep whole cubes at the border of the box, so that their representative points do not change.
     near = None if box is None else (box[0] - spacing_m, box[1] + spacing_m)
     points = np.concatenate([middles, grids.points(near)])
     # Fine meshes have many points in one place.
@@ -135,7 +135,7 @@ def _first_of_each(keys: NDArray[np.int64], n: int) -> NDArray[np.int64]:
     """The first place of each key (0 to n), in the order of keys."""
     if n > _SPARSE * len(keys):
         return np.asarray(np.unique(keys, return_index=True)[1])
-    # Of places that are written twice the last one stays: write them from the last to the first.
+    # The last write to an index wins: write in reverse order so that the first point remains.
     first = np.full(n, -1, np.int32)
     first[keys[::-1]] = np.arange(len(keys) - 1, -1, -1, dtype=np.int32)
     return np.asarray(first[first >= 0], np.int64)

@@ -1,4 +1,4 @@
-"""What doors and drawers sweep when they open, seen from above: the ground that stays free; no effects."""
+"""Floor area swept by doors and drawers when they open, seen from above; no effects."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from pbrs_farm.core.house import Item, ItemKind, Surface
 from pbrs_farm.core.joints import Joint
 
 _STEPS: Final = 9  # of a way, shut and wide open among them
-_OVERHEAD_M: Final = 1.4  # above the floor; what is swept higher is in nobody's way
+_OVERHEAD_M: Final = 1.4  # height above the floor up to which a sweep blocks the way, metres
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,9 +33,9 @@ class Swept:
 def swept_by(
     surfaces: Sequence[Surface], joints: Sequence[Joint], axes: F64 | None = None
 ) -> list[Swept]:
-    """What each part sweeps, in the frame of the surfaces; parts without a face are left out.
+    """Swept volume of each part, in the frame of the surfaces; parts without faces are omitted.
 
-    axes: (3, 3) columns along which a part's box is taken; x, y, z by default.
+    axes: (3, 3) columns, the axes of each part's box; x, y, z by default.
     """
     axes = np.eye(3) if axes is None else axes
     found = []
@@ -57,13 +57,13 @@ def swept_by(
 
 
 def swept_by_item(item: Item) -> list[Swept]:
-    """What doors and drawers of furniture sweep; none of doorways and windows, which have rules of their own."""
+    """Volumes swept by the doors and drawers of furniture; empty for doorways and windows."""
     if item.kind is not ItemKind.OBJECT or not item.joints:
         return []
     return swept_by(item.surfaces, item.joints, item.box.axes if item.box is not None else None)
 
 
 def floor_swept(items: Sequence[Item], floor_y: float) -> BaseGeometry:
-    """The ground that nothing may stand on which stays: under all that opens below a man's chest."""
+    """Floor area to keep free of furniture: below all sweeps lower than a man's chest."""
     swept = (s for item in items for s in swept_by_item(item))
     return shapely.union_all([s.area for s in swept if s.low_y < floor_y + _OVERHEAD_M])

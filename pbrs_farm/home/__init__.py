@@ -1,1 +1,1 @@
-"""What a home means: rooms, names, lamps; between the nouns and the stages, no effects."""
+"""The meaning of a home: room types, names, lamps, masses; no effects."""

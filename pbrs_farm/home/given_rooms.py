@@ -1,7 +1,7 @@
-"""What the vocabularies of other formats call a room -> the word that this project has; no effects.
+"""Room types of other data sets translated to ours; no effects.
 
-given_rooms.csv, beside this file, has a row a name: source (3dfront, ai2thor, roomplan, cubicasa,
-swiss), name, type. Types are words of room_words.csv; `none` is no room.
+given_rooms.csv, beside this file, has one row per name: source (3dfront, ai2thor, roomplan,
+cubicasa, swiss), name, type. Types are words of room_words.csv; `none` marks areas that are not rooms.
 """
 
 from __future__ import annotations
@@ -12,14 +12,14 @@ from importlib.resources import files
 from typing import Final
 
 NO_ROOM: Final = "none"
-"""Type of what is drawn as a room and is none: an outside, a void, a shaft."""
+"""Type of areas that are drawn as rooms but are not: outdoors, voids, shafts."""
 
 
 def given_room(source: str, name: str) -> str | None:
-    """The type of a source's name, whatever its case and joints; None where the table has none.
+    """Room type for a data set's name, ignoring case and separators; None if the table has no row.
 
-    source: the data set's name as in the table ("procthor", "zind"...). For names that follow no
-    table use the words of the name instead (`named_kind`).
+    source: the data set as named in the table ("procthor", "zind"...). For free-form names use
+    `named_kind`.
     """
     return _read_given_rooms().get((source, _plain_name(name)))
 

@@ -1,4 +1,4 @@
-"""How much light a room's lamps give its floor; no effects."""
+"""Illuminance of a room's floor by its lamps; no effects."""
 
 from __future__ import annotations
 

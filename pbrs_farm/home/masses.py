@@ -1,8 +1,8 @@
-"""What a thing or a part of one weighs, by what it is made of; no effects.
+"""Estimated mass of an item or part, from volume and material density; no effects.
 
-Densities are those of handbooks: chipboard 650 kg/m3 (EN 312 has 600 to 700), glass 2,500 (EN 572),
-steel 7,850, of sheets that are folded round air or foam 8 kg/m2 (1 mm), stone and china 2,400,
-plastic 1,000, paper 700, cloth 300 about foam and feathers of 40.
+Densities are from handbooks: chipboard 650 kg/m3 (EN 312 has 600 to 700), glass 2,500 (EN 572),
+steel 7,850 or, for sheet metal round air or foam, 8 kg/m2 (1 mm), stone and china 2,400, plastic
+1,000, paper 700, cloth 300 around foam and feathers of 40.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ _SHEETS: Final = ("enamel", "steel", "chrome", "brass", "iron", "metal", "handle
 
 
 def mass_kg(corners: F64, material: Material) -> float:
-    """Kilograms of one closed solid (F, 3, 3) of a material, metres.
+    """Mass in kilograms of one closed solid (F, 3, 3) of a material, metres.
 
-    Metal and enamel weigh as solid steel or as its sheet, whichever is less. A mesh that is open has
-    no volume: it counts for what its triangles bound with their middle.
+    Metal and enamel weigh as solid steel or as sheet metal, whichever is less. An open mesh is closed
+    by a cone to its centre.
     """
     if not len(corners):
         return 0.0
@@ -44,13 +44,13 @@ def mass_kg(corners: F64, material: Material) -> float:
 
 
 class _Stuff(NamedTuple):
-    """What things are made of: a wall of some thickness, and what fills the space behind it."""
+    """Construction of an item: a wall of some thickness around a filling."""
 
     words: str  # of materials, between blanks; `steel` is in "brushed steel"
     wall_kg_m3: float
-    wall_m: float  # what is thinner is solid
+    wall_m: float  # parts thinner than this are solid, metres
     core_kg_m3: float = 0.0
-    nyu40: tuple[int, ...] = ()  # things that are of it where their material's name says nothing
+    nyu40: tuple[int, ...] = ()  # classes made of it if the material's name is not conclusive
 
 
 _BOARDS: Final = _Stuff("wood oak timber board", 650, 0.018)
@@ -74,11 +74,11 @@ _STUFFS: Final = (
 
 
 def body_kg(solids: Iterable[tuple[F64, Material]], nyu40: int) -> float:
-    """Kilograms of a thing's bodies, each the triangles (F, 3, 3) of what hangs together and its material.
+    """Mass in kilograms of an item's connected bodies, given as triangles (F, 3, 3) and material.
 
-    Models draw a chest as one closed shell: of what is thicker than a wall of its material only the
-    wall counts, and what fills cushions. An open mesh is a sheet as thick as that wall. nyu40: the
-    thing's class, for materials whose names say nothing.
+    Models draw a chest as one closed shell, so of bodies thicker than their material's wall only the
+    wall and a cushion's filling count. An open mesh weighs as a sheet of that thickness. nyu40: the
+    item's class, used if the material's name is not conclusive.
     """
     total = 0.0
     for corners, material in solids:

@@ -1,4 +1,4 @@
-"""The words of which names of rooms and things are made; no effects."""
+"""Words in the names of rooms and items; no effects."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ FRAME_WORDS: Final = frozenset(
     ("frame", "sill", "sash", "handle", "trim", "casing", "shutter", "blind", "curtain", "wood",
      "metal", "rahmen", "griff", "cadre", "marco", "telaio")
 )  # fmt: skip
-# Of what stands at a mirror or is glass that nobody sees through.
+# Words for parts of a mirror, and for opaque glass.
 _NO_MIRROR_WORDS: Final = FRAME_WORDS | {"back", "base", "lamp", "leg", "light", "stand"}
 _OPAQUE_GLASS_WORDS: Final = FRAME_WORDS | {
     "black",
@@ -38,13 +38,12 @@ _LETTERS: Final = str.maketrans({"ł": "l", "ø": "o", "ß": "ss", "đ": "d", "�
 
 
 def folded(text: str) -> str:
-    """Lower case, without accents.
+    """Lower case without accents, to compare names of any language; not for display.
 
-    For comparing names of any language, not for showing. Letters that Unicode does not take apart
-    (as those with strokes) become plain ones as far as `_LETTERS` has them; Hangul syllables stay
-    whole.
+    Letters that Unicode does not decompose (such as those with strokes) are replaced if `_LETTERS`
+    lists them; Hangul syllables stay composed.
     """
-    # What that takes apart besides (Hangul) is composed again.
+    # Recompose Hangul, which the normalization also decomposes.
     taken_apart = unicodedata.normalize("NFKD", text.casefold().translate(_LETTERS))
     plain = "".join(c for c in taken_apart if not unicodedata.combining(c))
     return unicodedata.normalize("NFC", plain)
@@ -89,7 +88,7 @@ def names_glass(name: str) -> bool:
 
 
 def names_clear_glass(name: str) -> bool:
-    """Whether the name of a part of a piece says that one sees through it: "frosted glass" is none."""
+    """True if the name of a part means transparent glass; false for "frosted glass"."""
     words = words_of(name)
     return bool(words & GLASS_WORDS) and not words & _OPAQUE_GLASS_WORDS
 

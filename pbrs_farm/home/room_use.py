@@ -1,4 +1,4 @@
-"""What a room is for, by its types, its name and what stands in it; no effects.
+"""The use of a room, from its types, its name and its furniture; no effects.
 
 The words are in room_words.csv beside this file.
 """
@@ -33,7 +33,7 @@ from pbrs_farm.home.names import folded, words_of, words_of_item
 
 
 class RoomKind(StrEnum):
-    """What a room is for."""
+    """Use of a room."""
 
     LIVING = "living"
     BEDROOM = "bedroom"
@@ -56,7 +56,7 @@ _COOKED_AT = frozenset({
 
 
 def is_cooked_in(items: Iterable[Item]) -> bool:
-    """Whether a cooker, a hood, a dishwasher or a fridge stands among them."""
+    """True if the items include a cooker, a hood, a dishwasher or a fridge."""
     return any(
         item.nyu40 == REFRIGERATOR
         or (item.nyu40 in (CABINET, OTHERFURNITURE) and words_of_item(item) & _COOKED_AT)
@@ -65,11 +65,11 @@ def is_cooked_in(items: Iterable[Item]) -> bool:
 
 
 def room_kind(room: Room, items: Sequence[Item], area_m2: float) -> RoomKind:
-    """What the room is for: what it is called, else what the items (those in it) say.
+    """The room's kind, from its types and name, else from its furniture.
 
-    items: those that stand in the room; area_m2: of its floor. A name wins over furniture, but a
-    "studio" with a bed or a cooker is a home of one room. Never None: what nothing speaks for is
-    OTHER, or HALL when small.
+    items: the furniture in the room; area_m2: of its floor. A name takes precedence over furniture,
+    but a "studio" with a bed or a cooker is a one-room home. Without evidence the kind is OTHER, or
+    HALL if the room is small.
     """
     named = named_kind(" ".join((*room.types, room.name)))
     has = {item.nyu40 for item in items}
@@ -84,7 +84,7 @@ def room_kind(room: Room, items: Sequence[Item], area_m2: float) -> RoomKind:
 
 
 def kind_by_things(items: Iterable[Item], area_m2: float) -> RoomKind | None:
-    """What a room without a name is for by the things that stand in it; None where they do not say.
+    """The kind of a nameless room by its furniture; None if that is not conclusive.
 
     area_m2: of its floor.
     """
@@ -112,7 +112,7 @@ def kind_by_things(items: Iterable[Item], area_m2: float) -> RoomKind | None:
 
 
 def with_uses(house: House) -> House:
-    """The house, its rooms that no type and no name says the use of typed by what stands in them."""
+    """The house with a type, derived from the furniture, for each room that has neither type nor name."""
     unnamed = [r for r in house.rooms if named_kind(" ".join((*r.types, r.name))) is None]
     things = [i for i in house.items if not i.kind.is_structure and (i.n_faces or i.box)]
     if not unnamed or not things:
@@ -133,10 +133,10 @@ def with_uses(house: House) -> House:
 
 
 def named_kind(name: str) -> RoomKind | None:
-    """What a room of that name is for; None where the name does not say.
+    """The kind of room that a name means; None if it has no known word.
 
-    name: any text, types and name together; the words of many languages are known. The first rule
-    of the table that fits counts. Furniture is not asked: see `room_kind`.
+    name: any text, types and name together; words of many languages are known. The first matching row
+    of the table wins. Furniture is not considered: see `room_kind`.
     """
     rule = _rule_for(name)
     return rule.use if rule else None
