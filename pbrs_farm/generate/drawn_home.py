@@ -36,7 +36,7 @@ class DrawnHome:
 
     @property
     def pieces(self) -> tuple[PlacedPiece, ...]:
-        """What stands in the lowest storey."""
+        """Furniture of the lowest storey."""
         return self.storeys[0].pieces
 
 
@@ -49,7 +49,7 @@ def drawn_home(
     A plan whose rooms cannot hold what they must is drawn anew; after a number of tries the home
     that breaks fewest gates is given, which says which.
     """
-    # A family whose plans are rare is none the rarer: it is drawn once.
+    # Draw the family once, so that families whose plans often fail are not under-represented.
     wishes = with_family(wishes or Wishes(), rng) if programme is None else wishes
     best: DrawnHome | None = None
     for _ in range(_TRIES):

@@ -21,10 +21,10 @@ _PROGRAMMES: Final = 6  # programmes drawn and tried before the wish is refused
 def drawn_plan(
     rng: np.random.Generator, wishes: Wishes | None = None, programme: Programme | None = None
 ) -> Plan:
-    """A floor plan by seed: for a programme, or for one that is drawn as wished.
+    """Generate a floor plan by seed, for a given programme or for one drawn within wishes.
 
-    wishes: bedrooms, area, family; programme: the rooms by name, where a user wrote them, of which none
-    may be left out. Raises BadInput if no plan fits; a drawn programme is drawn anew some times before.
+    wishes: bedrooms, area, family; programme: the rooms by name as a user wrote them, all of them
+    required. Raises BadInput if no plan fits; a drawn programme is redrawn several times first.
     """
     if programme:
         plans = (wishes and wishes.plans) or programme.plans
@@ -53,7 +53,7 @@ def plan_of_layout(where: Layout, height: float, rng: np.random.Generator) -> Pl
 
 
 def _drawn_layout(rng: np.random.Generator, wishes: Wishes) -> Layout:
-    """Rectangles for a programme by seed; for another one where it has none."""
+    """Rectangles for a programme by seed; redraws the programme if it has no solution."""
     for _ in range(_PROGRAMMES):
         try:
             return layout(drawn_programme(rng, wishes), rng)

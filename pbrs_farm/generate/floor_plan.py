@@ -1,4 +1,4 @@
-"""The nouns of a floor plan and of what stands in it: rooms, walls, openings, pieces, storeys; no effects.
+"""Values of a floor plan and its furniture: rooms, walls, openings, pieces, storeys; no effects.
 
 Frozen values in metres. Coordinates are (x, z) as in a house: x to the right, z downwards on the page, as Sweet Home 3D
 draws its plans.
@@ -20,7 +20,7 @@ Rect = tuple[float, float, float, float]  # x0, z0, x1, z1
 
 
 class RoomType(StrEnum):
-    """What a room is for."""
+    """Type of a room."""
 
     LIVING = "living"
     KITCHEN = "kitchen"
@@ -49,7 +49,7 @@ class RoomType(StrEnum):
 
     @property
     def label(self) -> str:
-        """What such a room is called on a plan."""
+        """Name of the room type on a drawn plan."""
         if self in (RoomType.LIVING, RoomType.STUDIO):
             return "Living room"
         if self is RoomType.STORE:
@@ -58,7 +58,7 @@ class RoomType(StrEnum):
 
 
 class OpeningKind(StrEnum):
-    """What an opening of a wall is."""
+    """Kind of an opening in a wall."""
 
     DOOR = "door"
     ENTRANCE = "entrance"
@@ -87,9 +87,9 @@ class PlanRoom:
         return min(xs), min(zs), max(xs), max(zs)
 
     def contains(self, point: Point) -> bool:
-        """Whether a point (x, z), metres, lies inside the room's polygon.
+        """True if a point (x, z), metres, is inside the room's polygon.
 
-        A ray to the right crosses an odd number of sides. A point on a side may be either.
+        A ray to the right crosses an odd number of sides. Points on a side may be either.
         """
         x, z = point
         crossed = [
@@ -131,10 +131,9 @@ class PlanWall:
     def corners(
         self, *, to_start: bool = True, to_end: bool = True
     ) -> tuple[Point, Point, Point, Point]:
-        """The corners of its ground; an end that meets a wall is drawn out by half of its thickness.
+        """Corners of the wall's ground; an end at another wall is extended by half its thickness.
 
-        (x, z) metres. to_start, to_end: False leaves that end as it is, for a wall that ends
-        freely.
+        (x, z) metres. to_start, to_end: False if that end is free and not extended.
         """
         (nx, nz), half = self.normal, self.thickness / 2
         a, b = self.at(-half * to_start), self.at(self.length + half * to_end)
@@ -174,7 +173,7 @@ class PlanOpening:
     sill: float  # of its lower edge above the floor, metres
     room: int  # index into Plan.rooms: a door swings into it, a window lights it
     other: int | None = None  # the room on the other side; None = outside
-    hinge_at_start: bool = True  # a door's hinges stand towards the wall's start
+    hinge_at_start: bool = True  # a door's hinges are at the end towards the wall's start
 
 
 @dataclass(frozen=True, slots=True)
@@ -198,14 +197,14 @@ def _edges(polygon: tuple[Point, ...]) -> Iterator[tuple[Point, Point]]:
 
 @dataclass(frozen=True, slots=True)
 class PlacedPiece:
-    """A piece where it stands; metres in the plan's (x, z)."""
+    """A piece of furniture with its place; metres in the plan's (x, z)."""
 
     piece: Piece
     x: float  # of the middle of its base
     z: float
     elevation: float  # of its base above the floor
     angle_rad: float  # clockwise on the page with z down; at 0 its front looks to +z
-    width: float  # along its own x, as it is wanted: the model is scaled to it
+    width: float  # target width along the piece's x axis; the model is scaled to it
     depth: float
     height: float
     room: int  # index into Plan.rooms
@@ -231,7 +230,7 @@ class PlacedPiece:
 
 @dataclass(frozen=True, slots=True)
 class Storey:
-    """A plan and what stands in its rooms."""
+    """A plan and the furniture of its rooms."""
 
     plan: Plan
     pieces: tuple[PlacedPiece, ...]

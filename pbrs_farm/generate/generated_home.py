@@ -21,7 +21,7 @@ from pbrs_farm.generate.staircase import Stair
 
 @dataclass(frozen=True, slots=True)
 class GeneratedHome:
-    """A home that was made."""
+    """A generated home."""
 
     storeys: tuple[Storey, ...]  # from below
     contents: HomeContents
@@ -56,7 +56,7 @@ def generate_home(
 
 
 def origin_of_home(home: MadeHome, catalogue: Catalogue, programme: Programme | None = None) -> str:
-    """What tells a made home from every other, in its file: its word and a digest of the rest."""
+    """Identity of a generated home, for its file: its word and a digest of all other inputs."""
     shelf = catalogue if home.furniture else EMPTY
     digest = keys.digest("made", home.version, home.word, repr(programme), shelf.digest)
     return f"{home.word} {digest}"
@@ -66,9 +66,9 @@ def furnish_storeys(
     plans: Sequence[Plan], given_pieces: Sequence[Sequence[PlacedPiece]], catalogue: Catalogue, key: str, *,
     seed: int, style: str = "", name: str = "home",
 ) -> GeneratedHome:  # fmt: skip
-    """Upright storeys from below; rooms in which no given piece stands are furnished by a seed.
+    """Build the storeys from below; rooms without given pieces are furnished by a seed.
 
-    key: what the plans come from, of which the seed makes a home.
+    key: identifies the plans; it is combined with the seed.
     """
     rng = np.random.default_rng(keys.seed("own plan", VERSION, seed, style, key))
     storeys = []

@@ -39,7 +39,7 @@ _STRIP_ASPECT: Final = 2.15  # largest length by width of a room along a whole s
 _CORNER_ASPECTS: Final = (1.3, 1.6, 1.0)
 _ARM_M: Final = 1.0  # the narrowest part of a host that its guest leaves
 
-Cut = tuple[IntRect, tuple[IntRect, ...]]  # the guest, and what is left of its host
+Cut = tuple[IntRect, tuple[IntRect, ...]]  # the guest, and the remainder of its host
 
 
 def hosts_of(programme: Programme) -> dict[int, int]:
@@ -52,7 +52,7 @@ def hosts_of(programme: Programme) -> dict[int, int]:
     bathrooms = (i for i, wish in enumerate(programme.rooms) if wish.type is RoomType.BATHROOM)
     first = next(bathrooms, -1)
     cut_from = _CUT_FROM if first >= 0 else {**_CUT_FROM, RoomType.WC: _WC_BELOW}
-    # What lies beside a certain room is a rectangle of its own.
+    # A room with required neighbours keeps a separate rectangle.
     wished = {k for room, others in programme.adjacent for k in (room, *others)}
     for number, wish in enumerate(programme.rooms):
         types = cut_from.get(wish.type, ()) if number not in wished else ()
@@ -83,11 +83,11 @@ def cut_guests(
     brief: Brief,
     notch: IntRect | None,
 ) -> set[int]:
-    """Cut each small room from the rectangle of its host, in place; gives those where that breaks a rule.
+    """Cut each small room from its host's rectangle, in place; returns rooms whose cut breaks a rule.
 
-    parts: the rectangles of each room, of which a host's shrinks or becomes an L. hosts: small room ->
-    its host. notch: a part of the outline that is no floor. Of the cuts that break no rule the one that
-    leaves most daylight and the best shapes is taken.
+    parts: the rectangles of each room; a host's shrinks or becomes an L. hosts: small room -> its
+    host. notch: a part of the outline without floor. Among valid cuts the one with most daylight and
+    the best shapes wins.
     """
     uncut: set[int] = set()
     for guest, host in hosts.items():
@@ -134,7 +134,7 @@ def _keeps_rules(
             return False
     elif _shared_length(rest, ways_to(host.type)) < door_m(host.type):
         return False
-    # What is left of a living room keeps the way to its kitchen.
+    # The remaining living room keeps its access to the kitchen.
     if host.type is RoomType.LIVING:
         kitchen = parts[first_of(programme, RoomType.KITCHEN)]
         ways = rest if programme.open_kitchen else (*rest, *halls)
@@ -165,9 +165,9 @@ def _shared_length(rects: tuple[IntRect, ...], others: tuple[IntRect, ...]) -> f
 
 
 def _strips(whole: IntRect, wish: RoomWish) -> Iterator[Cut]:
-    """A strip along each side of a rectangle: of the wished area or its least width.
+    """A strip along each side of a rectangle, with the required area or minimum width.
 
-    A strip is no more than twice as long as it is wide, and none that would be far too large.
+    Strips are at most twice as long as wide; strips that would be far too large are skipped.
     """
     x0, z0, x1, z1 = whole
     least = MIN_WIDTH[wish.type] + WALL_M
@@ -187,7 +187,7 @@ def _strips(whole: IntRect, wish: RoomWish) -> Iterator[Cut]:
 
 
 def _corner_cuts(whole: IntRect, wish: RoomWish) -> Iterator[Cut]:
-    """A rectangle in each corner of another, of the wished area: what is left has an L's shape."""
+    """A rectangle of the required area in each corner of another, leaving an L."""
     if wish.type not in SMALL:
         return
     x0, z0, x1, z1 = whole

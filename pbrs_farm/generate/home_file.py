@@ -1,15 +1,15 @@
 """A furnished plan as a Sweet Home 3D file: Home.xml, models, textures; no effects.
 
-The program writes the same names and units: centimetres, angles in radians, x to the right and y
+Names and units are those of the program: centimetres, angles in radians, x to the right and y
 downwards on the plan (https://www.sweethome3d.com, SweetHome3D.dtd of version 7.0).
 
     NAME.sh3d                       a ZIP; equal arguments give equal bytes
     ├── Home.xml                    <home version wallHeight camera>
-    │     <property name value/>        author, licence, whose models it holds
+    │     <property name value/>        author, licence, credits of models
     │     <environment/>                colours of ground, sky and light
-    │     <observerCamera/> <camera/>   where the program looks from
+    │     <observerCamera/> <camera/>   initial cameras of the program
     │     <level id elevation height/>  only in a home of two storeys
-    │     <doorOrWindow model/>         each opening, with what it cuts of its wall
+    │     <doorOrWindow model/>         each opening, with its cut in the wall
     │     <pieceOfFurniture model/>     stairs, then furniture; a lamp is a <light> with <lightSource>s
     │     <wall xStart yStart .../>     paints left and right
     │     <room floorColor ...>         <texture> of its floor, a <point> a corner
@@ -57,7 +57,7 @@ AUTHOR: Final = "pbrs_farm"
 VERSION: Final = "7000"
 _ZIP_TIME: Final = (2000, 1, 1, 0, 0, 0)  # of every entry: the same home has the same bytes
 _EYE_M: Final = 1.6
-_STEP_M: Final = 0.01  # where an upper edge steps up or down, no wall stands
+_STEP_M: Final = 0.01  # gap in the wall at a step of its upper edge, metres
 _FIELD_OF_VIEW_RAD: Final = 1.1
 _LAMP_POWER: Final = 0.5
 _DOOR_NAMES: Final = {
@@ -120,7 +120,7 @@ def home_contents(
     name: str = "home",
     origin: str = "",
 ) -> HomeContents:
-    """What a .sh3d of storeys holds; equal arguments, equal contents. origin: what it was made from.
+    """Contents of a .sh3d with these storeys; deterministic. origin: identity of the generated home.
 
     storeys: from below; stair: between the first two. Pieces whose model the catalogue cannot load
     are left out.
@@ -132,7 +132,7 @@ def home_contents(
         "version": VERSION, "name": f"{name}.sh3d", "camera": "topCamera",
         "wallHeight": _cm(plan.height),
     }  # fmt: skip
-    # Without a level that is shown, the program's plan would be blank.
+    # Select a level, or the program shows a blank plan.
     if len(storeys) > 1:
         home.set("selectedLevel", "level-0")
     _add_properties(home, placed, origin)
@@ -168,7 +168,7 @@ def _fork(rng: np.random.Generator) -> np.random.Generator:
 
 
 class HomeContents:
-    """What a home's file holds: Home.xml as a tree, and the contents that it names; each model once."""
+    """Contents of a home's file: Home.xml as a tree, and the files it references, each model once."""
 
     def __init__(self) -> None:
         self.home = ET.Element("home")
@@ -182,7 +182,7 @@ class HomeContents:
         self._files[self.icon] = png_from_array(picture)
 
     def model(self, key: str, shape: Shape) -> str:
-        """The path of a shape's model; key: what tells it from others."""
+        """Path of a shape's model; key: identity of the shape."""
         if key not in self._models:
             folder = str(len(self._models))
             path = f"{folder}/model.obj"
@@ -199,7 +199,7 @@ class HomeContents:
         return path
 
     def read(self, name: str) -> bytes | None:
-        """The bytes of a content, None if there is none of that name."""
+        """The bytes of a content; None for an unknown name."""
         data = self._files.get(name)
         return obj_file(data) if isinstance(data, Shape) else data
 

@@ -1,4 +1,4 @@
-"""A programme becomes rectangles: the brief of the slicing tree, and what of it to relax; no effects."""
+"""Turn a programme into rectangles: the slicing tree's brief, and its relaxations; no effects."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Layout:
 
 @dataclass(frozen=True, slots=True)
 class Core:
-    """What the storeys of a home share, in steps."""
+    """The part shared by all storeys of a home, in steps."""
 
     width: int  # of the outline
     depth: int
@@ -58,11 +58,11 @@ class Core:
 
 
 def layout(programme: Programme, rng: np.random.Generator, *, is_fixed: bool = False) -> Layout:
-    """Rectangles for a programme. What makes it hard is left out step by step: its notch, its
-    second arm, its blind sides, its small rooms.
+    """Rectangles for a programme. If there is no solution, requirements are dropped one by one: the
+    notch, the second arm, the blind sides, the small rooms.
 
-    is_fixed: nothing may be left out, as where a user wrote it. Raises BadInput where there is no
-    plan, with the nearest that has one.
+    is_fixed: nothing may be dropped, as for a user's programme. Raises BadInput if there is no plan,
+    with the nearest programme that has one.
     """
     said = f"{len(programme.rooms)} rooms in {programme.area:.0f} m2"
     for left_out, tried in _easier(programme):
@@ -82,7 +82,7 @@ def layout(programme: Programme, rng: np.random.Generator, *, is_fixed: bool = F
 
 
 def _easier(programme: Programme) -> list[tuple[str, Programme]]:
-    """(what is left out, the rest), the programme itself first."""
+    """(what was dropped, remaining programme), starting with the programme itself."""
     steps = [("", programme)]
     for left_out, change in (
         ("these rooms adjacent", {"adjacent": ()}),
@@ -118,7 +118,7 @@ def _solved_layout(
     n_tries: int = N_TRIES,
 ) -> Layout | None:  # fmt: skip
     hosts = hosts_of(programme)
-    # Make a leaf of each room that is no part of another's; two of a room with a second arm.
+    # One leaf per room that is no guest of another; two for a room with a second arm.
     leaves, owner = [], []
     for number, wish in enumerate(programme.rooms):
         if number in hosts:

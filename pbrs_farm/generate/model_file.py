@@ -23,7 +23,7 @@ _UV_DIGITS: Final = 5
 _MOST_DECIMALS: Final = 12  # a float32 times 10^12 is still exact in double precision
 _POWERS: Final = np.array([float(f"1e{n}") for n in range(-_MOST_DECIMALS, 16)])
 _ENDINGS: Final = {"image/png": "png", "image/jpeg": "jpg"}
-# What Sweet Home 3D makes of a group by its name: seen through, a mirror, or what turns or slides.
+# Sweet Home 3D's interpretation of group names: transparent, mirror, or moving.
 _GROUPS: Final = {
     MaterialKind.PANE: "sweethome3d_window_pane",
     MaterialKind.MIRROR: "sweethome3d_window_mirror",
@@ -60,7 +60,7 @@ def written_surfaces(shape: Shape) -> Iterator[WrittenSurface]:
 
 
 def _rounded(values: NDArray[np.floating], decimals: int) -> F64:
-    """What float() makes of f"{value:.{decimals}f}".
+    """Round as float(f"{value:.{decimals}f}") does.
 
     A float32 times a power of ten up to 10^12 is exact in double precision, so that rounding it and
     dividing gives the nearest double of the decimal number, as parsing does.
@@ -71,7 +71,7 @@ def _rounded(values: NDArray[np.floating], decimals: int) -> F64:
 
 
 def _to_digits(values: NDArray[np.floating], digits: int) -> F64:
-    """What float() makes of f"{value:.{digits}g}"; the same reason, digit by digit."""
+    """Round as float(f"{value:.{digits}g}") does, by the same method digit by digit."""
     size = np.abs(values.astype(np.float64))
     # Count decimals from the first digit that is not 0; compare, since a logarithm is not exact.
     exponent = np.searchsorted(_POWERS, size, side="right") - 1 - _MOST_DECIMALS
@@ -116,7 +116,7 @@ def _group_name(shape: Shape, surface: Surface, number: int) -> str:
 
 
 def hanger(joint: Joint, number: int) -> str:
-    """What the k-th joint of a shape is called in the names of groups: "hinge_1", "rail_2"."""
+    """Group name of a shape's k-th joint: "hinge_1", "rail_2"."""
     return f"{_HANGERS[joint.kind]}_{number}"
 
 
@@ -162,7 +162,7 @@ def _visible_surface(surface: Surface) -> Surface:
 
 
 def material_name(shape: Shape, number: int) -> str:
-    """What its readers know a material by: its number, and what it says of itself."""
+    """Name of a material in the file: its number and its own name."""
     words = re.findall(r"[A-Za-z]+", shape.materials[number].name)
     return "_".join((f"m{number}", *words))[:60]
 

@@ -1,4 +1,4 @@
-"""A plan while its openings are drawn: walls, what is taken of them, what leaves sweep. No effects."""
+"""A plan during placement of its openings: walls, occupied stretches, door swings. No effects."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _LEAVES_M: Final = 0.1  # overlap allowed between the squares that two door leav
 
 @dataclass(slots=True)
 class WallDrawing:
-    """What doors and windows are added to."""
+    """The plan to which doors and windows are added."""
 
     layout: Layout
     runs: list[WallRun]
@@ -36,7 +36,7 @@ class WallDrawing:
 
     @property
     def family(self) -> PlanFamily:
-        """Whose habits it follows."""
+        """The plan family whose rules apply."""
         return self.layout.programme.family
 
     def wall_of(self, run: WallRun, at: float) -> tuple[int, float]:
@@ -67,7 +67,7 @@ class WallDrawing:
         return margin
 
     def taken(self, run: WallRun) -> list[tuple[float, float]]:
-        """What openings already take of a run's axis."""
+        """Intervals of a run's axis occupied by openings."""
         spans = []
         for opening in self.openings:
             wall = self.walls[opening.wall]
@@ -86,7 +86,7 @@ class WallDrawing:
         return spans
 
     def gaps(self, run: WallRun) -> list[tuple[float, float]]:
-        """What openings leave of a run between its corners, the longest first."""
+        """Free intervals of a run between its corners, the longest first."""
         low, high = self.free(run)
         found = []
         for a, b in sorted(self.taken(run)):

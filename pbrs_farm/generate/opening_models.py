@@ -1,7 +1,7 @@
 """Generated doors and windows, for homes whose catalogue has none of the right size; no effects.
 
-A shape fills the opening: metres, the middle of its base at the origin, x along the wall, its
-front (the room a door swings into) towards +z. A home has one design of doors and one of windows.
+A shape fills the opening: metres, its base centred at the origin, x along the wall, its front (the
+room a door swings into) towards +z. A home has one design of doors and one of windows.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from pbrs_farm.home.masses import mass_kg
 
 _FRAME_M: Final = 0.06  # breadth of a frame's posts
 _LEAF_M: Final = 0.04  # thickness of a door's leaf
-_PANEL_M: Final = 0.006  # how far a panel stands out
+_PANEL_M: Final = 0.006  # protrusion of a panel, metres
 _GAP_M: Final = 0.003  # around a leaf
 _STOP_M: Final = 0.015  # how far the stop behind a leaf reaches into the opening
 _STOP_DEPTH_M: Final = 0.012
@@ -58,7 +58,7 @@ _Box = tuple[Triple, Triple]  # low and high corner
 
 @dataclass(frozen=True, slots=True)
 class OpeningDesign:
-    """What a home's doors and windows look like."""
+    """Design of a home's doors and windows."""
 
     leaf: str = LEAVES[0]  # of doors between rooms
     entrance: str = LEAVES[0]
@@ -120,7 +120,7 @@ def _with_joints(
     hung: Sequence[tuple[Joint, Sequence[Surface]]],
     materials: tuple[Material, ...],
 ) -> Shape:
-    """A shape of what stands still and of what each joint moves, with its mass."""
+    """A shape of a static body and the parts that each joint moves, with its mass."""
     surfaces, joints = list(body), []
     for joint, moving in hung:
         surfaces += [replace(s, part=joint.part) for s in moving]
@@ -160,7 +160,7 @@ def _stops(w: float, h: float, d: float, *, has_threshold: bool) -> list[_Box]:
 
 
 def _door_leaf_boxes(w: float, h: float, d: float, kind: str) -> list[_Box]:
-    """A door's leaf, flush with the room it swings into; panels stand out on both sides."""
+    """A door's leaf, flush with the room it swings into; panels protrude on both sides."""
     x, front = w / 2 - _FRAME_M - _GAP_M, d / 2 - 0.005
     back, top = front - _LEAF_M, h - _FRAME_M - _GAP_M
     boxes: list[_Box] = [((-x, 0.006, back), (x, top, front))]
@@ -171,7 +171,7 @@ def _door_leaf_boxes(w: float, h: float, d: float, kind: str) -> list[_Box]:
 
 
 def _panels(x: float, top: float, kind: str) -> list[tuple[float, float, float, float]]:
-    """(left, low, right, high) of the panels on a leaf that is 2 x wide."""
+    """(left, low, right, high) of the panels on a leaf of width 2 x."""
     inset, gap, middle = 0.11, 0.036, 0.95
     left, right = -x + inset, x - inset
     if kind == "flat":
@@ -228,9 +228,9 @@ def _handles(w: float, d: float, hinge_at_start: bool, kind: str) -> list[_Box]:
 def _sashes(
     w: float, h: float, design: OpeningDesign
 ) -> Iterator[tuple[tuple[float, float], list[_Box], list[_Box], list[_Box]]]:
-    """(span of x, bars, panes, catches) of as many sashes side by side as keep each below a metre.
+    """(span of x, bars, panes, catches) of sashes side by side, each narrower than a metre.
 
-    A light above a sash does not open by itself: it turns with the sash below it.
+    A light above a sash has no joint: it turns with the sash below it.
     """
     n = max(1, round((w - 2 * _FRAME_M) / _WIDEST_SASH_M + 0.3))
     inner, low, high = w - 2 * _FRAME_M, _FRAME_M * 0.7, h - _FRAME_M
@@ -253,7 +253,7 @@ def _sashes(
 
 
 def _catch(x: float, y: float, kind: str) -> list[_Box]:
-    """What a sash is opened by, on the room's side of its upright bar that begins at x."""
+    """Handle of a sash, on the room side of its upright bar that begins at x."""
     at, front = x + _SASH_M * 0.4, _SASH_DEPTH_M
     if kind == "knob":
         return [((at - 0.012, y - 0.012, front), (at + 0.012, y + 0.012, front + 0.03))]

@@ -23,7 +23,7 @@ from pbrs_farm.generate.plan_walls import OUTSIDE, WallRun, open_pairs
 from pbrs_farm.generate.windows import GLASS_SHARE, add_balcony, add_windows, is_lit
 
 _TOLERANCE: Final = 0.97  # sizes of windows are whole centimetres
-_OPEN_M: Final = 0.7  # the least width of an open side that one walks through
+_OPEN_M: Final = 0.7  # minimum width of an open side to walk through
 _PASSAGES_M: Final = (1.5, 1.2)  # the wider one where it fits
 _DOOR_M, _WET_DOOR_M, _ENTRANCE_M = 0.9, 0.8, 0.95
 _FROM_CORNER_M: Final = 0.10  # least distance from a door's frame to the corner of the room
@@ -32,10 +32,10 @@ _OPENS_OUT: Final = (RoomType.WC, RoomType.STORE)
 
 
 def plan_faults(plan: Plan) -> list[str]:
-    """What is wrong with a plan, a line each.
+    """Faults of a plan, one line each; empty for a good plan.
 
-    Rooms that need daylight and have none, and rooms that nobody can reach; empty for a good plan.
-    Furniture and widths of doors are not looked at.
+    Reports rooms without the daylight they need, and unreachable rooms. Furniture and widths of doors
+    are not considered.
     """
     return [*_dark_rooms(plan), *_unreached_rooms(plan)]
 
@@ -168,7 +168,7 @@ def _runs_between(drawing: WallDrawing, room: int, others: Iterable[int]) -> lis
 
 
 def _add_doors_of_en_suite(drawing: WallDrawing, room: int, bedrooms: tuple[int, ...]) -> None:
-    """A bathroom's door to its bedroom; the home's only one has another to the hall if it fits."""
+    """Add a bathroom's door to its bedroom; the home's only bathroom gets another to the hall if it fits."""
     wanted: list[tuple[Iterable[int], bool]] = [(bedrooms, True)]
     if drawing.types.count(RoomType.BATHROOM) == 1:
         wanted.append((rooms_of_types(drawing.types, RoomType.HALL), False))
@@ -201,9 +201,9 @@ def _add_door(
     *,
     may_meet: bool = True,
 ) -> bool:
-    """A door at one end of a run, hinged towards the corner; False where there is no room.
+    """Add a door at one end of a run, hinged towards the corner; False if there is no space.
 
-    may_meet: its leaf may swing where another one does.
+    may_meet: its swing may overlap that of another door.
     """
     low, high = drawing.free(run)
     # Stand nearer to the corner where the wall is short.
@@ -215,7 +215,7 @@ def _add_door(
     if drawing.rng.random() < 0.5:
         places.reverse()
     other = next((r for r in run.rooms if r != room), OUTSIDE)
-    # The leaf of a small room's door would stand in all of it: it opens outwards.
+    # Doors of small rooms open outwards, since the leaf would fill the room.
     opens_out = other != OUTSIDE and drawing.types[room] in _OPENS_OUT
     into, behind = (other, room) if opens_out else (room, other)
     for at, hinge_at_start in places:

@@ -38,7 +38,7 @@ class PlanFamily(Record):
     second_bathroom: _Share = 0.3  # of homes of three bedrooms; above .3 of two bedrooms, too
     hall_share: tuple[float, float] = (0.11, 0.16)  # of the area of all other rooms
 
-    # Which rooms meet, and how one walks.
+    # Connections between rooms, and circulation.
     open_kitchen: _Share = 0.5  # no wall between kitchen and living room
     bedrooms_at: Literal["hall", "living or hall", "living"] = "hall"  # where their doors open to
     enfilade: _Share = 0.0  # a bedroom beside the living room has a second door, to it
@@ -52,7 +52,7 @@ class PlanFamily(Record):
     notch: tuple[float, float] = (0.06, 0.12)  # how much, of the floor
     l_shaped: _Share = 0.25  # the living room has a second arm
     slanted: _Share = 0.2  # one side is not at right angles to the others
-    bay: _Share = 0.2  # a window of a room to live in stands in a bay
+    bay: _Share = 0.2  # share of homes with a bay window in a living area
     balcony: _Share = 0.4
     blind_shares: tuple[_Share, ...] = (0.45, 0.4, 0.15)  # of 0, 1, 2 sides without daylight
 

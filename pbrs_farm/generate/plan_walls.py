@@ -70,7 +70,7 @@ def runs_of(layout: Layout) -> list[WallRun]:
 def _runs_on_line(
     before: NDArray[np.int32], after: NDArray[np.int32], line: int, is_vertical: bool
 ) -> list[WallRun]:
-    # The rim shifts cells by one: cell k lies between the coordinates k - 1 and k.
+    # The rim shifts cells by one: cell k is between the coordinates k - 1 and k.
     found, start = [], 0
     for (a, b), group in groupby(zip(before.tolist(), after.tolist(), strict=True)):
         stop = start + len(list(group))
@@ -88,9 +88,9 @@ def thickness(run: WallRun, types: list[RoomType]) -> float:
 
 
 def walls_of(layout: Layout, runs: list[WallRun]) -> tuple[PlanWall, ...]:
-    """The walls: runs of one line and thickness joined; none between rooms that are open.
+    """Merge collinear runs of equal thickness into walls; open sides get none.
 
-    runs: of `runs_of`. Stretches of unequal thickness stay two walls, although they are in line.
+    runs: from `runs_of`. Collinear stretches of unequal thickness stay separate walls.
     """
     types = [wish.type for wish in layout.programme.rooms]
     is_open = open_pairs(layout)
@@ -124,10 +124,10 @@ def open_pairs(layout: Layout) -> frozenset[frozenset[int]]:
 
 
 def rooms_of(layout: Layout, walls: tuple[PlanWall, ...]) -> tuple[PlanRoom, ...]:
-    """The rooms: their rectangles without what the walls stand on.
+    """The rooms: their rectangles minus the walls' ground.
 
-    (x, z) metres; a room is what is free between the faces of its walls, its largest part where a
-    wall divides it.
+    (x, z) metres; a room is the free area between the faces of its walls, its largest part if a wall
+    divides it.
     """
     ground = unary_union([Polygon(wall.corners()) for wall in walls])
     count: dict[RoomType, int] = {}
@@ -138,7 +138,7 @@ def rooms_of(layout: Layout, walls: tuple[PlanWall, ...]) -> tuple[PlanRoom, ...
             box(x0 * STEP_M, z0 * STEP_M, x1 * STEP_M, z1 * STEP_M) for x0, z0, x1, z1 in parts
         ]
         polygon = unary_union(rects).difference(ground)
-        # Rooms of one type without a name of their own are numbered: "bedroom 2".
+        # Number unnamed rooms of one type: "bedroom 2".
         count[wish.type] = count.get(wish.type, 0) + 1
         name = wish.name or wish.type.label
         if not wish.name and types.count(wish.type) > 1:
@@ -161,7 +161,7 @@ def corners(shape: BaseGeometry) -> tuple[Point, ...]:
     points = [(round(x, 4), round(z, 4)) for x, z in ring]
     # Leave out all but one of those at one place: beside itself no corner turns, and it would go.
     points = [p for i, p in enumerate(points) if p != points[i - 1]]
-    # Leave out what lies on a straight side: three points that turn by nothing.
+    # Drop collinear points.
     kept = [
         p
         for i, p in enumerate(points)
@@ -177,10 +177,10 @@ def _turn(a: Point, b: Point, c: Point) -> float:
 
 
 def largest_rectangle(polygon: Polygon) -> Rect:
-    """The largest rectangle inside a polygon with upright sides; its bounds where there is none.
+    """The largest axis-aligned rectangle inside a rectilinear polygon; its bounds if there is none.
 
-    Tries all pairs of corners' lines: for polygons of a room's size of corners, not for outlines of
-    hundreds.
+    Tries all pairs of corner coordinates: suitable for rooms, not for outlines with hundreds of
+    corners.
     """
     points = list(polygon.exterior.coords)
     xs, zs = sorted({p[0] for p in points}), sorted({p[1] for p in points})

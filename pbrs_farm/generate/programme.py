@@ -64,18 +64,18 @@ class Programme:
 
     rooms: tuple[RoomWish, ...]
     open_kitchen: bool = False  # no wall between kitchen and living room
-    n_blind_sides: int = 0  # sides of the outline that neighbours' homes stand against
+    n_blind_sides: int = 0  # sides of the outline shared with neighbouring homes
     notch: float = 0.0  # area of a corner that the outline leaves out, square metres
     l_shaped: bool = False  # the living room has a second arm
     balcony: bool = False
     adjacent: tuple[tuple[int, tuple[int, ...]], ...] = ()  # room shares a wall with one of others
     is_upper: bool = False  # the storey above: one comes up the stairs, not in by a front door
-    is_court: bool = False  # the notch lies in the middle of a side: the outline is a U
+    is_court: bool = False  # the notch is in the middle of a side: a U-shaped outline
     plans: str = FLAT  # the family that it is of
 
     @property
     def family(self) -> PlanFamily:
-        """What homes of its family have in common."""
+        """Properties shared by the homes of its family."""
         return plan_families()[self.plans]
 
     def entered_from(self, type_: RoomType) -> tuple[RoomType, ...]:
@@ -93,9 +93,9 @@ class Programme:
 
     @property
     def en_suites(self) -> dict[int, tuple[int, ...]]:
-        """Bathroom -> the bedrooms it is entered from: those that are wished beside each other.
+        """Bathroom -> the bedrooms with a door to it, from the wishes for adjacency.
 
-        Of several bathrooms that a pair leaves open the last one becomes it: the first is for all.
+        If several bathrooms qualify, the last is en suite: the first serves the whole home.
         """
         types = [wish.type for wish in self.rooms]
         found: dict[int, tuple[int, ...]] = {}
@@ -111,13 +111,13 @@ class Programme:
 
 @dataclass(frozen=True, slots=True)
 class Wishes:
-    """What a user asks of drawn homes."""
+    """A user's requirements for generated homes."""
 
     bedrooms: tuple[int, int] = (0, 4)
     area: tuple[float, float] = (20.0, 250.0)  # of all rooms, square metres
     storeys: int = 1
     plans: str = ""  # family of plans; "" = drawn by seed
-    offices: int = 0  # bedrooms that are offices
+    offices: int = 0  # number of bedrooms that become offices
 
     def __post_init__(self) -> None:
         """Raise BadInput for ranges that no home can meet."""
@@ -173,7 +173,7 @@ def _draw_programme(rng: np.random.Generator, bedrooms: tuple[int, int], plans: 
             else r
             for r in rooms
         ]
-    # The hall takes its share of what it opens to.
+    # The hall takes its share of the area of adjacent rooms.
     total = sum(r.area for r in rooms)
     doors = Programme(tuple(rooms), plans=plans)
     n_doors = sum(RoomType.HALL in found for found in map(doors.entered_from, types))

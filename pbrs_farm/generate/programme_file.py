@@ -45,7 +45,7 @@ _PAIR: Final = TypeAdapter(Annotated[tuple[str, str], exactly(2, "rooms")])
 
 
 def programme_from_json(path: Path) -> Programme:
-    """The programme of a file. Raises BadInput, naming the rule that is broken and what would do."""
+    """Read a programme from a file. Raises BadInput, naming the violated rule and a remedy."""
     given = checked(_File, json_from_file(path), path, hint=_FORM)
     wishes = [_wish(path, k, row) for k, row in enumerate(given.rooms)]
     wishes = _with_area(path, given.area, _complete(path, wishes))
@@ -129,7 +129,7 @@ def _complete(path: Path, wishes: list[RoomWish]) -> list[RoomWish]:
         raise BadInput(path, "", "has no bathroom", hint='add {"type": "bathroom"}')
     if RoomType.KITCHEN not in types:
         raise BadInput(path, "", "has no kitchen", hint='add {"type": "kitchen"}')
-    # A hall that is wished without an area takes its share of what opens to it.
+    # A hall without a given area takes its share of the adjacent rooms.
     others = [w for w in wishes if w.type is not RoomType.HALL]
     share = max(_ASKED_HALL_SHARE * sum(w.area for w in others), 3.0 + 0.95 * len(others))
     given = next((w for w in wishes if w.type is RoomType.HALL), RoomWish(RoomType.HALL, 0.0))

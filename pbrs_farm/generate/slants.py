@@ -1,7 +1,7 @@
-"""Walls that meet at other than right angles: a slanted side of the outline, a bay before a window. No effects.
+"""Walls at other than right angles: a slanted side of the outline, a bay window. No effects.
 
-Both only add floor, outside what was drawn: no room gets smaller, no opening leaves its wall, and what
-is furnished as a rectangle stays one.
+Both only add floor outside the drawn plan: no room shrinks, no opening leaves its wall, and
+rectangular furnishing areas stay rectangular.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from pbrs_farm.generate.plan_families import PlanFamily
 from pbrs_farm.generate.plan_walls import OUTER_M
 
 _SLANT_RAD: Final = (math.radians(5), math.radians(13))
-_MOST_M: Final = 1.7  # by which a slanted side stands out at one end
+_MOST_M: Final = 1.7  # maximum offset of a slanted side at its outer end, metres
 _LESS: Final = (1.0, 0.75, 0.5)  # of that, tried until every room has its daylight
 _BAY_DEPTH_M: Final = (0.5, 0.85)
 _BAY_SPREAD: Final = (0.45, 1.0)  # how far a bay's sides spread, by its depth
@@ -42,7 +42,7 @@ def with_slants(plan: Plan, family: PlanFamily, rng: np.random.Generator) -> Pla
 
 
 def _with_slanted_side(plan: Plan, rng: np.random.Generator) -> Plan:
-    """One side of the outline turned outwards about one of its ends; as it is where none may be."""
+    """Rotate one side of the outline outwards about an end; unchanged if no side is allowed."""
     sides = [(axis, outwards) for axis in (0, 1) for outwards in (-1, 1)]
     angle = float(rng.uniform(*_SLANT_RAD))
     for k in rng.permutation(len(sides)):
@@ -56,9 +56,9 @@ def _with_slanted_side(plan: Plan, rng: np.random.Generator) -> Plan:
 
 
 def _slanted(plan: Plan, axis: int, outwards: int, slope: float, *, grows: bool) -> Plan | None:
-    """The plan with the side at the least or greatest x (axis 0) or z (1) slanted; None before a balcony.
+    """The plan with the side at the least or greatest x (axis 0) or z (1) slanted; None if a balcony is there.
 
-    grows: whether it stands out further towards greater coordinates.
+    grows: whether the offset increases with the coordinate.
     """
     walls = [w for w in plan.walls if w.is_outer and w.height is None]
     across = [p[axis] for w in walls for p in (w.start, w.end)]
@@ -72,7 +72,7 @@ def _slanted(plan: Plan, axis: int, outwards: int, slope: float, *, grows: bool)
     longer = math.hypot(1.0, slope)
 
     def moved(point: Point, inwards: float) -> Point:
-        """A point that lies `inwards` of the old middle line, as far from the new one."""
+        """Move a point from a distance `inwards` of the old centre line to the same distance of the new one."""
         if abs(point[axis] - (line - outwards * inwards)) > _EPSILON:
             return point
         far = point[1 - axis] - low if grows else high - point[1 - axis]
@@ -95,7 +95,7 @@ def _slanted(plan: Plan, axis: int, outwards: int, slope: float, *, grows: bool)
 
 
 def _along(opening: PlanOpening, old: PlanWall, new: PlanWall) -> float:
-    """Where an opening is on its wall once that is turned, or goes on farther at its start."""
+    """Position of an opening on its wall after the wall was turned or extended at its start."""
     (x0, z0), (x1, z1) = new.start, new.end
     if min(abs(x1 - x0), abs(z1 - z0)) > _EPSILON:
         return opening.along * new.length / old.length
@@ -117,7 +117,7 @@ def _relit(old: Plan, new: Plan) -> Plan:
 
 
 def _fits(plan: Plan, opening: PlanOpening, others: Sequence[PlanOpening]) -> bool:
-    """Whether an opening lies before its room, off corners and off other openings of its wall."""
+    """True if an opening is within its room's side, clear of corners and of other openings."""
     wall, room = plan.walls[opening.wall], plan.rooms[opening.room]
     half = opening.width / 2
     if any(abs(p.along - opening.along) < half + p.width / 2 + _APART_M for p in others):
@@ -131,7 +131,7 @@ def _fits(plan: Plan, opening: PlanOpening, others: Sequence[PlanOpening]) -> bo
 
 
 def _with_bay(plan: Plan, rng: np.random.Generator) -> Plan:
-    """A bay before one window of a room to live in; as it is where none has the room for one."""
+    """Add a bay to one window of a living area; unchanged if there is no space."""
     depth = float(rng.uniform(*_BAY_DEPTH_M))
     spread = depth * float(rng.uniform(*_BAY_SPREAD))
     for k in rng.permutation(len(plan.openings)):

@@ -176,7 +176,7 @@ def _neighbour_tree(tree: _Tree, draw: _Random) -> _Tree:
 
 
 def _exchange_subtrees(tree: _Tree, i: int, j: int, draw: _Random) -> None:
-    """Swap a child of cut i with a child of cut j, unless one lies below the other."""
+    """Swap a child of cut i with a child of cut j, unless one is an ancestor of the other."""
     side_i, side_j = draw.below(2), draw.below(2)
     a, b = tree.children[i][side_i], tree.children[j][side_j]
     if i == j or _is_below(tree, j, a) or _is_below(tree, i, b):
@@ -239,12 +239,12 @@ _Limit = tuple[int, bool, float]  # of a cut: a side, whether it is the least on
 
 
 def _limits(tree: _Tree, brief: Brief, order: list[int]) -> dict[int, list[_Limit]]:
-    """What the cuts around leaves with a given place must keep off, the pinned leaf's last."""
+    """Bounds for the cuts around leaves with a given place; those of the pinned leaf last."""
     found: dict[int, list[_Limit]] = {}
     n_cuts = len(tree.children)
     for leaf, place, is_exact in brief.places:
         wanted = n_cuts + tree.leaf_at.index(leaf)
-        # From the leaves up to the root: every cut stands in the order before its children.
+        # Process cuts from leaves to root: the order lists every cut before its children.
         for k in reversed(order):
             if wanted in tree.children[k]:
                 is_first = wanted == tree.children[k][0]

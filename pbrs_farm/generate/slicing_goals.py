@@ -1,4 +1,4 @@
-"""What a slicing must meet: leaves, contacts, and how far rectangles are from it. No effects."""
+"""Goals of a slicing: leaves, contacts, and the distance of a layout from them. No effects."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ IntRect = tuple[int, int, int, int]  # x0, z0, x1, z1 in steps
 
 @dataclass(frozen=True, slots=True)
 class SliceLeaf:
-    """A rectangle of the plan and what it must be; lengths in metres."""
+    """A rectangle of the plan with its requirements; lengths in metres."""
 
     area: float  # with its share of the walls, square metres
     min_width: float
     max_aspect: float = math.inf
     outer: float = 0.0  # least length of outer wall with daylight
     any_outer: float = 0.0  # least length of any outer wall
-    is_corner: bool = False  # a notch of the outline: it lies in a corner and counts as outside
+    is_corner: bool = False  # a notch of the outline: in a corner, counted as outside
     is_court: bool = False  # such a notch in the middle of a side
-    pinned: IntRect | None = None  # exactly where it lies; at most one leaf of a brief
-    holds: IntRect | None = None  # what it must reach around
+    pinned: IntRect | None = None  # exact place; at most one leaf of a brief
+    holds: IntRect | None = None  # area that it must contain
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +43,7 @@ class Contact:
 
 @dataclass(frozen=True, slots=True)
 class Brief:
-    """What annealing has to solve."""
+    """The problem for the annealer to solve."""
 
     leaves: tuple[SliceLeaf, ...]
     contacts: tuple[Contact, ...]
@@ -55,13 +55,13 @@ class Brief:
 
 
 def given_places(leaves: Sequence[SliceLeaf]) -> tuple[tuple[int, IntRect, bool], ...]:
-    """(leaf, its place, whether it lies exactly there) of those that have one, the exact last."""
+    """(leaf, place, whether exact) of leaves with a given place, exact ones last."""
     around = [(i, leaf.holds, False) for i, leaf in enumerate(leaves) if leaf.holds]
     return (*around, *((i, leaf.pinned, True) for i, leaf in enumerate(leaves) if leaf.pinned))
 
 
 class Rules:
-    """How far the rooms of a layout are from what they must be."""
+    """Distance of a layout's rooms from their requirements."""
 
     def __init__(self, brief: Brief) -> None:
         self._brief = brief
@@ -75,10 +75,10 @@ class Rules:
         ]
 
     def judge(self, rects: list[IntRect]) -> tuple[float, int]:
-        """How far one rectangle for each leaf is from the brief: (cost, number of hard rules broken).
+        """Score one rectangle per leaf against the brief: (cost, number of violated hard rules).
 
-        rects: in steps of STEP_M on the walls' middle lines, in the order of the brief's leaves. The cost
-        is smooth, so that annealing finds its way: a rule that is nearly kept costs less.
+        rects: in steps of STEP_M on the walls' centre lines, in the order of the brief's leaves. The cost
+        is smooth to guide the annealing: a nearly satisfied rule costs less.
         """
         total, unmet = 0.0, 0
         for leaf, (min_width, max_aspect, has_place), rect in zip(
@@ -171,7 +171,7 @@ def _has_place(leaf: SliceLeaf) -> bool:
 
 
 def _missed_area(leaf: SliceLeaf, rect: IntRect) -> float:
-    """Cost of a rectangle that is much smaller or larger than its leaf wished."""
+    """Cost of a rectangle much smaller or larger than its leaf's area."""
     area = (rect[2] - rect[0]) * (rect[3] - rect[1]) * STEP_M**2
     share, (low, high) = max(area / leaf.area, 0.05), _AREA_SHARES
     if leaf.pinned or low <= share <= high:

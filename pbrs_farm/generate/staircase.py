@@ -1,7 +1,7 @@
-"""A staircase that turns by half a circle: two flights side by side and a landing; no effects.
+"""A half-turn staircase: two parallel flights and a landing; no effects.
 
-The shape stands on the lower floor: metres, the middle of its base at the origin, its front towards
-+z, where both flights begin and end. At its front edge it reaches the upper floor.
+The shape is in metres on the lower floor, with its base centred at the origin and its front towards
++z, where both flights begin and end. The front edge reaches the upper floor.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _WOOD: Final = (0.62, 0.45, 0.29)
 
 @dataclass(frozen=True, slots=True)
 class Stair:
-    """Where a staircase stands in the plan of the storey that it rises from."""
+    """Place of a staircase in the plan of its lower storey."""
 
     rect: Rect  # free in both storeys
     front: Point  # unit vector (x, z) from the stairs into both halls
@@ -71,7 +71,7 @@ def stair_between(
 
 
 def n_risers(rise: float) -> int:
-    """How many steps lead up: an even number, none higher than 18.5 cm."""
+    """Number of steps: even, none higher than 18.5 cm."""
     return 2 * math.ceil(rise / HIGHEST_RISER_M / 2)
 
 

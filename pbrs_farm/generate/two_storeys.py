@@ -43,7 +43,7 @@ def drawn_storeys(rng: np.random.Generator, wishes: Wishes) -> tuple[tuple[Plan,
     for _ in range(_CORES):
         lower, upper = _programmes(rng, wishes, n_bedrooms)
         core = _drawn_core(rng, lower, upper)
-        # The upper storey is asked for only where the lower one has a plan.
+        # Generate the upper storey only once the lower one has a plan.
         layouts = []
         for programme, n_tries in zip((lower, upper), _STOREY_TRIES, strict=True):
             found = storey_layout(programme, core, n_tries, rng)
@@ -65,12 +65,12 @@ def drawn_storeys(rng: np.random.Generator, wishes: Wishes) -> tuple[tuple[Plan,
 
 
 def _drawn_bedrooms(rng: np.random.Generator, wishes: Wishes) -> int:
-    """How many the home has: drawn once, so that homes whose plans are rare are none the rarer."""
+    """Draw the number of bedrooms once, so that numbers whose plans often fail are not under-represented."""
     low, high = max(wishes.bedrooms[0], _BEDROOMS[0]), wishes.bedrooms[1]
     shares = np.array(
         [s for n, s in zip(_BEDROOMS, _BEDROOM_SHARES, strict=True) if low <= n <= high]
     )
-    # Draw again what has no plan in the wished area; some number always has one.
+    # Redraw numbers without a plan in the given area; at least one number always has one.
     while True:
         n = int(rng.choice(np.arange(low, high + 1), p=shares / shares.sum()))
         if AREA_OF_TWO_STOREYS[n][0] <= wishes.area[1]:
@@ -78,7 +78,7 @@ def _drawn_bedrooms(rng: np.random.Generator, wishes: Wishes) -> int:
 
 
 def _programmes(rng: np.random.Generator, wishes: Wishes, n: int) -> tuple[Programme, Programme]:
-    """What lies below and above: to live and to cook, to sleep (n bedrooms) and to bathe; equally large."""
+    """Programmes of equal area: living and cooking below, n bedrooms and bathrooms above."""
     below = [RoomType.LIVING, RoomType.KITCHEN, RoomType.WC]
     above = [RoomType.BEDROOM] * n + [RoomType.BATHROOM]
     # Move a bedroom down where there are many; add the small rooms of larger homes.
@@ -92,7 +92,7 @@ def _programmes(rng: np.random.Generator, wishes: Wishes, n: int) -> tuple[Progr
         above.append(RoomType.BATHROOM)
     storeys = [_draw_room_wishes(rng, types) for types in (below, above)]
     areas = [sum(r.area for r in rooms) for rooms in storeys]
-    # Both have the area between, or half of what is wished.
+    # Both get the mean area, or half of the requested one.
     whole = float(np.clip(sum(areas), *wishes.area))
     lower, upper = (
         tuple(_with_room_for_toilet(wish) for wish in scaled_rooms(rooms, whole / 2))
@@ -125,7 +125,7 @@ def _drawn_core(rng: np.random.Generator, lower: Programme, upper: Programme) ->
     area = _WALLS * (lower.area + upper.area) / 2
     width, depth = drawn_outline(area, rng)
     lit = lit_sides(int(rng.choice([0, 1, 2], p=[0.5, 0.3, 0.2])), rng)
-    # Lay the stairs into a frame whose x runs along the side they stand at, z away from it.
+    # Transform the stairs to a frame with x along their wall and z away from it.
     side = int(rng.integers(4))  # left, top, right, bottom
     along, across = (depth, width) if side % 2 == 0 else (width, depth)
     is_sideways = bool(rng.random() < 0.5)

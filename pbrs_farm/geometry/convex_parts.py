@@ -125,13 +125,13 @@ class _Thing:
         if not len(corners):
             return 0.0
         points, _ = spread_points(corners, max(_HULL_SPACING_M, float(np.ptp(hull)) / _HULL_STEPS))
-        found = self.tree.query(points, distance_upper_bound=_FAR_M)
-        far, near = np.asarray(found[0]), np.asarray(found[1])
+        nearest = self.tree.query(points, distance_upper_bound=_FAR_M)
+        far, near = np.asarray(nearest[0]), np.asarray(nearest[1])
         lost = ~np.isfinite(far)
         if lost.any():
             tree, numbers = self.few
-            found = tree.query(points[lost])
-            far[lost], near[lost] = found[0], numbers[found[1]]
+            nearest = tree.query(points[lost])
+            far[lost], near[lost] = nearest[0], numbers[nearest[1]]
         above = ((points - self.points[near]) * self.normals[near]).sum(1)
         # Between points on a face, what counts is how far off its plane.
         far = np.where(far < self.within_m + self.spacing_m, np.abs(above), far)
@@ -155,8 +155,8 @@ class _Thing:
                 continue
             halves = tuple(self.part((half,)) for half in sides)
             # Halves to cut further, by volume; ties go to the smaller excess.
-            left = [h for h in halves if h.beyond_m > self.within_m]
-            cost = sum(hull_volume(h.hull) * (1 + _HOLLOW * h.beyond_m / size) for h in left)
+            candidates = [h for h in halves if h.beyond_m > self.within_m]
+            cost = sum(hull_volume(h.hull) * (1 + _HOLLOW * h.beyond_m / size) for h in candidates)
             if cost < least:
                 best, least = halves, cost
         return best
@@ -173,15 +173,15 @@ def slabs(triangles: F64, depth_m: float = 0.02) -> tuple[F64, ...]:
     offsets = (normals * triangles[:, 0]).sum(1)
     rows = np.column_stack([np.rint(normals * 500), np.rint(offsets / _SAME_M)])
     _, plane = np.unique(rows, axis=0, return_inverse=True)
-    found = []
+    slab_parts = []
     for k in range(int(plane.max(initial=-1)) + 1):
-        own = np.flatnonzero(plane == k)
-        normal = normals[own[0]]
-        outline = _outline(triangles[own].reshape(-1, 3), normal)
-        whole = face_areas(triangles[own]).sum()
-        faces = [outline[0]] if outline and outline[1] < 1.001 * whole else list(triangles[own])
-        found += [np.concatenate([face, face - depth_m * normal]) for face in faces]
-    return tuple(found)
+        members = np.flatnonzero(plane == k)
+        normal = normals[members[0]]
+        outline = _outline(triangles[members].reshape(-1, 3), normal)
+        whole = face_areas(triangles[members]).sum()
+        faces = [outline[0]] if outline and outline[1] < 1.001 * whole else list(triangles[members])
+        slab_parts += [np.concatenate([face, face - depth_m * normal]) for face in faces]
+    return tuple(slab_parts)
 
 
 def _outline(points: F64, normal: F64) -> tuple[F64, float] | None:
@@ -216,15 +216,15 @@ def _planes(triangles: F64) -> Iterator[tuple[int, float]]:
             continue
         yield axis, float((low + high) / 2)
         level = np.abs(normals[:, axis]) > _LEVEL * areas
-        at = np.rint(triangles[level, :, axis].mean(1) / _SAME_M).astype(np.int64)
-        places, which = np.unique(at, return_inverse=True)
+        bins = np.rint(triangles[level, :, axis].mean(1) / _SAME_M).astype(np.int64)
+        places, which = np.unique(bins, return_inverse=True)
         weight = np.bincount(which, areas[level], len(places))
         inner = (places * _SAME_M > low + _SAME_M) & (places * _SAME_M < high - _SAME_M)
         for k in np.argsort(-weight * inner, kind="stable")[:_MOST_PLANES]:
             if inner[k]:
                 # The place itself, not the middle of its step.
-                found = triangles[level, :, axis].mean(1)[which == k]
-                yield axis, float(found.mean())
+                positions = triangles[level, :, axis].mean(1)[which == k]
+                yield axis, float(positions.mean())
 
 
 def _cut_in_two(triangles: F64, axis: int, place: float) -> tuple[F64, F64]:
@@ -238,22 +238,22 @@ def _above(triangles: F64, axis: int, place: float, sign: float) -> F64:
     count = inner.sum(1)
     rises = height.max(1) > _BEYOND_M
     bounds = sign * area_vectors(triangles)[:, axis] < 0
-    found = [triangles[(count == 3) & (rises | bounds)]]
+    pieces = [triangles[(count == 3) & (rises | bounds)]]
     for n in (1, 2):
         # Turn each triangle so that its first corner is alone on its side.
-        own, h = triangles[rises & (count == n)], height[rises & (count == n)]
+        crossing, h = triangles[rises & (count == n)], height[rises & (count == n)]
         lonely = (inner[rises & (count == n)] == (n == 1)).argmax(1)
-        rows = np.arange(len(own))
+        rows = np.arange(len(crossing))
         (a, ha), (b, hb), (c, hc) = (
-            (own[rows, (lonely + k) % 3], h[rows, (lonely + k) % 3]) for k in range(3)
+            (crossing[rows, (lonely + k) % 3], h[rows, (lonely + k) % 3]) for k in range(3)
         )
         on_ab = a + (b - a) * (ha / (ha - hb))[:, None]
         on_ac = a + (c - a) * (ha / (ha - hc))[:, None]
         if n == 1:
-            found.append(np.stack([a, on_ab, on_ac], 1))
+            pieces.append(np.stack([a, on_ab, on_ac], 1))
         else:
-            found += [np.stack([on_ab, b, c], 1), np.stack([on_ab, c, on_ac], 1)]
-    return np.concatenate(found)
+            pieces += [np.stack([on_ab, b, c], 1), np.stack([on_ab, c, on_ac], 1)]
+    return np.concatenate(pieces)
 
 
 def _level_turn(triangles: F64) -> float:

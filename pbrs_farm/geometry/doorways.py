@@ -37,7 +37,7 @@ def doorways(walls: Any, reach_m: float = _REACH_M) -> list[LineString]:
     walls: their ground area as a shapely geometry, metres. reach_m: extension of each line into the
     walls. A gap between two wall ends may be returned twice.
     """
-    found = []
+    lines = []
     rings = [shapely.get_coordinates(ring) for ring in _rings(walls)]
     if not rings:
         return []
@@ -48,8 +48,8 @@ def doorways(walls: Any, reach_m: float = _REACH_M) -> list[LineString]:
             gap = _gap_before(start, way, near)
             if gap is not None:
                 tip = way * reach_m
-                found.append(LineString([start - tip, start + way * gap + tip]))
-    return found
+                lines.append(LineString([start - tip, start + way * gap + tip]))
+    return lines
 
 
 def door_line(middle: F64, way: F64, width: float) -> LineString:

@@ -84,15 +84,15 @@ class FreeAir:
         return (
             bool(shapely.contains(outline, plan))
             and not self._is_in_thing(box.centre)
-            and not any(_boxes_meet(wide, other) for other in self._hanging_near(wide))
+            and not any(_boxes_meet(wide, placed) for placed in self._hanging_near(wide))
             and not _meets(wide, self._scene.in_box(low, high)[0])
             and self._is_over_floor(box.centre)
         )
 
     def _hanging_near(self, box: Box) -> list[Box]:
         """Those of the boxes put there whose spheres meet that of a box."""
-        apart = lengths(self._spheres[:, :3] - box.centre)
-        near = np.flatnonzero(apart <= self._spheres[:, 3] + np.linalg.norm(box.half))
+        distances = lengths(self._spheres[:, :3] - box.centre)
+        near = np.flatnonzero(distances <= self._spheres[:, 3] + np.linalg.norm(box.half))
         return [self._hanging[k] for k in near]
 
     def _is_in_thing(self, point: F64) -> bool:
@@ -113,7 +113,7 @@ def _meets(box: Box, corners: F64) -> bool:
 
 
 def _boxes_meet(a: Box, b: Box) -> bool:
-    if any(_holds(one, other.centre) for one, other in ((a, b), (b, a))):
+    if any(_holds(first, second.centre) for first, second in ((a, b), (b, a))):
         return True
     quads = box_quads(b.centre, b.half, b.axes)
     return _meets(a, np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]))

@@ -24,14 +24,14 @@ def highest_below(places: F64, triangles: F64, limit_y: float | F64 = np.inf) ->
     limit_y: upper bound, (N,) or one for all; surfaces above it are ignored, at it included.
     """
     limit = np.broadcast_to(np.asarray(limit_y, np.float64), (len(places),))
-    found = np.full(len(places), -np.inf)
+    highest = np.full(len(places), -np.inf)
     triangles = _candidates_near(places, triangles)
     step = max(1, _PAIRS // max(1, len(triangles)))
     for k in range(0, len(places) if len(triangles) else 0, step):
         part = slice(k, k + step)
         y, covers = _heights_at(places[part, None], triangles)
-        found[part] = np.where(covers & (y <= limit[part, None]), y, -np.inf).max(1)
-    return found
+        highest[part] = np.where(covers & (y <= limit[part, None]), y, -np.inf).max(1)
+    return highest
 
 
 def lowest_above(places: F64, triangles: F64, least_y: float | F64) -> F64:
@@ -40,14 +40,14 @@ def lowest_above(places: F64, triangles: F64, least_y: float | F64) -> F64:
     least_y: lower bound, (N,) or one for all; surfaces at or below it are ignored.
     """
     least = np.broadcast_to(np.asarray(least_y, np.float64), (len(places),))
-    found = np.full(len(places), np.inf)
+    lowest = np.full(len(places), np.inf)
     triangles = _candidates_near(places, triangles)
     triangles = triangles[triangles[:, :, 1].max(1) > least.min(initial=np.inf)]
     step = max(1, _PAIRS // max(1, len(triangles)))
     for k in range(0, len(places) if len(triangles) else 0, step):
         y, covers = _heights_at(places[k : k + step, None], triangles)
-        found[k : k + step] = np.where(covers & (y > least[k : k + step, None]), y, np.inf).min(1)
-    return found
+        lowest[k : k + step] = np.where(covers & (y > least[k : k + step, None]), y, np.inf).min(1)
+    return lowest
 
 
 def heights_in(places: F64, triangles: F64, edge: float = _EDGE) -> F64:

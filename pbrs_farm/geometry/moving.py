@@ -69,14 +69,14 @@ def matrices_at(item: Item, motions: Mapping[str, Motion], time_s: float) -> dic
     """
     whole = motions.get("")
     of_item = None if whole is None else whole.matrix_at(time_s)
-    found: dict[str, Matrix4] = {} if of_item is None else {"": of_item}
+    matrices: dict[str, Matrix4] = {} if of_item is None else {"": of_item}
     for joint in item.joints:
         motion = motions.get(joint.part)
         chain = [] if of_item is None else [of_item]
         chain += [] if motion is None else [joint.motion(motion.value_at(time_s))]
         if chain:
-            found[joint.part] = functools.reduce(np.matmul, chain)
-    return found
+            matrices[joint.part] = functools.reduce(np.matmul, chain)
+    return matrices
 
 
 def item_at_time(item: Item, motions: Mapping[str, Motion], time_s: float) -> Item:
@@ -103,10 +103,10 @@ def item_at_time(item: Item, motions: Mapping[str, Motion], time_s: float) -> It
 
 def motions_by_item(house: House) -> dict[str, dict[str, Motion]]:
     """Item id -> part ("" = the whole item) -> its motion, of all that moves."""
-    found: dict[str, dict[str, Motion]] = {}
+    by_item: dict[str, dict[str, Motion]] = {}
     for motion in house.motions:
-        found.setdefault(motion.item, {})[motion.part] = motion
-    return found
+        by_item.setdefault(motion.item, {})[motion.part] = motion
+    return by_item
 
 
 def house_at(house: House, time_s: float) -> House:
@@ -137,17 +137,17 @@ class MovingHouse:
     @cached_property
     def _moving(self) -> tuple[tuple[int, int, str, slice], ...]:
         """(surface number, item's index, part, its rows of positions) of the surfaces that move."""
-        of_item, found, begin = motions_by_item(self.house), [], 0
+        of_item, moving, begin = motions_by_item(self.house), [], 0
         is_pane = [m.kind is MaterialKind.PANE for m in self.house.materials]
         for number, (instance, item, _j, surface) in enumerate(self.house.surfaces()):
             if not self.with_panes and is_pane[surface.material]:
                 continue
-            own = of_item.get(item.id, {})
-            if "" in own or surface.part in own:
+            motions = of_item.get(item.id, {})
+            if "" in motions or surface.part in motions:
                 rows = slice(begin, begin + len(surface.positions))
-                found.append((number, instance - 1, surface.part, rows))
+                moving.append((number, instance - 1, surface.part, rows))
             begin += len(surface.positions)
-        return tuple(found)
+        return tuple(moving)
 
     @cached_property
     def moving_faces(self) -> Bools:

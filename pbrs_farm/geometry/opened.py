@@ -71,11 +71,11 @@ def box_around(item: Item) -> Item:
 
 def part_triangles(item: Item, part: str) -> F64:
     """(F, 3, 3) corners of one part's faces in their current pose, metres."""
-    own = [triangle_corners(s.positions, s.faces) for s in item.surfaces if s.part == part]
-    return np.concatenate([np.zeros((0, 3, 3)), *own])
+    corners = [triangle_corners(s.positions, s.faces) for s in item.surfaces if s.part == part]
+    return np.concatenate([np.zeros((0, 3, 3)), *corners])
 
 
-def free_value(scene: SceneTriangles, index: int, part: str, wanted: float) -> tuple[float, str]:
+def free_value(scene: SceneTriangles, index: int, part: str, target: float) -> tuple[float, str]:
     """Furthest free value of a part of scene.items[index] towards wanted, and the id of its obstacle.
 
     The id is "" if there is no obstacle. A part stops 4 mm before other items and before other open
@@ -85,14 +85,14 @@ def free_value(scene: SceneTriangles, index: int, part: str, wanted: float) -> t
     """
     item = scene.items[index]
     joint = joint_of(item, part)
-    if wanted <= joint.value:
-        return wanted, ""
+    if target <= joint.value:
+        return target, ""
     corners = part_triangles(item, part)
     if not len(corners):
-        return wanted, ""
-    best, stopped_by = wanted, ""
+        return target, ""
+    best, stopped_by = target, ""
     track = _Track.of(joint, surface_points(corners, _SPACING_M))
-    low, high = _bounds_of_way(joint, corners, wanted)
+    low, high = _bounds_of_way(joint, corners, target)
     for name, faces in _near(scene, index, part, low, high):
         reach = joint.value + track.way_to(faces, np.array([low, high]))
         if reach < best:
@@ -109,9 +109,9 @@ def _near(
         if item.nyu40 == FLOOR_MAT:
             continue
         if k == index:
-            others = [j.part for j in item.joints if j.part != part and j.value != 0]
+            open_parts = [j.part for j in item.joints if j.part != part and j.value != 0]
             corners = np.concatenate(
-                [np.zeros((0, 3, 3)), *(part_triangles(item, p) for p in others)]
+                [np.zeros((0, 3, 3)), *(part_triangles(item, p) for p in open_parts)]
             )
         else:
             corners = scene.of_item(k)
@@ -121,9 +121,9 @@ def _near(
             yield item.id, corners[meets]
 
 
-def _bounds_of_way(joint: Joint, corners: F64, wanted: float) -> tuple[F64, F64]:
+def _bounds_of_way(joint: Joint, corners: F64, target: float) -> tuple[F64, F64]:
     points = corners.reshape(-1, 3)
-    values = np.linspace(joint.value, wanted, _STEPS)
+    values = np.linspace(joint.value, target, _STEPS)
     on_way = np.concatenate([transform_points(joint.motion(float(v)), points) for v in values])
     return on_way.min(0) - _CELL_M, on_way.max(0) + _CELL_M
 

@@ -99,9 +99,9 @@ def level_or_sloped(
 
     heights: of each polygon, y of all its corners in order; level where they are equal.
     """
-    every = np.concatenate(list(heights))
-    if np.ptp(every) < _LEVEL_M:
-        return horizontal(name, parts, float(every[0]), material, up=False)
+    all_heights = np.concatenate(list(heights))
+    if np.ptp(all_heights) < _LEVEL_M:
+        return horizontal(name, parts, float(all_heights[0]), material, up=False)
     # Span a roof over each polygon, and number its corners after those before it.
     positions, faces, n = [], [], 0
     for rings, tops in zip(parts, heights, strict=True):

@@ -38,22 +38,23 @@ def swept_by(
     axes: (3, 3) columns, the axes of each part's box; x, y, z by default.
     """
     axes = np.eye(3) if axes is None else axes
-    found = []
+    volumes = []
     for joint in joints:
-        own = [s.positions for s in surfaces if s.part == joint.part and len(s.positions)]
-        if not own:
+        positions = [s.positions for s in surfaces if s.part == joint.part and len(s.positions)]
+        if not positions:
             continue
-        local = np.concatenate(own).astype(np.float64) @ axes
+        local = np.concatenate(positions).astype(np.float64) @ axes
         ends = np.stack([local.min(0), local.max(0)], -1)
         corners = np.array(list(product(*ends))) @ axes.T
         values = (joint.lower, *np.linspace(joint.value, joint.upper, _STEPS))
-        at = [transform_points(joint.motion(float(v)), corners) for v in values]
+        poses = [transform_points(joint.motion(float(v)), corners) for v in values]
         hulls = [
-            shapely.MultiPoint(np.concatenate(pair)[:, [0, 2]]).convex_hull for pair in pairwise(at)
+            shapely.MultiPoint(np.concatenate(pair)[:, [0, 2]]).convex_hull
+            for pair in pairwise(poses)
         ]
-        y = np.array([points[:, 1] for points in at])
-        found.append(Swept(joint.part, shapely.union_all(hulls), float(y.min()), float(y.max())))
-    return found
+        y = np.array([points[:, 1] for points in poses])
+        volumes.append(Swept(joint.part, shapely.union_all(hulls), float(y.min()), float(y.max())))
+    return volumes
 
 
 def swept_by_item(item: Item) -> list[Swept]:

@@ -95,7 +95,7 @@ def _stuff_of(material: Material, nyu40: int) -> _Stuff:
     words = set(re.findall("[a-z]+", material.name.casefold()))
     if material.kind in _GLASSY:
         words.add("glass")
-    found = next((s for s in _STUFFS if words & set(s.words.split())), None)
-    if found is None and material.is_metal:
+    match = next((s for s in _STUFFS if words & set(s.words.split())), None)
+    if match is None and material.is_metal:
         return next(s for s in _STUFFS if "metal" in s.words.split())
-    return found or next((s for s in _STUFFS if nyu40 in s.nyu40), _BOARDS)
+    return match or next((s for s in _STUFFS if nyu40 in s.nyu40), _BOARDS)

@@ -123,8 +123,8 @@ def with_uses(house: House) -> House:
         outline = shapely.Polygon(room.polygon)
         inside = shapely.contains_xy(outline, middles[:, [0, 2]])
         inside &= (middles[:, 1] > room.floor_y) & (middles[:, 1] < room.ceiling_y)
-        here = [things[n] for n in np.flatnonzero(inside)]
-        kind = kind_by_things(here, outline.area)
+        contents = [things[n] for n in np.flatnonzero(inside)]
+        kind = kind_by_things(contents, outline.area)
         if kind is not None:
             kinds[room.id] = kind
     return replace(house, rooms=tuple(
@@ -184,8 +184,8 @@ def _rules() -> tuple[_Rule, ...]:
 
 
 @lru_cache(1024)
-def _rule_for(said: str) -> _Rule | None:
-    words, whole = words_of(said), folded(said)
+def _rule_for(text: str) -> _Rule | None:
+    words, whole = words_of(text), folded(text)
     for rule in _rules():
         if any(w in whole for w in rule.words) if rule.is_part else words & rule.words:
             return rule

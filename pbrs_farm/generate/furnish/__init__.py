@@ -1,1 +1,1 @@
-"""Rooms of a plan -> the furniture that stands in them; pure in (plan, Catalogue, seed)."""
+"""Furnish the rooms of a plan; pure in (plan, Catalogue, seed)."""

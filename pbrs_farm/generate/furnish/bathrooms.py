@@ -19,7 +19,7 @@ def tubs(shelf: Shelf) -> tuple[Template, ...]:
     baths = shelf.of("bathtub", width=(1.4, 1.85), depth=(0.65, 0.85))[:MAX_CHOICES]
     showers = shelf.of("shower", width=(0.7, 1.0), depth=(0.7, 1.2))[:MAX_CHOICES]
     found = [_cornered(p, 0.4) for p in baths] + [_cornered(p, 0.0) for p in showers]
-    # A bath can be made a little shorter, as they are sold.
+    # Bathtubs are sold in shorter sizes too.
     found += [_cornered(p, 0.1, length=1.5) for p in baths if p.size[0] > 1.55]
     small = [_cornered(p, -0.3, length=0.75) for p in showers if p.size[0] > 0.8]
     return tuple(found + small[:1])
@@ -49,7 +49,7 @@ def toilets(shelf: Shelf, *, beside: float = _BESIDE_TOILET_M) -> tuple[Template
 
 
 def basins(shelf: Shelf, *, small: bool = False, before: float = 0.6) -> tuple[Template, ...]:
-    """Washbasins that stand or hang."""
+    """Templates of washbasins, with pedestals or wall-mounted."""
     widest = 0.62 if small else 1.1
     pieces = shelf.of("washbasin", width=(0.4, widest), depth=(0.3, 0.72))
     if small:
@@ -59,7 +59,7 @@ def basins(shelf: Shelf, *, small: bool = False, before: float = 0.6) -> tuple[T
         hangs = piece.place is Place.WALL
         lift = max(_RIM_M - piece.size[2] * 0.85, 0.3) if hangs else 0.0
         w, d, _ = piece.size
-        # What hangs touches its wall.
+        # Wall-mounted pieces touch their wall.
         slot = backed(piece, gap=_HUNG_GAP if hangs else _GAP, elevation=lift)
         front = d + _GAP
         found.append(

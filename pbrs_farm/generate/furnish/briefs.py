@@ -1,4 +1,4 @@
-"""What each type of room must have, may have, and is filled with. Effect: reads briefs.toml beside."""
+"""Required, optional and filler furniture of each room type. Effect: reads briefs.toml beside."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class RoomBrief:
     fillers: tuple[PieceGroup, ...] = ()
     density: float = 0.0
     least_share: float = 0.0  # of the floor that stays walkable while fillers are added
-    kitchen: Places | None = None  # where the group "kitchen" can stand
+    kitchen: Places | None = None  # candidate places for the group "kitchen"
 
     def without(self, names: Collection[str]) -> RoomBrief:
         """The brief without the groups of these names."""
@@ -40,13 +40,13 @@ class RoomBrief:
         )
 
 
-# What holds of a room: it is a studio, no room is open to it, it is where the home's laundry is done.
+# Facts about a room: it is a studio, no room is open to it, it is where the home's laundry is done.
 _Fact = Literal["", "studio", "closed", "laundry"]
 # Its outline, square metres, metres of its longest row, of its free stretches of wall, seats at its table.
 _Measure = Literal["bounds", "area", "row", "stretches", "seats"]
 
 
-# What briefs.toml may name: every public function of the modules of templates.
+# Template functions available to briefs.toml: every public function of the template modules.
 _TEMPLATES_BY_NAME: Final[dict[str, Callable[..., tuple[Template, ...]]]] = {
     name: function
     for module in (bathrooms, bedrooms, fitted_walls, living_rooms, small_rooms)
@@ -92,7 +92,7 @@ class _Brief(Record):
 
 
 UseWithoutType = Literal["childs_room", "dining_room"]
-"""Briefs of rooms that no generated plan has, or that are drawn: no RoomType."""
+"""Briefs for uses that are not a RoomType: in no generated plan, or drawn at random."""
 
 _LEAST_STRETCH_M: Final = 1.3  # shorter walls are not filled from side to side
 _FOR_SIX_M2, _FOR_EIGHT_M2 = 16.0, 24.0  # rooms that have a table for so many
@@ -110,11 +110,10 @@ def brief_of(
     rng: np.random.Generator,
     use: UseWithoutType | None = None,
 ) -> RoomBrief:
-    """What a room must have, may have and is filled with, by its type and what else the home has.
+    """Required, optional and filler furniture of a room, by its type and the rest of the home.
 
-    shelf: the pieces of which templates are made; where it has none of a group nobody misses it. rng:
-    draws what comes by chance, and whether a bedroom is a child's. use: whose brief it has instead of
-    its type's.
+    shelf: the pieces to make templates of; groups without any piece are not required. rng: draws the
+    optional parts, and whether a bedroom is a child's. use: the brief to take instead of the type's.
     """
     type_ = plan.rooms[space.number].type
     name: str = use or (RoomType.LIVING if type_ is RoomType.STUDIO else type_)

@@ -15,7 +15,7 @@ from pbrs_farm.generate.plan_walls import largest_rectangle
 _HEAD_M: Final = 1.95  # the lowest point of a lamp
 _LARGE_M2: Final = 22.0  # rooms above have two
 _LONG: Final = 2.6  # and halls of this aspect
-_SHORTEST: Final = 0.35  # smallest scale of a lamp, as a share of its own size
+_SHORTEST: Final = 0.35  # minimum scale of a lamp, as a share of its original size
 _STEPS: Final = (0.0, 0.2, -0.2, 0.4, -0.4, 0.6, -0.6, 0.9, -0.9)
 
 
@@ -39,7 +39,7 @@ def ceiling_lamps(
 def _choose_lamp(shelf: Shelf, type_: RoomType) -> Piece | None:
     lamps = [p for p in shelf.of("ceiling_lamp") if max(p.size[:2]) > 0.15]
     is_plain = not type_.is_habitable or type_ is RoomType.KITCHEN
-    # What hangs low or wide belongs into rooms to live in.
+    # Low or wide pendant lamps belong in living areas.
     fitting = [p for p in lamps if (p.size[2] < 0.2) == is_plain] or lamps
     if is_plain:
         fitting = [p for p in fitting if "track" not in p.id and "strip" not in p.id] or fitting

@@ -10,10 +10,10 @@ from pbrs_farm.generate.furnish.pieces import Shelf, single
 from pbrs_farm.generate.furnish.places import BESIDE_M
 from pbrs_farm.generate.furnish.template import Template
 
-_LONGEST_M: Final = 4.4  # of walls that are filled
+_LONGEST_M: Final = 4.4  # maximum length of a filled wall
 _STRETCH: Final = (0.85, 1.2)  # what a piece may be narrowed and widened by
 _CEILING_M: Final = 2.7  # as high as it goes at most; the room's ceiling makes it lower
-_CHOICES: Final = 2  # designs that are tried at each wall
+_CHOICES: Final = 2  # designs to try at each wall
 
 
 def fitted_wardrobes(

@@ -31,13 +31,13 @@ def furnished(
     uses: Mapping[int, UseWithoutType] | None = None,
     present: Mapping[int, Collection[str]] | None = None,
 ) -> tuple[PlacedPiece, ...]:  # fmt: skip
-    """The furniture of every room of a plan, or of some of them, by seed.
+    """Furnish all rooms of a plan, or some of them, by seed.
 
-    rooms: their numbers, None = all. standing: room -> rectangles of what stands there already: nothing
-    is put on them, and one must be able to walk around them. uses: room -> the brief that it has instead
-    of its type's. present: room -> names of the groups of its brief that it has already, of which it gets
-    no second one. What the catalogue lacks is left out.
-    Raises BadInput for a style that is none. gates.py says whether the result holds what it must.
+    rooms: indices to furnish, None = all. standing: room -> rectangles of existing furniture, which
+    stay free of new pieces and accessible. uses: room -> brief to use instead of its type's. present:
+    room -> names of groups of its brief that it already has and does not get again. Groups that the
+    catalogue lacks are left out.
+    Raises BadInput for an unknown style. gates.py checks that the result is complete.
     """
     shelf = Shelf(catalogue, rng, style_of(style, rng))
     seeds = rng.integers(2**63, size=len(plan.rooms))
@@ -63,7 +63,7 @@ def furnished(
 
 
 def _rank(type_: RoomType) -> int:
-    # An open kitchen stands before the living room that shares its floor.
+    # Furnish an open kitchen before the living room that shares its floor.
     return _ORDER.index(type_) if type_ in _ORDER else len(_ORDER)
 
 
@@ -75,11 +75,11 @@ def arrangement_of(
     *,
     n_standing: int = 0,
 ) -> Arrangement:
-    """What stands in a room: all that must, then what may, then fillers up to its density.
+    """Arrange a room: all required groups, then optional ones, then fillers up to its density.
 
-    others: rectangles of what stands in rooms that are open to it. n_standing: pieces that stand in it
-    already, which count towards its density. Where what must stand does not fit in
-    the brief's order, other orders are tried.
+    others: rectangles of furniture in adjoining open rooms. n_standing: existing pieces in the room,
+    which count towards its density. If required groups do not fit in the brief's order, other orders
+    are tried.
     """
     walk = WalkMap(space, others)
     groups = [g for g in brief.groups if g.templates or _is_kitchen(g, brief)]
@@ -88,7 +88,7 @@ def arrangement_of(
         for g in groups
     ]
     best = arranged(groups, places, walk)
-    # Try the groups in other orders where one that must stand does not.
+    # Try the groups in other orders if a required one does not fit.
     if best.missing:
         best = _other_orders(groups, places, walk, best)
     return _add_fillers(best, brief, space, walk, rng, n_standing)

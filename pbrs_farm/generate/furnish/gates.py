@@ -1,4 +1,4 @@
-"""What a furnished plan must have: gates, each with what breaks it, and measures; no effects."""
+"""Acceptance tests of a furnished plan, each with its violations, and measures; no effects."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ _DEEP_M: Final = 0.01
 
 @dataclass(frozen=True, slots=True)
 class FurnishReport:
-    """What is wrong, a line each, and how full the home is."""
+    """Faults of a furnished plan, one line each, and how full the home is."""
 
     broken: tuple[str, ...]
     pieces_per_m2: float  # on the floor
@@ -48,9 +48,9 @@ class FurnishReport:
 def furnish_report(
     plan: Plan, pieces: tuple[PlacedPiece, ...], catalogue: Catalogue
 ) -> FurnishReport:
-    """The gates of a furnished plan: what is missing, blocked or overlaps, room by room, and measures.
+    """Check a furnished plan for missing, blocked or overlapping pieces, by room, and measure it.
 
-    A room is not asked for what the catalogue has nothing for.
+    Pieces that the catalogue does not have are not required.
     """
     broken, walked, area = [], 0.0, 0.0
     grounds = [_ground_rect(p) for p in pieces]
@@ -108,7 +108,7 @@ def _overlapping_pieces(pieces: tuple[PlacedPiece, ...], grounds: list[Rect]) ->
         apart = min(a.elevation + a.height, b.elevation + b.height) - max(a.elevation, b.elevation)
         pair = frozenset((a.piece.group, b.piece.group))
         if apart > _DEEP_M and pair not in _MAY_OVERLAP:
-            # A screen stands in the edge of what carries it; taps below wall cabinets.
+            # Allow a television inside the edge of its cabinet, and taps below wall cabinets.
             if "tv" in pair and apart < 0.3:
                 continue
             found.append(f"{a.piece.name} and {b.piece.name} overlap")

@@ -1,7 +1,7 @@
-"""Kitchen runs: a row, an L or a U of modules along walls, with all that one cooks in; no effects.
+"""Kitchen runs: a row, an L or a U of modules along walls, with all appliances; no effects.
 
-Sink below a window where there is one, cooker under a hood and never below a window, fridge at a
-far end, wall cabinets over the rest.
+The sink is below a window if there is one, the cooker below a hood and never below a window, the
+fridge at a far end; wall cabinets fill the rest.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ UPPER_DEPTH_M: Final = 0.36
 _BUILT_IN: Final = 0.6  # share of homes that have the oven built into the units
 _FRONT_M: Final = 0.8  # free before the run
 _GAP: Final = 0.005  # behind the units
-_HUNG_GAP: Final = 0.001  # and behind what touches the wall that it hangs on
-_STRIP: Final = 0.02  # between a front and what is deeper beside it: the fridge, the hood
+_HUNG_GAP: Final = 0.001  # gap between a wall-mounted piece and its wall, metres
+_STRIP: Final = 0.02  # gap between a front and a deeper neighbour (fridge, hood), metres
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,7 +93,7 @@ def units_of(shelf: Shelf) -> Units | None:
 
 
 def _sold_with(sink: Piece, pieces: list[Piece], *, alone: bool = False) -> list[Piece]:
-    """Those of the sink's set, and those of none; alone: of its set alone, or of its library."""
+    """Pieces of the sink's set and pieces of no set; alone: only of its set, or of its library."""
     mine = sink.of_set or sink.library
     if alone:
         return [p for p in pieces if (p.of_set or p.library) == mine]
@@ -162,7 +162,7 @@ def _orders(
         if left < -1e-6:
             return
         n = int(left / MODULE_M + 0.5) if left > 0.28 else 0
-        # A rest that is too narrow for a cabinet stays open at the free end.
+        # A remainder too narrow for a cabinet stays open at the free end.
         width = left / n if n else 0.0
         rows.append(
             list(
@@ -195,12 +195,12 @@ def _arm_rows(
             kinds = [*kinds, "fridge"] if fridge_high else ["fridge", *kinds]
         if blind:
             kinds = ["filler", *kinds] if k else [*kinds, "corner"]
-        # A fridge stands farther out than the filler beside it is wide.
+        # A fridge is deeper than the filler next to it is wide.
         if kinds[:2] == ["filler", "fridge"]:
             continue
         at, row = arm.low, []
         if kinds[-1] == "corner":
-            # What is left over stays open at the free end.
+            # The remainder stays open at the free end.
             at = arm.high - sum((fixed | widths)[kind] for kind in kinds)
         for kind in kinds:
             row.append(_Module(kind, k, at, (fixed | widths)[kind]))
@@ -209,7 +209,7 @@ def _arm_rows(
 
 
 def _run_score(modules: list[_Module], arms: tuple[Arm, ...], space: FurnishSpace) -> float | None:
-    """How well one can cook there; None where a hood would hang before a window."""
+    """Usability of a kitchen run; None if a hood would cover a window."""
     modules = [m for m in modules if m.kind != "filler"]
     kinds = ["base" if m.kind == "corner" else m.kind for m in modules]
     sink, cooker, fridge = (kinds.index(k) for k in ("sink", "cooker", "fridge"))
@@ -231,7 +231,7 @@ def _run_score(modules: list[_Module], arms: tuple[Arm, ...], space: FurnishSpac
 
 
 def _below_window(module: _Module, arms: tuple[Arm, ...], space: FurnishSpace) -> float:
-    """Metres of a module that stand below windows."""
+    """Length of a module below windows, metres."""
     wall = arms[module.arm].wall
     return sum(
         max(min(module.high, w.high + 0.03) - max(module.low, w.low - 0.03), 0.0)
@@ -254,7 +254,7 @@ def _template(
         if module.kind == "fridge":
             piece, height = units.fridge, units.fridge.size[2]
             depth = max(piece.size[1], 0.5)
-            # What opens it stands before what opens the others: its door turns before theirs.
+            # Offset the opening corner unit so that its door turns clear of the others.
             gap = max(_GAP, DEPTH_M + _GAP + PULL_M + 0.01 - depth)
             # The strip between it and its neighbour.
             is_last = i > 0 and modules[i - 1].arm == module.arm
@@ -266,11 +266,11 @@ def _template(
             piece = units.cooker
         elif module.kind == "base":
             n_base += 1
-            # The dishwasher stands beside the sink.
+            # Put the dishwasher next to the sink.
             if dishes is not None and abs(i - sink) == 1 and 0.55 <= module.width <= 0.66:
                 piece, dishes = dishes, None
         else:
-            # A set without one has a cabinet there that nobody can open.
+            # Sets without a blind corner unit get a cabinet there that cannot be opened.
             piece, depth = units.blind or piece, WORKTOP_M
         unit = PieceSlot(piece, 0, 0, module.width, depth, height)
         slots.append(_place_unit(unit, module, arms, gap))
@@ -290,7 +290,8 @@ def _hung(
         if slot is None:
             continue
         if slot.piece is not units.hood:
-            # A strip beside what is deeper: the hood, the fridge; beside the wall in the corner.
+            # Leave a strip beside deeper neighbours (hood, fridge) and beside the wall in the
+            # corner.
             near = [m.kind for m in modules if m.arm == module.arm and m.high == module.low]
             far = [m.kind for m in modules if m.arm == module.arm and m.low == module.high]
             left, right = (_STRIP * bool({"fridge", "cooker"} & set(k)) for k in (near, far))
@@ -345,7 +346,7 @@ def _in_main(along: float, across: float, arm: Arm) -> tuple[float, float]:
 def _rects(
     modules: list[_Module], arms: tuple[Arm, ...]
 ) -> tuple[tuple[Rect, ...], tuple[Rect, ...]]:
-    """What stays free before each arm, and what a way must reach: fridge, sink and cooker."""
+    """Area to keep free in front of each arm, and the areas that must be reachable: fridge, sink, cooker."""
     clear, fronts = [], []
     for k, arm in enumerate(arms):
         low = arm.low

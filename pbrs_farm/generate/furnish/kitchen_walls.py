@@ -1,4 +1,4 @@
-"""Where a kitchen run can stand: along one wall, or along two that meet in a corner. No effects."""
+"""Candidate walls for a kitchen run: one wall, or two that meet in a corner. No effects."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _LEAST_M: Final = 1.75  # fridge, sink and cooker
 
 @dataclass(frozen=True, slots=True)
 class Arm:
-    """A stretch of a wall that units stand along, from `low` to `high`."""
+    """A stretch of wall for kitchen units, from `low` to `high`."""
 
     wall: RoomWall
     low: float
@@ -99,8 +99,8 @@ def _cuts(low: float, high: float, wall: RoomWall) -> list[tuple[float, float]]:
 
 
 def _free(space: FurnishSpace, wall: RoomWall) -> list[tuple[float, float]]:
-    """Stretches of a wall before which a unit can stand."""
-    # What doors' swings and low windows take of the strip that units stand on.
+    """Stretches of a wall with room for units in front."""
+    # Intervals of the strip blocked by door swings and low windows.
     taken = []
     strip = wall.frame.rect((0.0, 0.0, wall.length, DEPTH_M + 0.02))
     low_windows = [w.zone for w in space.windows if w.sill < 0.8]

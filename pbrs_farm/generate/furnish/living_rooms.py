@@ -11,13 +11,13 @@ _TO_TABLE_M = 0.45  # from a sofa to its table
 _BEHIND_CHAIR_M = 0.75  # from the table's edge
 _SEAT_M = 0.6  # length of table edge that a seat takes
 _BETWEEN_CHAIRS_M = 0.01  # round the corner of a table
-_UNDER_TABLE_M = 0.2  # depth of a chair that is pushed under the table
+_UNDER_TABLE_M = 0.2  # depth of a chair pushed under the table
 _LEAST_HEAD_M = 0.75  # width of a table at whose ends somebody sits
 _VIEWING_M = (2.0, 2.25, 2.5, 2.8)  # from the screen to the sofa
 
 
 def lounges(shelf: Shelf, bounds: Rect, area: float) -> tuple[Template, ...]:
-    """Television and stand at a wall, sofa opposite, table between, up to two armchairs beside."""
+    """Television and cabinet at a wall, sofa opposite, table between, up to two armchairs at the sides."""
     stands = _television_stands(shelf)
     sofas = shelf.of("sofa", width=(1.4, 2.4), depth=(0.6, 1.1))
     if not sofas:
@@ -151,7 +151,7 @@ def _free(
         if heads:
             most = _UNDER_TABLE_M
             if inner < chair.size[0] / 2 + _BETWEEN_CHAIRS_M:
-                # Those at the sides stand in the way of the one at the end.
+                # Chairs at the sides block the chair at the end.
                 side = max(map(abs, offsets), default=0.0) + chair.size[0] / 2
                 most = w / 2 - side - _BETWEEN_CHAIRS_M
             left, right = (_out(shelf, table, chair, 0.0, turns, most) for turns in (-1, 1))
@@ -171,10 +171,10 @@ def _free(
 def _out(
     shelf: Shelf, table: Piece, chair: Piece, u: float, turns: int, most: float = _UNDER_TABLE_M
 ) -> float:
-    """From a table's edge to the middle of a chair that is pushed in as far as both allow.
+    """Distance from a table's edge to the centre of a chair pushed in as far as both allow.
 
-    u: where along that edge the chair stands, in the table's frame. most: how far other chairs let it
-    go, negative where it must stand off.
+    u: position along that edge, in the table's frame. most: limit set by other chairs, negative if
+    the chair must keep off.
     """
     at = -u if turns == 2 else u
     under = shelf.under_m(chair, table, at, turns, _UNDER_TABLE_M)
@@ -253,7 +253,7 @@ def armchairs(shelf: Shelf) -> tuple[Template, ...]:
 
 
 def plants(shelf: Shelf) -> tuple[Template, ...]:
-    """Plants that stand on the floor, in corners and by windows."""
+    """Floor plants, in corners and at windows."""
     pots = [
         p for p in shelf.of("plant", width=(0.2, 0.9), height=(0.55, 2.0)) if p.place == "floor"
     ]
@@ -261,7 +261,7 @@ def plants(shelf: Shelf) -> tuple[Template, ...]:
 
 
 def lamps(shelf: Shelf) -> tuple[Template, ...]:
-    """Lamps that stand on the floor."""
+    """Floor lamps."""
     found = shelf.of("floor_lamp", width=(0.2, 0.6))
     return tuple(single(p, before=0.0, corner=0.7, gap=0.05) for p in found[:2])
 

@@ -42,7 +42,7 @@ _UNFIT: Final = frozenset(
 )
 """Pieces that templates cannot use, each looked at."""
 _BEFORE_TABLE_M: Final = 0.05  # from which a chair is pushed in
-MAX_CHOICES = 6  # pieces of a kind that are tried at every place, the preferred ones
+MAX_CHOICES = 6  # preferred pieces of a kind to try at every place
 
 
 def style_of(name: str, rng: np.random.Generator) -> str:
@@ -97,16 +97,17 @@ class Shelf:
         return self._order[piece.id] < share
 
     def top(self, piece: Piece) -> float:
-        """Height above its base at which something can stand in a piece's middle, metres."""
+        """Height of the supporting surface in a piece's centre above its base, metres."""
         if piece.id not in self._tops:
             self._tops[piece.id] = self._top(piece)
         return self._tops[piece.id]
 
     def under_m(self, chair: Piece, table: Piece, at: float, turns: int, most_m: float) -> float:
-        """How far a chair goes under an edge of a table before it meets the table, at most most_m.
+        """Depth that a chair can be pushed under an edge of a table, at most most_m.
 
-        at: metres of its middle from that of the edge, along the chair's width. turns: quarter turns of
-        the chair to the left, as in slot, against the table's. most_m where either has no shape.
+        at: offset of its centre from that of the edge, metres along the chair's width. turns: quarter
+        turns of the chair to the left relative to the table, as in slot. Returns most_m if either has no
+        shape.
         """
         seat, top = self.catalogue.shape(chair), self.catalogue.shape(table)
         if seat is None or top is None:

@@ -1,4 +1,4 @@
-"""Depth first over groups of pieces: the best places of each, until all stand and one can walk. No effects."""
+"""Depth-first search over groups of pieces until all are placed and accessible. No effects."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pbrs_farm.generate.furnish.places import Places
 from pbrs_farm.generate.furnish.template import PieceGroup, Standing
 from pbrs_farm.generate.furnish.walk_bitmap import WalkMap
 
-_ROOTS: Final = 5  # places of the first group that are compared
+_ROOTS: Final = 5  # places to try for the first group
 _NODES_A_ROOT: Final = 14
 _MISSING: Final = 100.0  # penalty for a required group that finds no place
 _MISSED: Final = 2.0  # and one that need not
@@ -22,23 +22,20 @@ _MISSED: Final = 2.0  # and one that need not
 
 @dataclass(frozen=True, slots=True)
 class Arrangement:
-    """What stands in a room."""
+    """Furniture of a room with places."""
 
     standing: tuple[Standing, ...] = ()
-    missing: tuple[str, ...] = ()  # groups that must stand
+    missing: tuple[str, ...] = ()  # required groups without a place
     score: float = -np.inf
 
     @property
     def bodies(self) -> list[Rect]:
-        """Of everything that stands on the floor.
-
-        Plan rectangles (x0, z0, x1, z1), metres; what hangs above the floor is not among them.
-        """
+        """Plan rectangles (x0, z0, x1, z1) of all pieces on the floor, metres; wall-mounted ones excluded."""
         return [rect for place in self.standing for rect in place.bodies]
 
     @property
     def fronts(self) -> list[Rect]:
-        """What a way must reach."""
+        """Areas that must be reachable on foot."""
         return [rect for place in self.standing for rect in place.fronts]
 
 
@@ -56,7 +53,7 @@ class _Search:
         self, level: int, alive: list[Bools], free: Bools, standing: tuple[Standing, ...],
         missing: tuple[str, ...], score: float,
     ) -> bool:  # fmt: skip
-        """Place the groups from a level on; True when all of them stand."""
+        """Place the groups from a level on; True if all of them are placed."""
         if level == len(self.groups):
             if score > self.best.score:
                 self.best = Arrangement(standing, missing, score)
@@ -73,7 +70,7 @@ class _Search:
                 mask if k <= level else self.places[k].free_of(mask, place)
                 for k, mask in enumerate(alive)
             ]
-            # Do not go on where a group that must stand cannot any more.
+            # Prune if a required group has no place any more.
             if any(
                 g.is_required and not mask.any() and alive[k].any()
                 for k, (g, mask) in enumerate(zip(self.groups, left, strict=True))
@@ -91,7 +88,7 @@ class _Search:
         return whole and not lost
 
     def placed(self, place: Standing, free: Bools, standing: tuple[Standing, ...]) -> Bools | None:
-        """The free floor with one more template, if one can still walk to everything."""
+        """The free floor after adding a template; None if something becomes unreachable."""
         after = self.walk.with_bodies(free, place.bodies)
         fronts = [rect for s in (*standing, place) for rect in s.fronts]
         region = self.walk.reached(after, fronts)
@@ -105,11 +102,11 @@ def arranged(
     start: Arrangement | None = None, roots: int = _ROOTS, nodes: int = _NODES_A_ROOT,
     least_share: float = 0.0,
 ) -> Arrangement:  # fmt: skip
-    """The best arrangement found of groups, in this order, added to what stands already.
+    """Find the best arrangement of groups, in this order, added to the existing furniture.
 
-    Depth first: at each group the best places that overlap nothing and leave a way to all that must be
-    reached. roots: places of the first group that are tried; nodes: bound on
-    what is looked at for each of them. least_share: of the floor that must stay walkable. A group that is not required may be left out.
+    Depth first: each group tries its best places that overlap nothing and keep all required areas
+    reachable. roots: places to try for the first group; nodes: maximum nodes to visit per root.
+    least_share: minimum share of the floor that stays walkable. Optional groups may be left out.
     """
     before = start or Arrangement(score=0.0)
     alive = [np.ones(p.n, bool) for p in places]

@@ -1,4 +1,4 @@
-"""All places where a template can stand in a room, with what makes each good; no effects."""
+"""Candidate places of a template in a room, with their scores; no effects."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ _TOUCH_M: Final = 0.002
 _ABOVE_SILL_M: Final = 0.08
 _DEAD_GAP_M: Final = 0.35  # a gap that nobody can use
 BESIDE_M: Final = 0.01  # between furniture and the wall at its end
-_APART_M: Final = 0.4  # least distance between two places of one template that are both tried
+_APART_M: Final = 0.4  # minimum distance between two candidate places of one template, metres
 _NOISE: Final = 0.25
 _BEST: Final = 20
 
 
 @dataclass(slots=True, eq=False)
 class Places:
-    """Where a group can stand: rows are places; unused rectangles are nan."""
+    """Candidate places of a group, one per row; unused rectangles are nan."""
 
     templates: list[Template]
     template_of: Ints  # (N,) index into templates
@@ -47,24 +47,24 @@ class Places:
 
     @property
     def n(self) -> int:
-        """How many places there are."""
+        """Number of places."""
         return len(self.scores)
 
     def standing(self, k: int) -> Standing:
-        """The template of place k where it would stand."""
+        """The template at place k."""
         x, z, dx, dz = self.frames[k].tolist()
         template = self.templates[int(self.template_of[k])]
         return Standing(template, WallFrame(x, z, dx, dz), float(self.scores[k]))
 
     def free_of(self, alive: Bools, standing: Standing) -> Bools:
-        """Which of the places stay possible when something stands.
+        """Mask of places that remain possible after adding a template.
 
-        alive: (N,) bool of what was possible before; a copy comes back. Bodies may not meet bodies
-        or what is to stay free, but free areas may share ground.
+        alive: (N,) bool, possible so far; a copy is returned. Bodies may not overlap bodies or areas to
+        keep free; free areas may overlap each other.
         """
         bodies, clear = _rect_array(standing.bodies), _rect_array(standing.clear)
         taken = np.concatenate([bodies, clear])
-        # Look again only at those that are possible still.
+        # Test only places that are still possible.
         left = alive.copy()
         rows = np.flatnonzero(alive)
         hit = overlap(self.bodies[rows], taken).any(1) | overlap(self.clear[rows], bodies).any(1)
@@ -131,7 +131,7 @@ def places_of(group: PieceGroup, space: FurnishSpace, rng: np.random.Generator) 
 
 
 def fixed_places(found: Sequence[Standing]) -> Places:
-    """Places that were found elsewhere."""
+    """Places that were determined elsewhere."""
     frames = frames_array([p.frame for p in found])
     scores = np.array([p.score for p in found], np.float64)
     return _sorted_places([p.template for p in found], np.arange(len(found)), frames, scores)
@@ -190,7 +190,7 @@ def _versions(template: Template) -> list[Template]:
 
 
 def _frames(template: Template, space: FurnishSpace) -> tuple[F64, Ints]:
-    """(N, 4) where a template could stand, and the wall of each, -1 for none."""
+    """(N, 4) candidate frames of a template, and the wall index of each, -1 for none."""
     if template.stand is Stand.FREE:
         frames = _free_frames(space)
         return frames, np.full(len(frames), -1)
@@ -280,7 +280,7 @@ def _distances_to_nearest(points: F64, others: Sequence[Point]) -> F64:
 def _wall_scores(
     like: Liking, span: tuple[float, float], frames: F64, walls: Ints, space: FurnishSpace
 ) -> F64:
-    """(N,) for ends at corners, against gaps that nobody can use and what stands below windows."""
+    """(N,) score: favours ends at corners, penalises unusable gaps and blocked windows."""
     start = frames_array([w.frame for w in space.walls])[walls]
     length = np.array([w.length for w in space.walls])[walls]
     along = ((frames[:, :2] - start[:, :2]) * start[:, 2:]).sum(1)
@@ -304,7 +304,7 @@ def _back_scores(template: Template, frames: F64, space: FurnishSpace) -> F64:
     """(N,) of a seat whose back is its far end: 1 at a wall, .6 with a way behind it, else -1."""
     u0, _, u1, v1 = template.extent
     scores = np.full(len(frames), 0.6)
-    # From far to near: what is met first decides.
+    # From far to near: the first hit decides.
     for far, score in ((0.75, -1.0), (0.3, 0.8), (0.06, 1.0)):
         behind = _rects_in_frames(np.array([(u0 + 0.3, v1, u1 - 0.3, v1 + far)]), frames)
         scores[overlap(behind, space.outside).any(1)] = score

@@ -1,4 +1,4 @@
-"""A room as furniture sees it: walls to stand at, doors and windows to keep free; no effects."""
+"""Free space of a room for furniture: its walls, and the areas of doors and windows; no effects."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class RoomWall:
 
 @dataclass(frozen=True, slots=True)
 class Window:
-    """What must not be hidden: the strip before a window."""
+    """The strip in front of a window, to keep clear."""
 
     zone: Rect
     sill: float
@@ -77,10 +77,10 @@ class FurnishSpace:
 
 
 def room_space(plan: Plan, number: int) -> FurnishSpace:
-    """The space of a room of the plan.
+    """The free space of a room of the plan.
 
-    Doors, windows and sides that are open to a neighbour are part of it, each with what has to stay
-    free before it. Furniture is not: see `with_bodies`.
+    It includes doors, windows and sides open to a neighbour, each with the area to keep free in front
+    of it, but no furniture: see `with_bodies`.
     """
     room = plan.rooms[number]
     polygon = Polygon(room.polygon)
@@ -106,7 +106,7 @@ def room_space(plan: Plan, number: int) -> FurnishSpace:
         doors.append(frame.rect((-side, 0.0, side, depth)))
         if not is_french or opening.other is not None:
             ways.append(frame.rect((-half + 0.15, 0.2, half - 0.15, 0.75)))
-    # Before stairs all stays free; one does not walk through them from side to side.
+    # Keep the whole area in front of stairs free; nobody walks across them.
     stairs = [n for i, n in neighbours if plan.rooms[i].type is RoomType.STAIRS]
     floors = [n for n in near if n not in stairs]
     for open_to, width in ((floors, _OPEN_M), (stairs, math.inf)):
@@ -121,7 +121,7 @@ def room_space(plan: Plan, number: int) -> FurnishSpace:
 
 
 def with_bodies(space: FurnishSpace, bodies: Sequence[Rect]) -> FurnishSpace:
-    """The space of a room where something stands already: nothing more fits there."""
+    """The space with existing furniture subtracted."""
     if not bodies:
         return space
     return replace(space, outside=np.concatenate([space.outside, np.array(bodies)]))
@@ -151,10 +151,10 @@ def free_stretches(space: FurnishSpace, least: float) -> tuple[float, ...]:
 
 
 def outside_of(polygon: Polygon) -> F64:
-    """(N, 4) rectangles: the rim around a rectilinear polygon, and what its bounds hold beyond it.
+    """(N, 4) rectangles: the rim around a rectilinear polygon, and the rest of its bounds.
 
-    The rim is 3 m wide, so that a piece which sticks out of the room meets it. Slanted sides count
-    as outside as far as their cells reach.
+    The rim is 3 m wide, so that a piece which extends beyond the room hits it. Cells of slanted sides
+    count as outside.
     """
     x0, z0, x1, z1 = polygon.bounds
     far = 3.0
@@ -162,7 +162,7 @@ def outside_of(polygon: Polygon) -> F64:
         (x0 - far, z0 - far, x0, z1 + far), (x1, z0 - far, x1 + far, z1 + far),
         (x0 - far, z0 - far, x1 + far, z0), (x0 - far, z1, x1 + far, z1 + far),
     ]  # fmt: skip
-    # Cut the bounds along every corner; keep the cells whose middle lies beyond.
+    # Cut the bounds at every corner; keep cells whose centre is outside.
     points = list(polygon.exterior.coords)
     xs, zs = sorted({p[0] for p in points}), sorted({p[1] for p in points})
     for xa, xb in pairwise(xs):
@@ -174,7 +174,7 @@ def outside_of(polygon: Polygon) -> F64:
 
 
 def _open_neighbours(plan: Plan, number: int) -> list[tuple[int, Polygon]]:
-    """Rooms that share a stretch of outline with it: no wall stands between."""
+    """Adjacent rooms without a wall between."""
     own = Polygon(plan.rooms[number].polygon)
     found = []
     for other, room in enumerate(plan.rooms):

@@ -15,7 +15,7 @@ def coats(shelf: Shelf) -> tuple[Template, ...]:
 
 
 def consoles(shelf: Shelf) -> tuple[Template, ...]:
-    """What keys and shoes lie on: a low chest, narrow shelves, a bench."""
+    """Hall furniture for keys and shoes: a low chest, narrow shelves, a bench."""
     pieces = shelf.of("dresser", "shelves", depth=(0.2, 0.56), width=(0.4, 1.5), height=(0.4, 1.3))
     found = [single(p, before=0.6, rank=-0.5 * p.size[1]) for p in pieces[:MAX_CHOICES]]
     benches = shelf.of("stool", width=(0.7, 1.3), height=(0.35, 0.55))

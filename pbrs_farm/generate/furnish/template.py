@@ -1,7 +1,7 @@
-"""The nouns of furnishing: slots, templates and where they come to stand; no effects.
+"""Values of furnishing: slots, templates and their places; no effects.
 
 A template's frame: u along the wall, v from the wall into the room, both in metres; u turned
-clockwise on the page by a quarter is v. Its pieces look along +v unless they are turned.
+clockwise on the page by a quarter is v. Its pieces face +v unless they are turned.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ _WORKTOP_M: Final = 0.9
 
 
 class Stand(Enum):
-    """Where a template may stand."""
+    """Where in a room a template may be placed."""
 
     WALL = auto()  # its back at a wall
     CORNER = auto()  # at a wall and with one end at the next one
@@ -84,7 +84,7 @@ class PieceSlot:
         return replace(self, u=-self.u, turns=-self.turns)
 
     def placed(self, frame: WallFrame, room: int) -> PlacedPiece:
-        """The piece where the template stands."""
+        """The piece at the template's place."""
         x, z = frame.point(self.u, self.v)
         angle = (frame.angle_rad + self.turns * math.pi / 2) % (2 * math.pi)
         return PlacedPiece(
@@ -95,7 +95,7 @@ class PieceSlot:
 
 @dataclass(frozen=True, slots=True)
 class Liking:
-    """What makes a place better than another; each a weight."""
+    """Weights of the criteria for a good place."""
 
     corner: float = 0.3  # one end at a wall
     daylight: float = 0.0  # near a window
@@ -107,7 +107,7 @@ class Liking:
 
 @dataclass(frozen=True)
 class Template:
-    """Pieces that stand together, and what they need free; all of it moves as one."""
+    """A rigid group of pieces with the areas that they need free."""
 
     name: str
     slots: tuple[PieceSlot, ...]
@@ -147,7 +147,7 @@ class Template:
 
 @dataclass(frozen=True, slots=True)
 class PieceGroup:
-    """What a room wants: one of several templates."""
+    """Alternative templates for one purpose; a room gets one of them."""
 
     name: str
     templates: tuple[Template, ...]
@@ -156,7 +156,7 @@ class PieceGroup:
 
 @dataclass(frozen=True, slots=True)
 class Standing:
-    """A template where it stands."""
+    """A template with its place."""
 
     template: Template
     frame: WallFrame
@@ -164,7 +164,7 @@ class Standing:
 
     @property
     def bodies(self) -> list[Rect]:
-        """Plan rectangles of what stands on the floor."""
+        """Plan rectangles of the pieces on the floor."""
         return [self.frame.rect(slot.rect) for slot in self.template.bodies]
 
     @property

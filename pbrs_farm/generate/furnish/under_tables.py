@@ -1,8 +1,8 @@
-"""How far a chair goes under a table before the two meet; no effects but caches.
+"""Depth that a chair fits under a table before the two touch; no effects but caches.
 
-Both become pictures of depth, seen along the way: of the chair how far it reaches in each cell of 8 mm,
-of the table where it begins. They meet at the least difference, wherever along the edge the chair
-stands, so that a table is looked at once a side.
+Both are rendered to depth maps along the direction of motion: per cell of 8 mm, how far the chair
+extends and where the table begins. They touch at the minimum difference, for any position along
+the edge, so each side of a table is rendered once.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ def _way_m(chair: Shape, table: Shape, at: int, turns: int) -> float:
 
 @lru_cache(maxsize=512)
 def _front(chair: Shape) -> _Depths:
-    """How far a chair reaches behind its front, at most 0: chairs look along +z."""
+    """Extent of a chair relative to its front, at most 0: chairs face +z."""
     corners = corners_of_surfaces(chair.surfaces)
     points = surface_points(corners, _SPACING_M)
     first, depths = _greatest(points, points[:, 2] - corners[..., 2].max())

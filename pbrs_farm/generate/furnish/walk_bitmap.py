@@ -1,4 +1,4 @@
-"""Where one can walk in a room, on a bitmap of 5 cm. No effects."""
+"""Walkable floor of a room, on a bitmap with 5 cm cells. No effects."""
 
 from __future__ import annotations
 
@@ -41,13 +41,13 @@ class WalkMap:
         self.joined_ways = [w for w in space.ways if region is not None and self._meets(region, w)]
 
     def with_bodies(self, free: Bools, rects: Iterable[Rect]) -> Bools:
-        """The middles that are left where something stands on rectangles.
+        """Free cell centres after placing furniture on rectangles.
 
-        free: (H, W) bool; a copy comes back. A man is a circle of _REACH_M around his middle.
+        free: (H, W) bool; a copy is returned. A person is a circle of radius _REACH_M.
         """
         left = free.copy()
         for x0, z0, x1, z1 in rects:
-            # Look at the cells of the rectangle around what is near; round its corners off.
+            # Test the cells in the bounding rectangle; round its corners off.
             columns, rows = (
                 slice(*np.searchsorted(at, (low - _REACH_M, high + _REACH_M)).tolist())
                 for at, low, high in ((self._xs, x0, x1), (self._zs, z0, z1))
@@ -80,7 +80,7 @@ class WalkMap:
         return float((near & self._inside).sum() / max(self._inside.sum(), 1))
 
     def _cells(self, rect: Rect) -> tuple[slice, slice]:
-        # A cell counts if its middle lies within.
+        # A cell counts if its centre is inside.
         def span(low: float, high: float, origin: float) -> slice:
             a = math.ceil((low - origin) / CELL_M - 0.5 - 1e-6)
             b = math.floor((high - origin) / CELL_M - 0.5 + 1e-6) + 1
@@ -89,7 +89,7 @@ class WalkMap:
         return span(rect[1], rect[3], self._origin[1]), span(rect[0], rect[2], self._origin[0])
 
     def _region(self, free: Bools, start: Rect | None) -> Bools | None:
-        """The way that begins at a rectangle; the largest where there is none."""
+        """The connected free region at a rectangle; the largest region if no rectangle is given."""
         ways, _ = ndimage.label(free)
         area = ways[self._cells(start)] if start else ways
         counts = np.bincount(area.ravel(), minlength=1)

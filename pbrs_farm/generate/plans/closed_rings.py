@@ -63,9 +63,9 @@ def closed_rings(path: Path, lines: Sequence[Line], join_m: float = _JOIN_M) -> 
 def passages_between(
     rooms: Sequence[Polygon], lines: Sequence[Line], openings: Sequence[dict[str, Any]]
 ) -> list[dict[str, Any]]:
-    """The rows of passages: gaps between the walls of two rooms, as wide as doors, of which the file has no opening.
+    """Rows for passages: door-sized gaps between two rooms' walls without an opening in the file.
 
-    lines: middle lines of walls, metres. Without a passage a wall would stand in the doorway.
+    lines: centre lines of walls, metres. Without a passage, a wall would close the doorway.
     """
     walls = [LineString(line) for line in lines if line[0] != line[1]]
     standing = unary_union([wall.buffer(_BESIDE_M, cap_style="flat") for wall in walls])

@@ -1,8 +1,8 @@
-"""A plan of CubiCasa5k (model.svg) -> a ParsedPlan. Effects: reads the file.
+"""Read a plan of CubiCasa5k (model.svg) as a ParsedPlan. Effects: reads the file.
 
-Classes of groups say what their polygons are: Floorplan (a floor), Space, Wall, Door, Window, Railing,
-FixedFurniture. A unit is a centimetre, y runs down. Outlines of rooms are drawn to the walls' faces or to
-their middles: what walls stand on is taken from them; rooms without a wall between are one.
+Group classes give the meaning of polygons: Floorplan (a floor), Space, Wall, Door, Window, Railing,
+FixedFurniture. A unit is a centimetre, y runs down. Room outlines end at the walls' faces or centre
+lines: the walls' ground is subtracted; rooms without a wall between are merged.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ class _Floor:
 
 
 def plan_of_svg(path: Path) -> ParsedPlan:
-    """What the drawing tells, a storey a floor of it, left edges and upper edges upon each other."""
+    """Read the drawing, one storey per floor, aligned at their left and upper edges."""
     floors = _floors(path, _root(path))
     if not floors:
         raise BadInput(
@@ -101,7 +101,7 @@ def _floors(path: Path, root: Element) -> list[_Floor]:
     floors: list[_Floor] = []
     whole = _Floor()  # of a drawing without groups for its floors
     n_parts = 0
-    # Go down by a list of our own: groups may be nested without an end.
+    # Use an explicit stack: groups may be nested arbitrarily deep.
     waiting: list[tuple[Element, _Matrix, _Floor, str, tuple[str, ...]]] = [
         (root, _HERE, whole, "", ())
     ]
@@ -123,7 +123,7 @@ def _floors(path: Path, root: Element) -> list[_Floor]:
             shape = _polygon(path, group.get("points") or "", matrix)
             if shape is not None:
                 floor.parts.setdefault(kind, []).append((words, shape))
-            # What a thing's drawing shows beside its outline says no more.
+            # Only the outline of an item's drawing matters.
             continue
         children = list(group)
         if kind == "FixedFurniture":

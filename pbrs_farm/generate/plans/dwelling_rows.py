@@ -1,9 +1,9 @@
-"""An apartment of a table of dwellings with WKT polygons -> a ParsedPlan. Effects: reads the file.
+"""Read an apartment from a table of dwellings with WKT polygons as a ParsedPlan. Effects: reads the file.
 
 The columns are those of geometries.csv of Swiss Dwellings (Archilyse, doi 10.5281/zenodo.7788422):
 entity_type (area, separator, opening, feature), entity_subtype, geometry (WKT in metres, +y north; geom
-in Modified Swiss Dwellings), apartment_id, floor_id, and where they are there elevation and height.
-Walls follow from the areas; railings become parapets, columns stay, features are things with a box alone.
+in Modified Swiss Dwellings), apartment_id, floor_id, and optionally elevation and height.
+Walls follow from the areas; railings become parapets, columns are kept, features are items with only a box.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ _NAMED: Final = 3  # apartments that a message names
 _IS_POLYGON: Final = re.compile(r"\s*(SRID=\d+;)?\s*(MULTI)?POLYGON[ ZM]*[ (]", re.IGNORECASE)
 _MOST_NESTED: Final = 3  # brackets of a multipolygon
 _FRENCH_M: Final = 0.3  # a window that begins below is a door of glass
-# Heights of fixtures where the table has none; 1 m for others.
+# Default heights of fixtures; 1 m for others.
 _HEIGHTS: Final = {
     "KITCHEN": 0.9, "SINK": 0.85, "TOILET": 0.8, "BATHTUB": 0.6, "SHOWER": 2.0,
     "WASHING_MACHINE": 0.85, "BUILT_IN_FURNITURE": 2.2,
@@ -75,9 +75,9 @@ class _Row:
 
 
 def plan_of_rows(path: Path, apartment: str = "") -> ParsedPlan:
-    """What the table tells of one apartment, a storey a floor of it.
+    """Read one apartment, one storey per floor.
 
-    Raises BadInput: no such table, no such apartment, several where none is named.
+    Raises BadInput: not such a table, unknown apartment, or several if none is named.
     """
     floors = _floors(path)
     if not floors:
@@ -108,7 +108,7 @@ def _elevation(rows: list[_Row]) -> float:
 
 
 def _read_rows(path: Path) -> Iterator[tuple[int, dict[str, str]]]:
-    """(line, row) of the table, with the columns that are needed."""
+    """(line, row) of the table, reduced to the required columns."""
     csv.field_size_limit(_LONGEST_FIELD)
     try:
         with open_regular(path, MAX_DIGEST_BYTES) as file:
@@ -118,7 +118,7 @@ def _read_rows(path: Path) -> Iterator[tuple[int, dict[str, str]]]:
             if missing:
                 text = f"has no column {missing[0]}"
                 raise BadInput(path, "", text, hint=f"columns {', '.join(_NEEDED)}")
-            # Tables have millions of rows: take the columns that are asked for, no more.
+            # Tables have millions of rows: extract only the required columns.
             places = [(c, names.index(c)) for c in (*_NEEDED, *_MORE) if c in names]
             least = max(place for _, place in places)
             for row in reader:
@@ -233,7 +233,7 @@ def _storey_of_rows(
 
 
 def _wall_of_railing(row: _Row, balconies: Any, height: float) -> dict[str, Any] | None:
-    """A railing that is no balcony's, which has its parapet already, or a column."""
+    """A parapet for a railing that does not belong to a balcony, or a column."""
     box = footprint(row.shape)
     is_railing = row.subtype == "RAILING"
     if (is_railing and balconies.distance(row.shape) < _NEAR_M) or box.width < 0.05:

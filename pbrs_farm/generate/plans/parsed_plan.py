@@ -1,7 +1,7 @@
-"""What a file says of a home before its walls stand: storeys of rooms, openings, things; frozen values.
+"""A home as read from a plan file, before walls are built: storeys of rooms, openings, items; frozen values.
 
-Plans of machines come in whatever frame their format has; here x runs to the right, z downwards on
-the page, in metres, as in a Plan. Angles are about +y: at 0 a front looks to +z.
+Plans of other programs have various frames; here x runs to the right, z downwards on the page, in
+metres, as in a Plan. Angles are about +y: at 0 a front faces +z.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from pbrs_farm.generate.plans.wall_tops import WallTop
 
 MAX_THINGS: Final = 3_000
 _FILLED: Final = 0.85  # a shape that fills less of its rectangle is made of several boxes
-_MOST_CORNERS: Final = 12  # most corners of a shape that is cut into boxes
+_MOST_CORNERS: Final = 12  # maximum corners of a shape that is cut into boxes
 _LEAST_BOX_M2: Final = 0.08
 
 
@@ -42,7 +42,7 @@ class Thing(NamedTuple):
 
 @dataclass(frozen=True)
 class ParsedStorey:
-    """A storey as the JSON of a plan of one's own would say it, and the things on it."""
+    """A storey in the form of this project's plan JSON, and its items."""
 
     value: dict[str, Any]
     things: tuple[Thing, ...] = ()
@@ -52,7 +52,7 @@ class ParsedStorey:
 
 @dataclass(frozen=True)
 class ParsedPlan:
-    """All storeys from below, and what the file holds that was left out, a line each."""
+    """All storeys from below, and notes about omitted content, one line each."""
 
     storeys: tuple[ParsedStorey, ...]
     left_out: tuple[str, ...] = ()
@@ -60,16 +60,16 @@ class ParsedPlan:
 
 @dataclass
 class LeftOut:
-    """Collects what is left out, many of a kind as one line; state: its counts."""
+    """Collects notes about omitted content, grouped by kind; state: its counts."""
 
     counts: dict[str, int] = field(default_factory=dict)
     first: dict[str, str] = field(default_factory=dict)
 
     def add(self, what: str, place: str = "") -> None:
-        """Remember something that is left out.
+        """Record an omission.
 
-        what: a sentence that holds for all of its kind; those of one sentence become one line with their
-        number. place: where in the file, kept of the first.
+        what: a sentence that holds for all of its kind; equal sentences become one line with a count.
+        place: where in the file, reported for the first.
         """
         self.counts[what] = self.counts.get(what, 0) + 1
         self.first.setdefault(what, place)
@@ -106,7 +106,7 @@ def footprint(shape: Polygon) -> Footprint:
     a, b = corners[1] - corners[0], corners[2] - corners[1]
     long, short = (a, b) if np.hypot(*a) >= np.hypot(*b) else (b, a)
     middle = corners[:4].mean(0)
-    # The right side of a thing turned by t points to (cos t, -sin t).
+    # The right side of an item rotated by t points to (cos t, -sin t).
     turn = math.atan2(-float(long[1]), float(long[0]))
     return Footprint(
         float(middle[0]), float(middle[1]), float(np.hypot(*long)), float(np.hypot(*short)), turn
@@ -124,7 +124,7 @@ def footprints(shape: Polygon) -> list[Footprint]:
     area = whole.width * whole.depth
     if area <= 0 or shape.area > _FILLED * area or len(ground.exterior.coords) > _MOST_CORNERS:
         return [whole]
-    # Turn it upright, and take the largest rectangle of what is left, again and again.
+    # Rotate it upright, and repeatedly take the largest rectangle of the remainder.
     upright: Polygon | None = largest_part(
         affinity.rotate(ground, whole.turn_rad, (0, 0), use_radians=True)
     )
@@ -142,7 +142,7 @@ def footprints(shape: Polygon) -> list[Footprint]:
 
 
 def largest_part(shape: object) -> Polygon | None:
-    """The largest polygon of a shape; None where it has none."""
+    """The largest polygon of a shape; None if it has none."""
     if isinstance(shape, Polygon):
         return None if shape.is_empty else shape
     parts = getattr(shape, "geoms", ())
@@ -175,10 +175,10 @@ def value_of(
     rooms: Sequence[dict[str, Any]], openings: Iterable[dict[str, Any]], height: float,
     walls: Sequence[dict[str, Any]] = (),
 ) -> dict[str, Any]:  # fmt: skip
-    """A storey as the JSON of a plan of one's own has it (plan_files.py).
+    """A storey in the form of this project's plan JSON (plan_files.py).
 
-    rooms, walls: rows of it. openings: rows of any kind, sorted here into doors and windows. height:
-    from floor to ceiling, drawn into 2 to 6 m; 2.6 m where it is no number.
+    rooms, walls: its rows. openings: rows of any kind, sorted here into doors and windows. height: from
+    floor to ceiling, clamped to 2 to 6 m; 2.6 m if it is not a number.
     """
     rows = list(openings)
     glazed = ("window", "french_window")

@@ -1,16 +1,16 @@
-"""A file of a floor plan, in any format -> storeys of a Plan, and what stands there by name and box. Effects: reads the file.
+"""Read a floor plan in any supported format as storeys of a Plan with named items. Effects: reads the file.
 
-A plan of one's own:
+This project's own format:
 
     {"height": 2.5,
      "rooms": [{"type": "living", "name": "Salon", "polygon": [[0, 0], [5, 0], [5, 4], [0, 4]]}],
      "doors": [{"at": [5, 2], "width": 0.9}, {"at": [0, 2], "entrance": true}],
      "windows": [{"at": [2.5, 0], "width": 1.3, "height": 1.3, "sill": 0.9}]}
 
-GeoJSON says the same: polygons with the properties `type` and `name` are rooms, points with `kind`
+GeoJSON is equivalent: polygons with the properties `type` and `name` are rooms, points with `kind`
 (door, entrance, passage, window, french_window) and the sizes are openings. x runs to the right and the
-second coordinate downwards on the page. Rooms may touch or leave room for the walls between. The other
-formats have a module each beside this one, which ends with its entry FORMAT.
+second coordinate downwards on the page. Rooms may touch or leave space for the walls between. Each
+other format is a module in this folder that ends with its entry FORMAT.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from pbrs_farm.generate.programme_file import json_from_file
 
 @dataclass(frozen=True, slots=True)
 class PlanStorey:
-    """A storey: its plan, and the things that the file tells of it."""
+    """A storey: its plan and the items in the file."""
 
     plan: Plan
     things: tuple[Thing, ...] = ()
@@ -47,7 +47,7 @@ class PlanStorey:
 
 @dataclass(frozen=True, slots=True)
 class PlanFile:
-    """What a file holds, from below, and what of it is left out, a line each."""
+    """Contents of a file, storeys from below, and notes about omissions, one line each."""
 
     storeys: tuple[PlanStorey, ...]
     left_out: tuple[str, ...] = ()
@@ -71,9 +71,9 @@ def plan_formats() -> tuple[PlanFormat, ...]:
 
 
 def plan_from_file(path: Path, part: Part | str = "") -> PlanFile:
-    """The plan of a file, or of a part of it; its longest walls run along x or z.
+    """Read the plan of a file, or of a part of it, rotated so that its longest walls are along x or z.
 
-    Raises BadInput, naming the room or opening. What a machine wrote and does not fit is left out.
+    Raises BadInput, naming the room or opening. Invalid parts of machine-written files are left out.
     """
     part = Part(apartment=part) if isinstance(part, str) else part
     suffix = path.suffix.lower()
@@ -98,7 +98,7 @@ def _first_rows(value: object) -> list[Any]:
 
 
 def _is_own(value: dict[str, Any]) -> bool:
-    """Whether the first room is drawn as a plan of one's own draws it."""
+    """True if the first room has the form of this project's plan format."""
     return any(
         isinstance(room, dict) and "polygon" in room for room in _first_rows(value.get("rooms"))
     )

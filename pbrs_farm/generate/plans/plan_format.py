@@ -21,7 +21,7 @@ class Part:
 
     @property
     def word(self) -> str:
-        """As it stands behind the # of a word of the command line; "" = the whole file."""
+        """The part after the # in a command-line word; "" = the whole file."""
         given = [f"apartment={self.apartment}"] * bool(self.apartment)
         given += [f"floor={self.floor}"] * (self.floor is not None)
         return ",".join(given)

@@ -1,7 +1,7 @@
-"""The value that a plan's JSON has -> Plan with walls, or one line about what does not fit; no effects.
+"""Convert a plan's JSON value to a Plan with walls; errors are one line each; no effects.
 
-What a person wrote must be right; in what a machine wrote, a sliver, an outline that crosses itself and
-an opening that fits no wall are left out, a line each.
+Hand-written plans must be correct. In files of other programs, slivers, self-intersecting outlines
+and openings without a wall are left out, with a note each.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from pbrs_farm.generate.plans.wall_tops import WallTop, with_tops
 from pbrs_farm.generate.plans.walled_rooms import DrawnRoom, walled
 
 MAX_ROOMS: Final = 60
-MAX_CORNERS: Final = 20_000  # most corners of an outline as it is drawn
+MAX_CORNERS: Final = 20_000  # maximum corners of an outline
 _MOST_SIDES: Final = 120  # most sides of an outline after simplification
 _TOLERANCES_M: Final = (1e-3, 0.01, 0.02, 0.05, 0.1)  # by which a curve is made of straight walls
 _FAR_M: Final = 200.0
@@ -102,7 +102,7 @@ def plan_of_value(
     tops: upper edges of its walls where some are sloped. Raises BadInput, naming the room or opening.
     """
     given = checked(_PlanFields, value, path, hint='{"rooms": [...], "doors": [...]}')
-    # Walls stand between the drawn rooms; openings then find their wall.
+    # Build walls between the drawn rooms; openings are then assigned to walls.
     fields = [checked(_RoomFields, row, path, f"room {k}") for k, row in enumerate(given.rooms, 1)]
     _check_unit(path, fields)
     drawn = [
@@ -144,7 +144,7 @@ def _wall_of_row(path: Path, number: int, row: object) -> PlanWall:
 
 
 def _check_unit(path: Path, rooms: list[_RoomFields]) -> None:
-    """Raise BadInput for rooms whose size tells that they are not drawn in metres."""
+    """Raise BadInput for rooms whose size shows that the unit is not metres."""
     points = np.array([p for room in rooms for p in room.polygon])
     extent = float(np.ptp(points, axis=0).max())
     sides = [float(np.sqrt(abs(Polygon(room.polygon).area))) for room in rooms]
@@ -276,7 +276,7 @@ class _Openings:
             text = f"is {far[wall]:.1f} m from the nearest wall"
             raise BadInput(self.path, place, text, hint=f"within {_REACH_M} m of one")
         if self.is_of_machine:
-            # Of walls that are about as near, one that is long enough.
+            # Among about equally near walls choose one that is long enough.
             fits = [k for k in far if self.walls[k].length >= width + 0.04 and far[k] <= _REACH_M]
             best = min(fits, key=lambda k: (far[k], k), default=wall)
             return best if far[best] <= far[wall] + 0.2 else wall

@@ -76,7 +76,7 @@ class _House(BaseModel):
 
 
 def plan_of_procthor(path: Path, value: Any) -> ParsedPlan:
-    """What the house tells. Raises BadInput, naming the place."""
+    """Read the house. Raises BadInput, naming the place."""
     house = checked(_House, value, path)
     left_out = LeftOut()
     height = max((p.y for w in house.walls for p in w.polygon), default=2.6)
@@ -136,7 +136,7 @@ def _opening_of_hole(
 
 
 def _walk_objects(path: Path, objects: list[_Object]) -> Iterator[_Object]:
-    """Each object, those that stand on others too; children have places of their own."""
+    """Iterate over all objects including their children, which have absolute positions."""
     waiting, n = [(o, 0) for o in reversed(objects)], 0
     while waiting:
         thing, depth = waiting.pop()

@@ -1,8 +1,8 @@
-"""A home drawn with react-planner (its JSON) -> a ParsedPlan; no effects.
+"""Read a react-planner home (its JSON) as a ParsedPlan; no effects.
 
 layers.<id> holds vertices, lines (walls), holes, areas and items; y is up on the page, lengths are in the
-file's unit (cm). A hole lies at `offset`, a share of its line, or where its `coordinates` are. Where a file
-was traced from a picture, `scale` is square units a square pixel; properties are in units all the same.
+file's unit (cm). A hole is at `offset`, a fraction of its line, or at its `coordinates`. For plans traced
+from a picture, `scale` is square units per square pixel; properties are in units in any case.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class _Layer(BaseModel):
 
 
 def _one_for_none(value: Any) -> Any:
-    """The scale of a plan that was drawn, not traced, which editors write as null."""
+    """Replace null by 1: editors write null as the scale of a plan that was not traced."""
     return 1.0 if value is None else value
 
 
@@ -55,7 +55,7 @@ class _File(BaseModel):
 
 
 def plan_of_react_planner(path: Path, value: Any) -> ParsedPlan:
-    """What the file tells, a storey a layer. Raises BadInput, naming the place."""
+    """Read the plan, one storey per layer. Raises BadInput, naming the place."""
     given = checked(_File, value, path)
     if given.unit not in _METRES:
         raise BadInput(path, "unit", f"no such unit: {given.unit[:20]}", hint=", ".join(_METRES))
@@ -71,7 +71,7 @@ def plan_of_react_planner(path: Path, value: Any) -> ParsedPlan:
 
 
 class _Drawing:
-    """A layer in metres. metres: of a unit. scale: units of a length as it is drawn."""
+    """A layer in metres. metres: metres per unit. scale: units per drawn length."""
 
     def __init__(self, path: Path, place: str, layer: _Layer, metres: float, scale: float) -> None:
         self.path, self.place, self.layer = path, place, layer
@@ -145,7 +145,7 @@ class _Drawing:
         return self._point(self.layer.vertices.get(str(name)))
 
     def _ring(self, given: Any) -> list[tuple[float, float]]:
-        """The corners of an outline, [] where it is none: [[x, y], ...], or that within lists (GeoJSON)."""
+        """Corners of an outline given as [[x, y], ...] or nested (GeoJSON); [] for anything else."""
         for _ in range(3):
             if not isinstance(given, list) or not given:
                 return []
@@ -183,7 +183,7 @@ class _Drawing:
             return None
         (x0, z0), (x1, z1) = line
         offset, ring = row.get("offset"), self._ring(row.get("coordinates"))
-        # Along a wall its length; what is called width beside a length is its thickness.
+        # Items have a length along the wall; if both are given, width is the thickness.
         width = self._length(row, "length", self._length(row, "width", 0.9))
         if _is_number(offset) and 0 <= offset <= 1:
             t = float(offset)

@@ -36,9 +36,11 @@ from pbrs_farm.geometry.doorways import rooms_by_walls
 
 _MOST: Final = 3_000
 _JOIN_M: Final = 0.25  # scanned walls do not meet exactly
-_IN_WALL_M: Final = 0.15  # what lies so near to a wall's line stands in it
+_IN_WALL_M: Final = (
+    0.15  # maximum distance from a wall's line for an item to be part of the wall, metres
+)
 _SPURIOUS_M: Final = 12.0
-_SAME_HEIGHT_M: Final = 0.15  # of walls: larger differences are told
+_SAME_HEIGHT_M: Final = 0.15  # maximum difference in wall height without a note, metres
 _UPRIGHT: Final = 0.98  # y of a wall's own up, at least: others lean
 _KINDS: Final = {"door": "door", "window": "window", "opening": "passage"}
 
@@ -69,7 +71,7 @@ class _Scan(BaseModel):
 
 
 def plan_of_room_plan(path: Path, value: Any) -> ParsedPlan:
-    """What the scan tells, a storey a `story` of it. Raises BadInput, naming the place."""
+    """Read the scan, one storey per `story`. Raises BadInput, naming the place."""
     if not value.get("walls") and isinstance(value.get("rooms"), list):
         # A structure of several scans: what each of them holds.
         names = _Scan.model_fields
@@ -154,7 +156,7 @@ def _parse_pose(path: Path, place: str, surface: _Surface) -> F64:
     if len(flat) != 16 or not all(is_number):
         raise BadInput(path, f"{place}, transform", "expected 16 numbers")
     pose = np.array(flat, np.float64).reshape(4, 4)
-    # The row 0 0 0 1 tells which way it is written.
+    # The row 0 0 0 1 shows whether the matrix is row-major.
     return pose if np.allclose(pose[3], [0, 0, 0, 1]) and pose[:3, 3].any() else pose.T
 
 
@@ -173,7 +175,7 @@ def _upper_edge_of(surface: _Surface, pose: F64) -> WallTop:
 
 
 def _lines_in_gaps(path: Path, scan: _Scan, lines: list[Line]) -> list[Line]:
-    """Middle lines of doors, windows and openings that stand between walls, not in one."""
+    """Centre lines of doors, windows and openings between walls instead of in one."""
     standing = unary_union([LineString(line).buffer(_IN_WALL_M) for line in lines])
     found = []
     for kind in ("doors", "windows", "openings"):

@@ -1,4 +1,4 @@
-"""What rooms are for, by the words of other vocabularies, by what stands in them, by size; no effects."""
+"""Room types by names of other vocabularies, by furniture and by size; no effects."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from pbrs_farm.home.room_use import RoomKind, named_kind
 
 BY_FIXTURES: Final = "by its fixtures"
 LEAST_M2: Final = 0.5
-"""Of a room: what is smaller is a sliver."""
+"""Minimum room area; smaller areas are slivers."""
 
-_SMALL_BATH_M2: Final = 2.6  # a smaller one has no bath: a WC
+_SMALL_BATH_M2: Final = 2.6  # smaller bathrooms have no bath, only a WC
 _NEAR_WINDOW_M: Final = 0.5
 _NEAR_DOOR_M: Final = 0.35
 _LIVING_M2, _ROOM_M2, _STORE_M2 = 18.0, 9.0, 3.0
 _SMALL_ROOM_M2: Final = 6.0  # of a room to live in with one door and a window
-_OPEN_AIR_SHARE: Final = 0.25  # of its outline that railings stand along: a balcony's
+_OPEN_AIR_SHARE: Final = 0.25  # minimum share of a balcony's outline with railings
 _NEAR_RAILING_M: Final = 0.3
 _TYPES: Final = {
     RoomKind.DINING: "living", RoomKind.OUTDOOR: "balcony", RoomKind.OTHER: "hall",
 }  # fmt: skip
 _GLAZED: Final = ("window", "french_window")
-# Words of things that say what a room is for; the first row that one of them has a word of holds.
+# Item words that imply a room type; the first matching row wins.
 _FIXTURES: Final = (
     ("bath", {"bathtub", "tub", "shower", "jacuzzi"}), ("toilet", {"toilet", "wc", "urinal"}),
     ("kitchen", {"kitchen", "stove", "oven", "cooker", "hob", "fridge", "refrigerator", "dishwasher"}),
@@ -38,7 +38,7 @@ _FIXTURES: Final = (
 
 
 class DrawnArea(NamedTuple):
-    """An area of a file before it is known what it is for."""
+    """An area whose room type is not yet known."""
 
     shape: Polygon
     word: str  # the vocabulary's, "" = none
@@ -54,10 +54,10 @@ def typed_rooms(
     left_out: LeftOut,
     railings: Sequence[Polygon] = (),
 ) -> list[dict[str, Any]]:
-    """The rows of the areas that are rooms, in their order.
+    """Rows of the areas that are rooms, in input order.
 
-    What no word says goes by what stands in it, by railings along it, by its windows and doors, by its
-    size. Where none is to live in, the largest plain room is. Slivers and what is no room are left out.
+    Types follow from names, else furniture, railings, windows and doors, else size. Without any living
+    area, the largest plain room becomes one. Slivers and non-rooms are left out.
     """
     kept: list[tuple[DrawnArea, str]] = []
     sure = [
@@ -144,7 +144,7 @@ def _by_fixtures(m2: float, has: set[str], n_doors: int, *, is_lit: bool, is_lar
         return "bedroom"
     if is_living:
         return "living"
-    # A passage has doors at two ends; what has one door is a room with a window, a store without.
+    # A passage has doors at both ends; with one door it is a room if it has a window, else a store.
     if is_lit:
         return "bedroom" if m2 >= (_SMALL_ROOM_M2 if n_doors == 1 else _ROOM_M2) else "hall"
     return "store" if n_doors == 1 or m2 < _STORE_M2 else "hall"

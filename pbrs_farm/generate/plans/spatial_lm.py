@@ -29,10 +29,10 @@ _NUMBERS: Final = {"Wall": (7, 8), "Door": (5, 5), "Window": (5, 5), "Bbox": (7,
 
 
 def plan_of_layout(path: Path) -> ParsedPlan:
-    """What the layout tells. Raises BadInput, naming the line, or where the walls close no room.
+    """Read the layout. Raises BadInput, naming the line, or if the walls enclose no room.
 
-    Lines that begin with # or < and empty ones are passed over. Rooms are the faces that walls
-    close; boxes become furniture.
+    Empty lines and lines that begin with # or < are skipped. Rooms are the faces enclosed by walls;
+    boxes become furniture.
     """
     walls: list[list[float]] = []
     holes: list[tuple[str, list[float]]] = []

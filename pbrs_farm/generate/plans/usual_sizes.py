@@ -1,4 +1,4 @@
-"""How large things usually are of which a file tells no size; no effects."""
+"""Default sizes for furniture whose file gives none; no effects."""
 
 from __future__ import annotations
 

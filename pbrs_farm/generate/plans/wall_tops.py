@@ -15,7 +15,7 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.generate.floor_plan import PlanWall
 
 SLOPED_M: Final = 0.1  # edges that rise or fall by less are level: scans are no better
-_BESIDE_M: Final = 0.45  # a built wall stands so far beside the line of the file that it follows
+_BESIDE_M: Final = 0.45  # maximum distance between a built wall and its line in the file, metres
 _HAIR_M: Final = 1e-6
 _STRAIGHT_M: Final = 1e-3
 _ALONG: Final = 0.98  # cosine of the angle between the two
@@ -38,9 +38,9 @@ class WallTop(NamedTuple):
 
 
 def upper_edge(corners: Polygon) -> list[tuple[float, float]]:
-    """(x, y) of the upper edge of a wall's outline, x along the wall, from its left to its right.
+    """(x, y) of the upper edge of a wall's outline, x along the wall, from left to right.
 
-    Where the edge steps up or down, two points stand at one x.
+    A step up or down is two points at the same x.
     """
     ring = shapely.get_coordinates(corners.exterior)
     low, high = float(ring[:, 0].min()), float(ring[:, 0].max())
@@ -73,9 +73,9 @@ def _height_at(ring: F64, x: float) -> float | None:
 
 
 def with_tops(walls: Sequence[PlanWall], tops: Sequence[WallTop]) -> tuple[PlanWall, ...]:
-    """The walls with the upper edges of the lines that they follow; parapets stay as they are.
+    """The walls with the upper edges of their lines in the file; parapets are unchanged.
 
-    A wall without a line of its own is as high at each end as the nearest edge is.
+    A wall without its own line takes the height of the nearest edge at each end.
     """
     if not tops:
         return tuple(walls)

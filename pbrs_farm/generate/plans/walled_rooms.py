@@ -1,8 +1,8 @@
-"""Room polygons become walls between them and around them; no effects.
+"""Build the walls between and around room polygons; no effects.
 
-Rooms may touch or leave room for the walls between: a wall of INNER_M stands on a shared side, one as
-thick as the gap in it, one of OUTER_M around. A stub of wall that a room goes round is as thick as it
-is drawn. A balcony gets parapets.
+Rooms may touch or leave space for walls: a shared side gets a wall of INNER_M, a gap a wall of its
+width, the outside one of OUTER_M. A wall stub inside a room keeps its drawn thickness. A balcony
+gets parapets.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _PARALLEL: Final = 0.999  # cosine between two sides that face each other
 
 
 class DrawnRoom(NamedTuple):
-    """A room before its walls stand."""
+    """A room before walls are built."""
 
     place: str  # where the file has it: "room 3"
     type: RoomType
@@ -35,9 +35,9 @@ class DrawnRoom(NamedTuple):
 
 
 def walled(drawn: Sequence[DrawnRoom]) -> tuple[tuple[PlanWall, ...], tuple[PlanRoom, ...]]:
-    """Walls between rooms and around them; rooms without what the walls stand on, in their order.
+    """Walls between and around rooms, and the rooms without the walls' ground, in input order.
 
-    A room of which the walls leave nothing has no corner.
+    A room completely covered by walls has no corners.
     """
     shapes = [room.shape for room in drawn]
     rings = [_Ring(shape) for shape in shapes]
@@ -101,7 +101,7 @@ def _walls_of(
 
 
 def _mitre(a: Point, b: Point, c: Point) -> float:
-    """How far a wall outside a..b goes on beyond b, in thicknesses: 0 where the room turns inwards."""
+    """Extension of an outer wall a..b beyond b, in thicknesses: 0 at an inward corner."""
     turn = math.atan2(c[1] - b[1], c[0] - b[0]) - math.atan2(b[1] - a[1], b[0] - a[0])
     turn = (turn + math.pi) % (2 * math.pi) - math.pi
     return min(math.tan(turn / 2), 2.0) if turn > 0 else 0.0
@@ -150,7 +150,7 @@ class _Side:
         return self._wall_between(low, high, thickness, out, is_outer=is_outer)
 
     def stub(self, low: float, high: float, thickness: float, out: float) -> PlanWall:
-        """A wall with a room on either side and at its ends: as long as it is drawn."""
+        """A wall surrounded by a room on both sides and at its end, with its drawn length."""
         return self._wall_between(low, high, thickness, out, is_outer=False)
 
     def _wall_between(

@@ -36,7 +36,7 @@ class _Room(BaseModel):
 
 
 def plan_of_zind(path: Path, value: Any) -> ParsedPlan:
-    """What the file tells, a storey a floor. Raises BadInput, naming the place."""
+    """Read the plan, one storey per floor. Raises BadInput, naming the place."""
     redraw = checked(dict[str, dict[str, Any]], value["redraw"], path, "redraw")
     for name, rooms in redraw.items():
         if len(rooms) > MAX_ROOMS:
