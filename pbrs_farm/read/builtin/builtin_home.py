@@ -1,8 +1,8 @@
-"""A small furnished home of our own, built in code: for demos without a network, and for tests.
+"""A small furnished home built in code, for demos without a network and for tests.
 
 Effect: reads builtin.toml beside. Two rooms side by side, a door between them, a front door, a window in each room, two
-lamps (one with a bulb, one without). It is a House as a reader gives it: walls are uncut solids,
-floors and ceilings planes, so that repair has its usual work to do.
+lamps (one with a bulb, one without). The House is as a reader returns it: walls are uncut solids,
+floors and ceilings planes, so that repair runs as usual.
 """
 
 from __future__ import annotations
@@ -212,7 +212,7 @@ def _openings(index: dict[str, int]) -> tuple[tuple[Opening, ...], list[Item]]:
         openings.append(
             Opening(f"opening_{hole.id}", "0", hole.id, hole.is_window, cutter, quad, axes[:, 2])
         )
-        # The door or window stands in the hole, turned with the wall.
+        # The door or window fills the hole, turned with the wall.
         name, make = ("window", _window_piece) if hole.is_window else ("door", _door_piece)
         turn = 0.0 if hole.along == "x" else 90.0
         piece = make(width, y1 - y0)

@@ -99,7 +99,7 @@ class Turned(Record):
 
 
 class BuiltinPiece(Record):
-    """A thing to place."""
+    """A piece to place."""
 
     nyu40: Nyu40 = Field(alias="class")
     parts: tuple[Part, ...] = ()
@@ -109,7 +109,7 @@ class BuiltinPiece(Record):
 
     @property
     def materials(self) -> set[str]:
-        """The names of what it is made of."""
+        """Names of its materials."""
         return {part.material for part in self.parts} | {body.material for body in self.turned}
 
 

@@ -1,6 +1,6 @@
-"""Furniture libraries on disk: what each entry says, and the archive its model lies in.
+"""Furniture libraries on disk: catalogue entries, and the archives with their models.
 
-Effects: opens `.sh3f` files and the program's jar; reads their catalogues, and models when asked.
+Effects: opens `.sh3f` files and the program's jar; reads their catalogues, and models on demand.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class Entry:
     category: str
     creator: str
     piece: PlanPiece  # as a home places it that turns and paints nothing
-    file: str = ""  # the model's, where it lies in a folder
+    file: str = ""  # path of the model, for a folder
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,7 +57,7 @@ class Library:
 
 @dataclass(slots=True)
 class LibraryNotes:
-    """What was wrong with the libraries, each once."""
+    """Faults of the libraries, each once."""
 
     found: dict[Note, None] = field(default_factory=dict)
 
@@ -115,8 +115,8 @@ def furniture_library(
 ) -> Library | None:
     """The library in a .sh3f (or the program's jar); None and BadInput as opened_library.
 
-    notes: takes what is left out and why. Entries whose model is missing in the archive are left
-    out with a note. No model is read yet.
+    notes: receives omissions and their reasons. Entries without a model in the archive are left out
+    with a note. Models are not read yet.
     """
     opened = opened_library(path, catalogue, notes)
     if opened is None:
@@ -139,9 +139,9 @@ def furniture_library(
 
 
 def licence_of(properties: Mapping[str, str]) -> str:
-    """A library's licence in short: "CC0", "CC-BY 3.0", else as it is written.
+    """A library's licence in short: "CC0", "CC-BY 3.0", else as written.
 
-    "" where the library names none. For showing; what the licence allows is not known here.
+    "" if the library names none. For display; the terms of the licence are not interpreted.
     """
     text = properties.get("license", "")
     for pattern, short in _KNOWN_LICENCES:

@@ -34,10 +34,13 @@ from pbrs_farm.read.sweethome3d.placement import (
 )
 
 MAX_TRIANGLES: Final = 200_000  # a model of more is left out unread
-SMALL: Final = (3_000, 1 / 48)  # triangles of what stands on furniture, and how coarse it may get
+SMALL: Final = (
+    3_000,
+    1 / 48,
+)  # maximum triangles and coarseness of small items, which are placed on furniture
 MEDIUM: Final = (5_000, 1 / 100)  # of chairs, which come in sixes
 LARGE: Final = (10_000, 1 / 110)
-MEDIUM_M: Final = 1.15  # the longest side of what is medium
+MEDIUM_M: Final = 1.15  # maximum longest side of a medium item, metres
 TOO_MANY: Final = 30_000  # a model that stays heavier than this is left out
 MAX_TEXTURE_PX: Final = 512  # edge of a piece's picture; more would show in no view of a room
 _JPEG_QUALITY: Final = 92
@@ -139,9 +142,10 @@ def _with_small_textures(shape: Shape) -> Shape:
 
 
 def small_texture(texture: Texture, edge_px: int) -> Texture:
-    """The texture with no edge above edge_px; JPEG where nothing is cut out of it, else PNG.
+    """The texture scaled to at most edge_px; JPEG if it is opaque, else PNG.
 
-    The same object where it is small enough. Pillow's errors are passed on for what is no picture.
+    Returns the same object if it is small enough. Pillow's errors are passed on for data that is not
+    a picture.
     """
     picture: Image.Image = Image.open(io.BytesIO(texture.data))
     if max(picture.size) <= edge_px:

@@ -12,7 +12,7 @@ from pbrs_farm.core.catalogue import Shape
 from pbrs_farm.core.house import Surface
 from pbrs_farm.core.mesh import face_areas, triangle_corners
 
-FINEST: Final = 1 / 500  # first cell that is tried, as a share of the longest side
+FINEST: Final = 1 / 500  # size of the first grid cell to try, as a share of the longest side
 _STEP: Final = 1.3
 _NORMAL_STEPS: Final = 2.0  # normals that round to the same multiple of 1/2 are one
 _UV_STEPS: Final = 16.0
@@ -20,10 +20,10 @@ _MIN_AREA_M2: Final = 1e-10
 
 
 def lighter_shape(shape: Shape, most: int, coarsest: float) -> Shape:
-    """The shape with at most `most` triangles where a fine grid can do it.
+    """Reduce a shape to at most `most` triangles by clustering vertices in a grid.
 
-    coarsest: the largest cell, as a part of the longest side. Its bounds stay; a shape that has
-    few enough comes back as it is, one that cannot be made so light as light as it gets.
+    coarsest: the largest cell, as a share of the longest side. The bounds are kept; a shape with few
+    enough triangles is returned unchanged, and one that needs a coarser grid as light as possible.
     """
     n_faces = sum(len(s.faces) for s in shape.surfaces)
     if n_faces <= most:
@@ -59,7 +59,7 @@ def _clustered(shape: Shape, cell: float) -> Shape:
     for surface in shape.surfaces:
         own = cluster[first : first + len(surface.positions)]
         first += len(surface.positions)
-        # What is smaller than a cell stays as it is: lights count surfaces by their place.
+        # Keep surfaces smaller than a cell: lights refer to surfaces by index.
         surfaces.append(_lighter_surface(surface, own, mean) or surface)
     return replace(shape, surfaces=tuple(surfaces))
 

@@ -1,7 +1,7 @@
-"""Folders of OBJ and GLB models -> pieces; a table or the folders' names say what they are.
+"""Read folders of OBJ and GLB models as pieces, classified by a table or by the folders' names.
 
-Thousands of models are indexed once: what was found lies in a store under the names, sizes and times
-of the folder's files. Effects: reads the models, to measure them; reads and writes the store.
+Thousands of models are indexed once: the index is stored under the names, sizes and times of the
+folder's files. Effects: reads the models to measure them; reads and writes the store.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ INDEX_VERSION: Final = 1  # raised when another piece is made of the same files
 _FIELDS: Final = ReadFields(max_model_triangles=MAX_TRIANGLES)
 _UNITS: Final = {0.01: "centimetres", 0.001: "millimetres", 0.0254: "inches"}
 _MAX_JSON_BYTES: Final = 64_000_000
-_MOST_NODES: Final = 20_000  # nodes of a model that are looked at for its bounds
+_MOST_NODES: Final = 20_000  # maximum nodes of a model to visit for its bounds
 _FAULTS: Final = (
     PbrsError, OSError, ValueError, KeyError, TypeError, IndexError, AttributeError, RecursionError,
 )  # fmt: skip
@@ -48,7 +48,7 @@ FolderPiece = tuple[Piece, "partial[Shape | None]"]
 
 @dataclass(frozen=True, slots=True)
 class _Indexed:
-    """A model that is a piece: what is stored of it."""
+    """Stored index entry of a model that is a piece."""
 
     file: str  # below the folder
     name: str
@@ -65,7 +65,7 @@ class _Indexed:
 def model_folder(
     path: Path, notes: LibraryNotes, store: Path | None = None
 ) -> tuple[str, tuple[FolderPiece, ...]]:
-    """(digest of all its files, the pieces) of a folder; a model that is refused becomes a note.
+    """(digest of all its files, the pieces) of a folder; a rejected model becomes a note.
 
     store: a folder to keep the index in. Raises BadInput for a folder without a model, or with more
     than MOST_MODELS.
@@ -140,7 +140,7 @@ def _find_rule_and_size(
     rule = _rule_by_words(name, row, category, size)
     if rule is not None and rule.fits("", size):
         return rule, size
-    # A model of another unit is a thing of a usual size in it.
+    # Scale a model of another unit to a usual size.
     if row.size is None:
         for unit, words in _UNITS.items():
             width, depth, height = size
@@ -165,7 +165,7 @@ def _rule_by_words(name: str, row: ModelRow, category: str, size: Size) -> Group
     if row.group:
         return group_rule(name, "", size, group=row.group)
     if row.label:
-        # A data set's category says more than the class that it stands for.
+        # A data set's category is more specific than the class derived from it.
         words = group_rule(name, "", size)
         if words is not None and (row.label not in NYU40_NAMES or _is_of(words, row.label)):
             return words
@@ -196,9 +196,9 @@ def _measure_model(model: ObjectModel) -> Size:
 
 
 def _bounds_of_glb(path: Path) -> Any:
-    """(2, 3) the box of a GLB by the bounds that it tells, without its meshes; None where that is not plain.
+    """(2, 3) box of a GLB from its accessors' bounds, without reading meshes; None if they do not suffice.
 
-    A node that is turned by no quarter makes the box of its box, which is larger than its mesh.
+    A node with an oblique rotation makes the box larger than its mesh.
     """
     with open_regular(path) as stream:
         head = stream.read(20)
@@ -233,7 +233,7 @@ def _bounds_of_glb(path: Path) -> Any:
 
 
 def _key_of_folder(path: Path, files: dict[str, Path]) -> str:
-    """Of the folder's name and its files' names, sizes and times: what is cheap to ask of thousands."""
+    """Cache key from the folder's name and its files' names, sizes and times, which are cheap to query."""
     digest = hashlib.sha256(f"{INDEX_VERSION} {path.name}\n".encode())
     for name, file in files.items():
         status = file.stat()
@@ -260,7 +260,7 @@ def _write_index(
 
 
 def _read_index(file: Path) -> tuple[str, tuple[_Indexed, ...], tuple[Note, ...]] | None:
-    """What _write_index wrote; None where there is nothing, or it is damaged."""
+    """Read the file of _write_index; None if it is missing or damaged."""
     try:
         row = json.loads(file.read_bytes())
         pieces = tuple(_Indexed(**{**one, "size": tuple(one["size"])}) for one in row["pieces"])
@@ -291,7 +291,7 @@ def _shape(model: ObjectModel, piece: Piece, quarters: int, notes: LibraryNotes)
 
 
 def _on_base(house: House, place: Place, quarters: int) -> Shape:
-    # A single object stands about the origin: turn it, lift it on its base, bring its back forward.
+    # Move a single object from the origin: turn it, lift it on its base, bring its back forward.
     item = house.items[0]
     turn = np.rint(rotation_y(quarters * np.pi / 2))
     low = np.min([(s.positions @ turn.T).min(0) for s in item.surfaces], 0)

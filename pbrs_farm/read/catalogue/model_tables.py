@@ -1,9 +1,9 @@
-"""What a table beside models says of them: catalogue.csv, 3D-FUTURE, HSSD, objathor. Effects: reads tables.
+"""Tables that describe models: catalogue.csv, 3D-FUTURE, HSSD, objathor. Effects: reads tables.
 
-`catalogue.csv` (or the only CSV of the folder that has a column `file`): file, and any of name,
+`catalogue.csv` (or the only CSV of the folder with a column `file`): file, and any of name,
 class (or group), size or width, depth, height (cm), front, creator, licence. `model_info.json` is
-3D-FUTURE's, `objects.csv` HSSD's, `annotations.json` (`.gz`) objathor's. A table of one of the three
-says which models are pieces; with catalogue.csv all models are.
+3D-FUTURE's, `objects.csv` HSSD's, `annotations.json` (`.gz`) objathor's. With one of these three
+only listed models are pieces; with catalogue.csv all models are.
 """
 
 from __future__ import annotations
@@ -39,10 +39,9 @@ _AXES: Final = {"+z": 0, "z": 0, "+x": 3, "x": 3, "-z": 2, "-x": 1}
 
 @dataclass(frozen=True, slots=True)
 class ModelRow:
-    """What a table says of a model; "" and None where it says nothing.
+    """A table's row for a model; missing fields are "" or None.
 
-    quarters: how often the model is turned by 90 degrees about the vertical until its front looks
-    to +z.
+    quarters: turns by 90 degrees about the vertical until the model's front faces +z.
     """
 
     name: str = ""
@@ -56,18 +55,17 @@ class ModelRow:
 
 @dataclass(frozen=True, slots=True)
 class ModelTable:
-    """A folder's table: what it says by file; is_whole: models that it does not name are no pieces."""
+    """A folder's table by file; is_whole: models without a row are not pieces."""
 
     rows: Mapping[str, ModelRow]
     is_whole: bool = False
 
 
 def model_table(path: Path, notes: LibraryNotes) -> ModelTable:
-    """The table of a folder of models, empty where there is none; what is wrong with it is a note.
+    """The table of a folder of models, empty if there is none; faults become notes.
 
-    Looked for in turn: our own table, 3D-FUTURE's, HSSD's, objathor's, and last a single CSV file
-    that names model files. Damage is a note, never an error: models are then classed by their
-    names.
+    Searched in turn: catalogue.csv, 3D-FUTURE's, HSSD's, objathor's, and last a single CSV file that
+    names model files. If the table is damaged, models are classified by their names.
     """
     for names, read in (
         ((TABLE,), _own),
@@ -202,7 +200,7 @@ def _hssd(path: Path, name: str, notes: LibraryNotes) -> ModelTable:
 
 
 def _front_of_config(file: Path) -> int:
-    """Turns from the front that a model's own configuration tells, in the model's axes; 0 where none does."""
+    """Quarter turns for the front given in a model's own configuration, in its axes; 0 if not given."""
     try:
         front = json.loads(read_regular(file, 1_000_000)).get("front")
         return _quarters(" ".join(map(str, front))) if isinstance(front, list) else 0

@@ -1,8 +1,7 @@
-"""What a piece of a library is, from its name, category and size: its group. Reads the tables beside it.
+"""Group of a library's piece, by name, category and size. Reads the tables beside it.
 
-groups.csv: what the words of a name stand for, and the sizes that a thing of the group has.
-exceptions.csv: pieces of the packages that were looked at and are something else, face another
-way, or stay out, each with its reason.
+groups.csv: words of names and the size range of each group. exceptions.csv: reviewed pieces of
+the packages that belong to another group, face another way, or are left out, each with its reason.
 """
 
 from __future__ import annotations
@@ -36,7 +35,7 @@ _OUTSIDE: Final = frozenset(
         "garden",
     ]
 )
-"""Categories of nothing that stands in a room."""
+"""Categories that are never inside a room."""
 _LONGEST_PHRASE: Final = 5  # words
 _LAMP: Final = "lamp"
 
@@ -55,7 +54,7 @@ class GroupRule:
 
     @property
     def kind(self) -> ItemKind:
-        """What an item of this group is to the pipeline."""
+        """Item kind of this group."""
         if self.place is Place.OPENING:
             return ItemKind.DOOR if self.group == "door" else ItemKind.WINDOW
         if self.group == "plant":
@@ -63,9 +62,9 @@ class GroupRule:
         return ItemKind.LAMP if NYU40_NAMES[self.nyu40] == _LAMP else ItemKind.OBJECT
 
     def fits(self, category: str, size: Size) -> bool:
-        """Whether a thing of that size in that category may be one of this group.
+        """True if an item of that size and category may belong to this group.
 
-        category: of the library, "" = unknown, which fits; size: width, depth, height in metres. On
+        category: of the library, "" = unknown, which always fits; size: width, depth, height in metres. On
         a wall the side is the larger of the width and the smaller of depth and height.
         """
         width, depth, height = size
@@ -77,7 +76,7 @@ class GroupRule:
 
 @dataclass(frozen=True, slots=True)
 class PieceVerdict:
-    """A piece that was looked at: its group ("" = left out), how it must be turned, and why."""
+    """Result of a review of a piece: its group ("" = left out), its rotation, and the reason."""
 
     group: str
     turn_deg: float
@@ -101,7 +100,7 @@ def group_rule(
         found = _rule_by_words(text, category, size)
         if found is not None:
             return found
-    # Ask the vocabulary of all languages for the class that the name stands for.
+    # Look up the name's class in the multilingual vocabulary.
     by_word = class_of_piece("", name).nyu40
     return _rule_by_words(NYU40_NAMES[by_word], category, size) if by_word else None
 
@@ -120,7 +119,7 @@ def group_rules() -> tuple[GroupRule, ...]:
 
 @cache
 def piece_verdicts() -> Mapping[str, PieceVerdict]:
-    """Piece id (`<library>#<id>`) -> what was seen of it: the rows of exceptions.csv."""
+    """Rows of exceptions.csv by piece id (`<library>#<id>`)."""
     return {
         r["id"]: PieceVerdict(r["group"], float(r["turn_deg"] or 0), r["reason"])
         for r in _rows_of_table("exceptions.csv")
@@ -165,7 +164,7 @@ def _rule_by_words(text: str, category: str, size: Size) -> GroupRule | None:
 
 
 def _phrases(words: list[str]) -> Iterator[str]:
-    # The whole name first; then what stands before an aside, its last words first.
+    # The whole name first; then the part before a preposition, its last words first.
     yield " ".join(words)
     aside = next((k for k, w in enumerate(words) if k and w in _ASIDE), len(words))
     for part in (words[:aside], words[aside:]):

@@ -13,9 +13,9 @@ _ENTRY: Final = re.compile(r"((?:\\.|[^\s\\:=])+)\s*[:=]?\s*(.*)", re.DOTALL)
 
 
 def parse_properties(data: bytes) -> dict[str, str]:
-    """Key -> value, later lines first; what is no entry is passed over.
+    """Parse a Java properties file; later lines first, malformed lines ignored.
 
-    Text is UTF-8 where it decodes, else Latin-1; a line that ends in a backslash goes on.
+    Text is UTF-8 if it decodes, else Latin-1; a line that ends in a backslash continues.
     """
     try:
         text = text_from_bytes(data)
@@ -54,7 +54,7 @@ def numbered_entries(properties: dict[str, str]) -> list[dict[str, str]]:
 
 
 def numbers(text: str) -> list[float]:
-    """The numbers of a value, parted by blanks; ValueError where a word is none."""
+    """The numbers in a value, separated by spaces; ValueError for any other word."""
     return [float(word) for word in text.split()]
 
 

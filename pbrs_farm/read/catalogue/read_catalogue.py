@@ -49,7 +49,7 @@ Loader = Callable[[], Shape | None]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Found:
-    """What a library or a folder holds."""
+    """Contents of a library or folder."""
 
     sha256: str
     pieces: tuple[tuple[Piece, Loader], ...] = ()
@@ -60,12 +60,12 @@ def catalogue_from(
     libraries: Sequence[Path], *, jar: Path | None = None, given: Sequence[Path] = (),
     store: Path | None = None, may_be_empty: bool = False,
 ) -> Catalogue:  # fmt: skip
-    """The catalogue of all libraries; an id that comes again goes to the later library.
+    """Merge libraries into a catalogue; for repeated ids the later library wins.
 
     libraries: .sh3f files of the packages. jar: the program's, with its own models. given: the
-    user's .sh3f and .sh3t libraries and folders of models. store: a folder to keep shapes in once
-    they are read. What is damaged becomes a note; BadInput for a path that does not exist or is
-    nothing of the kind, and for one of which nothing can be used, unless it may_be_empty.
+    user's .sh3f and .sh3t libraries and folders of models. store: a folder that caches shapes.
+    Damaged entries become notes; BadInput for a path that does not exist or is no library, and for a
+    library without any usable piece, unless may_be_empty.
     """
     notes = LibraryNotes()
     found = []
@@ -169,7 +169,7 @@ def _rule_of_entry(entry: Entry, group: str) -> GroupRule | None:
 def _piece_of_entry(
     library: Library, entry: Entry, rule: GroupRule, seen: PieceVerdict, notes: LibraryNotes
 ) -> tuple[Piece, Loader]:
-    # Turn the size with a piece that is turned a quarter.
+    # Swap width and depth of a piece turned by a quarter.
     width, depth, height = entry.piece.size
     is_across = round(seen.turn_deg / 90) % 2 == 1
     piece = Piece(

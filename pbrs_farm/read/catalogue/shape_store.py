@@ -1,4 +1,4 @@
-"""Shapes that were read before, kept on disk: parsing a model takes a hundred times as long. Effects: reads and writes its folder."""
+"""A disk cache of shapes, since parsing a model takes a hundred times as long. Effects: reads and writes its folder."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ FORMAT: Final = 1
 
 @dataclass(frozen=True, slots=True)
 class _Described:
-    # What of a shape is no array.
+    # Fields of a shape that are not arrays.
     names: tuple[str, ...]  # of the surfaces
     numbers: tuple[int, ...]  # of their materials
     materials: tuple[Material, ...]
@@ -42,10 +42,10 @@ class ShapeStore:
         self._folder = folder
 
     def shape(self, key: tuple[str | int, ...], make: Callable[[], Shape | None]) -> Shape | None:
-        """The shape that is stored under a key, else the one that `make` gives, which is then stored.
+        """The cached shape of a key; on a miss `make` is called and its result stored.
 
-        key: all that the shape follows from, versions included; equal keys are never made again. A model
-        that cannot be read is None and stored as such. A store that cannot be written costs time alone.
+        key: everything that determines the shape, including versions. None, for an unreadable model, is
+        stored too. If the store is not writable, results are correct but slow.
         """
         path = self._folder / f"{keys.digest(FORMAT, *key)}.npz"
         with suppress(OSError, ValueError, KeyError, zipfile.BadZipFile, EOFError):

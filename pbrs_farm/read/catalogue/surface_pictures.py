@@ -1,7 +1,7 @@
-"""Photographed surfaces of libraries: those that models of the packages wear, and texture libraries.
+"""Photographed surfaces of libraries: textures of the packages' models, and texture libraries.
 
-surface-pictures.csv: pictures that were looked at, each without a seam, and how large one repeat
-is. Grain runs along u. Effects: reads the libraries.
+surface-pictures.csv: reviewed seamless pictures with the size of one repeat. Grain runs along u.
+Effects: reads the libraries.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ from pbrs_farm.regular_files import read_regular
 
 TEXTURES: Final = "PluginTexturesCatalog.properties"
 JAR_TEXTURES: Final = "com/eteks/sweethome3d/io/DefaultTexturesCatalog.properties"
-MOST_OF_A_GROUP: Final = 24  # pictures that are kept of a library
+MOST_OF_A_GROUP: Final = 24  # maximum pictures of a group per library
 _EDGE_PX: Final = 1024
 _GROUPS: Final = (
     ("tiles", "tile ceramic mosaic porcelain terracotta"),
@@ -57,8 +57,8 @@ _GROUPS: Final = (
     ("planks", "parquet plank floorboard floorboards laminate floor flooring"),
     ("wood", "wood wooden oak pine beech walnut ash maple cherry teak"),
 )
-"""What a picture shows, by whole words of its name and category; the first that fits."""
-_PLACES: Final = ("floor", "wall", "sky")  # categories that say nothing of what it is
+"""Surface group by whole words of name and category; the first match wins."""
+_PLACES: Final = ("floor", "wall", "sky")  # categories that do not describe the surface
 MOST_PICTURES: Final = 200  # of one folder; the rest, by name, is left out
 _SUFFIXES: Final = (".jpg", ".jpeg", ".png")
 _PHOTOGRAPH_EDGE_PX: Final = 800
@@ -91,10 +91,10 @@ def pictures_of_models(
 def texture_library(
     path: Path, notes: LibraryNotes, catalogue: str = TEXTURES
 ) -> tuple[str, tuple[Picture, ...]] | None:
-    """(sha256, pictures) of a .sh3t; None, with a note, where it is damaged.
+    """(sha256, pictures) of a .sh3t; None, with a note, if it is damaged.
 
-    At most MOST_OF_A_GROUP pictures of a kind are kept, in the library's order. What is no
-    picture, or of no known kind, becomes a note or is passed over. BadInput: no such file.
+    At most MOST_OF_A_GROUP pictures of a kind are kept, in the library's order. Undecodable pictures
+    become notes; unknown kinds are ignored. BadInput: no such file.
     """
     opened = opened_library(path, catalogue, notes)
     if opened is None:
@@ -120,10 +120,9 @@ def _pictures_of_library(
 
 
 def surface_group(name: str, category: str) -> str:
-    """What a surface is of, by whole words of its name, then of its category; "" = unknown.
+    """Group of a surface, by whole words of its name, then of its category; "" = unknown.
 
-    English words, singular or plural. A category that is a place (as "kitchen") says nothing of the
-    surface.
+    English words, singular or plural. A category that is a place (as "kitchen") is not conclusive.
     """
     for text in (name, category if plain(category) not in _PLACES else ""):
         words = set(plain(text).replace("-", " ").replace("_", " ").split())
@@ -188,7 +187,7 @@ def _seen_pictures() -> dict[str, list[_Seen]]:
 def picture_folder(path: Path, notes: LibraryNotes) -> tuple[str, tuple[Picture, ...]]:
     """(digest, pictures of the group `prints`) of the JPEG and PNG files below a folder, by name.
 
-    Turned as their camera noted. What is no picture becomes a note.
+    EXIF orientation is applied. Undecodable files become notes.
     """
     digest, found = hashlib.sha256(), []
     files = sorted(p for p in path.rglob("*") if p.suffix.lower() in _SUFFIXES)

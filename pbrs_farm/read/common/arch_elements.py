@@ -30,10 +30,10 @@ from pbrs_farm.read.common.placed_mesh import placed
 from pbrs_farm.read.mesh.mtl import ObjMaterial
 from pbrs_farm.read.mesh.obj import Mesh
 
-# Thickness where an element tells none.
+# Default wall thickness.
 WALL_DEPTH_M: Final = 0.10
 SLAB_DEPTH_M: Final = 0.05
-_EDGE: Final = ObjMaterial("edge", (0.50196, 0.50196, 0.50196))  # sRGB 128: no element tells it
+_EDGE: Final = ObjMaterial("edge", (0.50196, 0.50196, 0.50196))  # sRGB 128; not given in files
 KIND_OF_ELEMENT: Final = {
     "Floor": ItemKind.FLOOR,
     "Ceiling": ItemKind.CEILING,
@@ -54,7 +54,7 @@ class Element:
     depth_m: float  # thickness
     height_m: float = 0.0  # of a wall
     holes: tuple[tuple[float, float, float, float], ...] = ()  # (H, 4): from, up from, to, up to
-    hole_types: tuple[str, ...] = ()  # as written, "" where a hole tells none
+    hole_types: tuple[str, ...] = ()  # as written, "" if a hole has no type
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -115,8 +115,8 @@ class _Slab(_Common):
 def element_of(file: str, raw: Any, place: str, defaults: Any) -> Element | None:
     """A wall, floor, ceiling or ground of an arch.json, in the file's own axes and units of metres.
 
-    raw: the entry. place: for messages. defaults: the file's, by kind, for what the entry lacks. None for a
-    kind that is not known. Raises BadHouse naming the value that is wrong.
+    raw: the entry. place: for messages. defaults: the file's, by kind, for missing fields. None for an
+    unknown kind. Raises BadHouse, naming the invalid value.
     """
     raw = checked(dict, raw, file, place, error=BadHouse)
     kind = raw.get("type")
@@ -196,7 +196,7 @@ def slab_surfaces(arch: Arch, e: Element, materials: ModelMaterials) -> tuple[Su
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WallFrame:
-    """Where a wall stands: its start, and (3, 3) unit columns along, up, outward; its length."""
+    """Frame of a wall: its start, (3, 3) unit columns along, up, outward, and its length."""
 
     start: F64
     axes: F64

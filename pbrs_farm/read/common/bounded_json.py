@@ -16,7 +16,7 @@ _MOST_VALUES: Final = 24_000_000
 
 
 def bounded_json(data: bytes, file: str) -> Any:
-    """The JSON value; BadHouse for text that is none or holds more than a house does.
+    """Parse JSON; BadHouse for invalid text or more values than any house has.
 
     Counts brackets and commas before parsing, so that a small file cannot fill the memory with
     objects. file: for messages.

@@ -13,7 +13,7 @@ from pbrs_farm.read.common.given_classes import LEFT_OUT, class_by_words, given_
 
 _FURNITURE: Final = ("object", "lamp", "plant", "stairs", "person")
 _ON_FIXTURES: Final = frozenset({"faucet", "tap"})
-"""What sinks and tubs have of their own."""
+"""Parts that the stand-ins of sinks and tubs already include."""
 LARGEST_M: Final = 15.0
 
 
@@ -29,11 +29,13 @@ def box_only_item(
     level_id: str = "0",
     room_id: str | None = None,
 ) -> Item | None:
-    """An item without surfaces for a thing of known class and box; None where its name means nothing that is drawn, or
-    its box is none: not finite, without a size, larger than any furniture.
+    """An item without surfaces for a known class and box.
 
-    vocabulary: whose word the name is (given_classes.csv). centre: of the box, metres, world. size:
-    width, height, depth. turn_rad: about +y; at 0 the front looks to +z.
+    Returns None if the name's class is not drawn, or the box is invalid: not finite, without a size,
+    larger than any furniture.
+
+    vocabulary: the data set of the name (given_classes.csv). centre: of the box, metres, world. size:
+    width, height, depth. turn_rad: about +y; at 0 the front faces +z.
     """
     if words_of(_spoken(name)) & _ON_FIXTURES:
         return None
@@ -59,5 +61,5 @@ def box_only_item(
 
 
 def _spoken(name: str) -> str:
-    """TVStand, tv_stand -> TV Stand, tv stand: words that the vocabulary of pieces knows."""
+    """Split identifiers into words of the vocabulary: TVStand, tv_stand -> TV Stand, tv stand."""
     return parted(name).replace("_", " ").replace("-", " ").strip()

@@ -1,7 +1,7 @@
-"""Doors and windows of sources that have holes alone: a leaf or a pane for each hole; no effects.
+"""Doors and windows for sources that only have holes: a leaf or a pane for each hole; no effects.
 
-What stands in a hole is built to its size, in the middle of the wall: a frame that lines the hole,
-leaves with handles, or a sash with panes.
+The model is built to the hole's size, centred in the wall: a frame as lining, leaves with handles,
+or a sash with panes.
 """
 
 from __future__ import annotations
@@ -41,10 +41,10 @@ _Boxes = dict[str, list[tuple[tuple[float, float, float], tuple[float, float, fl
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Hole:
-    """A hole of a wall and what stands in it.
+    """A hole in a wall and the style of its door or window.
 
-    axes: (3, 3) unit columns along the wall, up, across it, right-handed. A viewer who looks along
-    -z of them has x to the right: a hinge is right where it lies at +x.
+    axes: (3, 3) unit columns along the wall, up, across it, right-handed. For a viewer looking along
+    -z, x is to the right: a hinge is right if it is at +x.
     """
 
     id: str
@@ -62,7 +62,7 @@ class Hole:
 def opening_of(hole: Hole, level_id: str, *, is_cut: bool = False) -> Opening:
     """The opening that repair cuts for a hole, through all walls within the hole's depth.
 
-    is_cut: whether the walls have the hole already. Its quad lies in the wall's middle plane.
+    is_cut: whether the walls have the hole already. Its quad is in the wall's centre plane.
     """
     half = np.array(hole.size) / 2
     corners = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0.0]])
@@ -81,9 +81,9 @@ def opening_of(hole: Hole, level_id: str, *, is_cut: bool = False) -> Opening:
 def fill_hole(
     hole: Hole, library: MaterialLibrary, level_id: str, room_id: str | None
 ) -> Item | None:
-    """The door or window that stands in a hole, built to its size; None for one that stays open.
+    """Build the door or window for a hole; None if the hole stays open.
 
-    library: where its materials go. The item is tagged `made`, as nobody drew it.
+    library: receives its materials. The item is tagged `made`, as it is not in the source.
     """
     if hole.kind == "open":
         return None
@@ -131,7 +131,7 @@ def _door(hole: Hole) -> _Boxes:
         n = 2
     edges = np.linspace(left, right, n + 1)
     for k in range(n):
-        # Sliding leaves run in two tracks and overlap a little; the others stand in one plane.
+        # Sliding leaves run in two tracks and overlap slightly; others share one plane.
         slides = hole.style == "sliding"
         track = (0.5 - k % 2) * (_LEAF_M + 0.004) if slides else 0.0
         lap = 0.03 if slides else -0.0015

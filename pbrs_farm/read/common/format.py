@@ -1,4 +1,4 @@
-"""The entry of a format that is read: what `FORMAT` of its package, or of a plugin, is. No effects."""
+"""Description of an input format: the entry `FORMAT` of its package or of a plugin. No effects."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.read.common.source_files import SourceFiles
 
 PLAN: Final = "plan"
-"""The kind of sources that are floor plans, of whatever format."""
+"""Kind of all floor-plan sources, in any format."""
 
 
 class GivenFile(NamedTuple):
-    """A file to read, or the folder of a format that has one a home, and what was said of it."""
+    """A file to read, or the folder of a format with one folder per home, and its options."""
 
     path: Path
     models: str = ""  # folder of the models that the file names, "" = where its format keeps them
-    part: str = ""  # what is meant of a plan's file; "" = the whole file
+    part: str = ""  # selected part of a plan's file; "" = the whole file
 
 
 def no_companions(_given: GivenFile, _files: SourceFiles) -> str:
@@ -48,9 +48,9 @@ class Format(DataFormat):
     read: Callable[[GivenFile, ReadFields], House]
     """The house, placed in the world: metres, y up. Raises BadHouse naming file and place."""
     companions: Callable[[GivenFile, SourceFiles], str] = no_companions
-    """Digest of every other file that reading opens, "" where there is none. Never raises."""
+    """Digest of all other files that the reader opens, "" if there are none. Never raises."""
     main_file: str = ""  # that makes a folder a home; its id is then the folder's name
     has_parts: bool = False  # FILE#part names a part of the file
-    has_box_only_items: bool = False  # it may have things by class and box alone, without a mesh
+    has_box_only_items: bool = False  # may have items with only class and box, without a mesh
     travels: bool = True  # a file that has no companions goes to the store of a farm
     uses_packages: bool = False  # its companions are Debian packages, which go there by themselves

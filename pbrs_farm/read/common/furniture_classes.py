@@ -25,13 +25,13 @@ _PRIMITIVES: Final = frozenset(
     {"eTeks#texturableBox", "eTeks#texturableCylinder", "eTeks#texturableTriangle"}
 )
 _PRIMITIVE_NAMES: Final = frozenset({"box", "cylinder", "triangle", ""})
-# What follows these words describes the thing; the thing itself is named before them.
+# Words after these describe the item; its noun comes before them.
 _ASIDES: Final = """with and on of for from under without in mit und auf fur von aus ohne avec et
     sur de du des pour en con para del della di da do dos sem sin senza per met voor van op для w
     two three four five six"""
 _ASIDE: Final = frozenset(_ASIDES.split())
-_MODIFIERS: Final = frozenset({"wall", "kitchen"})  # say where an unknown thing stands
-_HEAD_FIRST: Final = frozenset({"fr", "es", "it", "pt"})  # languages that name the thing first
+_MODIFIERS: Final = frozenset({"wall", "kitchen"})  # give the place of an unknown item
+_HEAD_FIRST: Final = frozenset({"fr", "es", "it", "pt"})  # languages with the noun first
 _LONGEST_PHRASE: Final = 4  # words
 
 # "Light" before these is a shade: light oak, light grey.
@@ -42,7 +42,7 @@ _TINTS: Final = frozenset(_TINT_WORDS.split())
 _MATERIAL_WORDS: Final = """fabric gold grain laminate lumber parquet pattern plank planks plywood texture timber veneer
     wallpaper wood wooden"""
 _OF_MATERIALS: Final = frozenset(_MATERIAL_WORDS.split())
-# "Bed room", "girl bedroom": a place, not the thing or the person.
+# "Bed room", "girl bedroom": a place, not the bed or the person.
 _THINGS_OF_ROOMS: Final = (
     "bath bed box closet computer game laundry locker plant shower storage toilet tv"
 )
@@ -56,8 +56,8 @@ PERSON_WORD: Final = "person"
 PLANT_WORD: Final = "plant"
 _STAIRS: Final = "stairs"
 
-# Least and largest longer horizontal side, least and largest height, in metres: what is smaller or
-# larger is a toy, a tray, a heap or a mistake. A side of 0 is no bound.
+# Minimum and maximum of the longer horizontal side and of the height, in metres: items outside this
+# range are toys, trays, heaps or mistakes. A side of 0 is unbounded.
 _SIZES: Final[Mapping[str, tuple[float, float, float, float]]] = {
     "bathtub": (0.7, 6, 0.1, 1.8),
     "bed": (0.5, 5, 0.05, 3.2),
@@ -84,18 +84,19 @@ _SIZES: Final[Mapping[str, tuple[float, float, float, float]]] = {
     "toilet": (0.15, 1.4, 0.1, 2),
     "window": (0.1, 15, 0.1, 10),
 }
-# What stands on floors must be twice the least size where its bottom is at the height of a table
-# or a shelf: a doll's bed.
+# Floor furniture at the height of a table or shelf must have twice the minimum size: otherwise it
+# is
+# a doll's bed.
 _RAISED_M: Final = (0.6, 1.8)  # above the floor of the level
-_LEAST_LAWN_M: Final = 1.0  # shorter side of grass that is ground
-_FLATTEST_PLANT: Final = 0.1  # height over shorter side: what is flatter covers the ground
+_LEAST_LAWN_M: Final = 1.0  # minimum shorter side of a lawn, metres
+_FLATTEST_PLANT: Final = 0.1  # minimum height over shorter side; flatter plants cover the ground
 _SLIMMEST_CROWN: Final = 0.25  # of the longer side
 _STANDING: Final = frozenset({"bathtub", "bed", "chair", "desk", "sofa", "table", "toilet"})
 
 
 @dataclass(frozen=True, slots=True)
 class PieceSize:
-    """How large a piece is and how high it stands, in metres."""
+    """Size of a piece and height of its base, in metres."""
 
     width: float
     height: float
@@ -105,12 +106,12 @@ class PieceSize:
 
 @dataclass(frozen=True, slots=True)
 class _Candidate:
-    """A class or kind that a word of a name stands for."""
+    """A class or kind suggested by a word of a name."""
 
     label: str
     is_noun: bool  # whether the word says what the whole name means
     phrase: str = ""
-    is_first: bool = False  # the first word, in a language that names the thing first
+    is_first: bool = False  # the first word, in a language with the noun first
 
 
 class _Describing(NamedTuple):
@@ -123,10 +124,10 @@ class _Describing(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class PieceClass:
-    """What a piece of furniture is, and why.
+    """Class of a piece of furniture, and the rule that decided it.
 
     rule: catalogue, name (its last noun), inner-word (another word of the name), group, id; size =
-    the words' class does not fit the piece's size or place; none = no word is known.
+    the words' class does not fit the piece's size or place; none = no known word.
     """
 
     nyu40: int | None  # None = no class
@@ -155,7 +156,7 @@ def _classes_of_catalogue_ids() -> Mapping[str, int]:
 
 @cache
 def _vocabulary() -> Mapping[str, tuple[str, bool]]:
-    # Phrase -> class or kind, and whether its language names the thing first.
+    # Phrase -> class or kind, and whether its language has the noun first.
     # A phrase with "-" before it also ends compound words ("-tisch": Esstisch).
     return {
         plain(phrase): (r["class"], r["language"] in _HEAD_FIRST)
@@ -180,13 +181,13 @@ def plain(text: str) -> str:
     return folded(parted(text))
 
 
-_LONGEST_NAME: Final = 500  # letters that are looked at
+_LONGEST_NAME: Final = 500  # maximum letters of a name to analyse
 
 
 def _words_in_order(name: str) -> list[str]:
-    """Words and numbers that stand alone; a number in a word ("chair01") means nothing.
+    """Words and separate numbers; numbers inside words ("chair01") are dropped.
 
-    What only says where a thing stands ("bed room") is left out.
+    Words for the item's place ("bed room") are dropped too.
     """
     words = re.findall(r"(?<![^\W_])\d+|[^\W\d_]+", plain(name))
     of_rooms = {
@@ -201,8 +202,9 @@ def _candidates(name: str) -> tuple[_Candidate, ...]:
 
 
 def _found_candidates(name: str) -> Iterator[_Candidate]:
-    # The classes or kinds that the words of a name stand for, likeliest first. Words before an
-    # aside go first ("lamp with table" is a lamp), and a number that stands alone begins one.
+    # Classes or kinds for the words of a name, likeliest first. Words before a preposition come
+    # first
+    # ("lamp with table" is a lamp), and a separate number begins a new part.
     words = _words_in_order(name)
     aside = next((k for k, w in enumerate(words) if k and (w in _ASIDE or w.isdigit())), len(words))
     # A phrase from the first word may hold an aside: "table de nuit".
@@ -217,7 +219,7 @@ def _found_candidates(name: str) -> Iterator[_Candidate]:
 def _from_the_noun(words: list[str], *, is_head: bool) -> Iterator[_Candidate]:
     found: list[_Candidate] = []
     k = len(words)
-    # The last known word says what the thing is; more words go before one.
+    # The last known word is the noun; phrases of several words take precedence.
     while k > 0:
         for n in range(min(_LONGEST_PHRASE, k), 0, -1):
             phrase = " ".join(words[k - n : k])
@@ -229,13 +231,13 @@ def _from_the_noun(words: list[str], *, is_head: bool) -> Iterator[_Candidate]:
                 k -= n - 1
                 break
         k -= 1
-    # What the last word only describes goes before it: "table leg", "cabinet door glass".
+    # A word described by the last word precedes it: "table leg", "cabinet door glass".
     noun = 0
     for k in range(1, len(found)):
         noun = k if _describes(found[noun], found[k]) else noun
     if noun:
         found.insert(0, replace(found.pop(noun), is_noun=found[0].is_noun))
-    # A language that names the thing first goes by its first word.
+    # Languages with the noun first use the first word.
     yield from sorted(found, key=lambda c: not c.is_first)
 
 
@@ -279,13 +281,13 @@ def _class_of_phrase(phrase: str) -> tuple[str, bool] | None:
 
 
 def is_a_cover_of_ground(width: float, height: float, depth: float) -> bool:
-    """Whether a thing whose name is a plant's lies as grass does: wide and flat, metres."""
+    """True if a plant's size is that of ground cover: wide and flat, metres."""
     side = min(width, depth)
     return side >= _LEAST_LAWN_M and height <= _FLATTEST_PLANT * side
 
 
 def stands_as_a_tree(width: float, height: float, depth: float) -> bool:
-    """Whether a thing called by a wood's name, as Pine, has a stem or a crown; metres."""
+    """True if an item named after a wood, such as Pine, has the size of a tree; metres."""
     across, along = sorted((width, depth))
     return height > along and across > _SLIMMEST_CROWN * along
 
@@ -329,10 +331,10 @@ def _by_words(name: str, place: PieceSize | None, rule: str) -> PieceClass:
 def class_of_piece(
     catalogue_id: str, name: str, group: str = "", place: PieceSize | None = None
 ) -> PieceClass:
-    """The class by catalogue id, else by whole words of the name, of the group, of the id.
+    """Class by catalogue id, else by whole words of the name, of the group, of the id.
 
-    A bare box, cylinder or triangle is what its name says, else its group's: people build with
-    them. Every class must fit the place, where it is given; a table 5 cm high is none.
+    A bare box, cylinder or triangle is classified by name, else by group: people build furniture from
+    them. The class must fit the place, if given; a table 5 cm high is rejected.
     """
     known = _classes_of_catalogue_ids().get(catalogue_id)
     inner = catalogue_id.partition("#")[2]
@@ -365,9 +367,9 @@ def nyu40_of(catalogue_id: str, name: str, group: str = "") -> int | None:
 
 
 def kind_of(piece: PieceClass, nyu40: int, *, is_opening: bool, is_light: bool) -> ItemKind:
-    """What the piece is to the pipeline: the source's own element first, then class, then words.
+    """Item kind of a piece: by the source's own element first, then class, then words.
 
-    nyu40: the class the item gets, which the source's element may have decided.
+    nyu40: the item's final class, which the source's element may have decided.
     """
     if is_opening:
         return ItemKind.WINDOW if nyu40 == WINDOW else ItemKind.DOOR

@@ -1,7 +1,7 @@
-"""What the vocabularies of other formats call a thing -> class and kind; no effects.
+"""Class and kind for names of other data sets' vocabularies; no effects.
 
-given_classes.csv, beside this file, has a row a name: source (3dfuture, ai2thor, roomplan, ...),
-name, kind, NYU40 class. A name that it lacks goes by the words of furniture_classes.
+given_classes.csv, beside this file, has one row per name: source (3dfuture, ai2thor, roomplan, ...),
+name, kind, NYU40 class. Other names are classified by furniture_classes.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ REVEAL: Final = "opening-reveal"
 
 
 class GivenClass(NamedTuple):
-    """What a name means.
+    """Meaning of a name.
 
     kind: an ItemKind's value, "opening-reveal" (the jambs of a hole) or "none" (not drawn).
-    nyu40: -1 where the words of the thing's name decide.
+    nyu40: -1 if the words of the item's name decide.
     """
 
     kind: str
@@ -36,10 +36,10 @@ class GivenClass(NamedTuple):
 
 
 def given_class(source: str, name: str) -> GivenClass | None:
-    """The class that a data set's own name means (given_classes.csv); None where the table has no row.
+    """Class of a data set's name (given_classes.csv); None if the table has no row.
 
-    source: the vocabulary, such as `3dfuture`, `hssd`, `ifc`. name: in any case. A class of -1 says that
-    the words of the thing's name decide.
+    source: the vocabulary, such as `3dfuture`, `hssd`, `ifc`. name: in any case. A class of -1 means
+    that the words of the item's name decide.
     """
     return _classes_by_name().get((source, _key_of_name(name)))
 

@@ -1,4 +1,4 @@
-"""A house while a reader puts it together: rooms into levels, items, what stands in holes, limits. No effects."""
+"""A house under construction by a reader: levels from rooms, items, doors and windows, limits. No effects."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ from pbrs_farm.read.common.rooms import level_of, levels_of, room_at
 
 @dataclass(slots=True)
 class HouseBuilder:
-    """Collects a house's rooms, items and openings; `house` checks the limits and closes it.
+    """Collects a house's rooms, items and openings; `house` checks the limits and completes it.
 
     A reader calls `set_rooms` first: items and holes are sorted into the levels and rooms that it
-    numbers. State: what was added so far.
+    numbers. State: the parts added so far.
 
         builder = HouseBuilder(path.name, fields, notes, library)
         id_of_room = builder.set_rooms(rooms)
@@ -79,9 +79,9 @@ class HouseBuilder:
     def house(
         self, stem: str, source: Source, *, name: str = "", openings: Iterable[Opening] = ()
     ) -> House:
-        """The House of what was added. stem: of its file's name, which begins its id.
+        """The completed House. stem: of its file's name, with which its id begins.
 
-        Raises BadHouse for more triangles or items than are read, and for what lies too far away.
+        Raises BadHouse for too many triangles or items, and for coordinates too far away.
         """
         self._check_limits()
         return House(

@@ -23,7 +23,7 @@ from pbrs_farm.core.checked_json import Finite, exactly
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.frames import is_flattening
 
-# What a model or a texture may be called; a file name that stays in its folder.
+# Valid names of models and textures: file names that stay in their folder.
 NAME: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.\-]{0,99}")
 
 _COLOUR: Final = re.compile(r"#[0-9a-fA-F]{6}")
@@ -65,13 +65,13 @@ Lenient: Final = BeforeValidator(lambda value: value if isinstance(value, list) 
 
 
 class Given(BaseModel):
-    """What an object of SUNCG's JSON says; what else it holds is passed over."""
+    """An object of SUNCG's JSON; unknown fields are ignored."""
 
     model_config = ConfigDict(frozen=True)
 
 
 class Override(Given):
-    """What a node says of the model's material at the same position; None = keep the model's."""
+    """A node's override of the model's material at the same index; None = keep the model's."""
 
     name: Label = ""
     texture: FileName | None = None

@@ -1,4 +1,4 @@
-"""What glTF, USD and MTL can say of a surface and its pictures, and what becomes of each: one table.
+"""Table of the material fields of glTF, USD and MTL, and how each is read.
 
 `python -m pbrs_farm.read.common.material_fields` prints the rows of docs/houses/surfaces.md. Effect: reads the table.
 """
@@ -17,7 +17,7 @@ class MaterialField(NamedTuple):
 
     format: str  # "glTF", "USD", "MTL"
     field: str  # names as the format has them, parted by "; "
-    use: str  # "read"; "note" where it is there and not read; "-": nothing that is seen is lost
+    use: str  # "read"; "note" if it is reported but not read; "-": without visible effect
     text: str
 
 

@@ -23,7 +23,7 @@ PANE_OPACITY: Final = 0.2  # opacity of panes and glass that the source calls op
 
 
 class AlphaRange(NamedTuple):
-    """What a picture's alpha holds, 0..1: the least, the most and the mean of its texels."""
+    """Minimum, maximum and mean of a picture's alpha, 0..1."""
 
     least: float
     most: float
@@ -155,11 +155,7 @@ class MaterialLibrary:
 
     @property
     def textures(self) -> dict[str, Texture]:
-        """Every texture a material names, by id.
-
-        A texture that was loaded and that no material uses is left out. Keys are those of
-        Material.texture_id.
-        """
+        """Textures used by a material, by id; unused loaded textures are left out."""
         used = {name for m in self._materials for name in m.texture_ids}
         found = (loaded.texture for loaded in self._loaded.values() if loaded is not None)
         return {t.id: t for t in found if t.id in used}
@@ -167,7 +163,7 @@ class MaterialLibrary:
     def index(self, material: Material) -> int:
         """The material's index in the house, the same for equal materials.
 
-        Only materials that are indexed become part of the house, and with them their textures.
+        Only indexed materials, with their textures, become part of the house.
         """
         return self._materials.setdefault(material, len(self._materials))
 
@@ -185,10 +181,10 @@ class MaterialLibrary:
     def texture(
         self, key: str, *, name: str, place: str, load: Callable[[], bytes | None]
     ) -> LoadedTexture | None:
-        """The texture of a picture; None, with a note, where there is none or it cannot be decoded.
+        """Load the texture of a picture; None, with a note, if it is missing or cannot be decoded.
 
-        key: what tells pictures apart, such as a path; each is loaded once. name: of the texture. place: for
-        notes. load: gives the file's bytes, None for a missing file.
+        key: identity of the picture, such as a path; each is loaded once. name: of the texture. place: for
+        notes. load: returns the file's bytes, None for a missing file.
         """
         if key not in self._loaded:
             self._loaded[key] = self._load(key, name, place, load)

@@ -88,7 +88,7 @@ class ModelMaterials:
         return png if self._folder.path(png) is not None else f"texture/{name}.jpg"
 
     def _texture(self, name: str, opacity: str, place: str) -> LoadedTexture | None:
-        """The picture of the colour ("" = none), with the alpha of the opacity's where that is another."""
+        """The colour picture ("" = none), with the alpha of the opacity picture if that is another one."""
         if opacity and opacity != name:
             mask = self._picture(opacity)
             if mask is not None:

@@ -1,4 +1,4 @@
-"""What the name of a node, a product or a material says that it is: structure, an opening, a lamp, a piece. No effects."""
+"""Class from the name of a node, product or material: structure, opening, lamp or piece. No effects."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ _LEAST_STRUCTURE_M: Final = 0.2  # a tile of a floor is as large
 _ROOMS_AND_CABINETS: Final = frozenset({"closet", "kitchen", "kitchenette", "pantry", "storage"})
 _REVIT_NAME: Final = re.compile(r'^M_|:.*:\d+$|[ "-].*:|:.*[ "-]')
 UNMAPPED: Final = "unmapped"
-"""Tag of an item of which nothing says what it is."""
+"""Tag of an item without any known class."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,23 +63,23 @@ class NodeClass:
 def class_of_node_name(
     name: str, *, materials: Sequence[str] = (), size: PieceSize | None = None
 ) -> NodeClass | None:
-    """What a node's, a product's or a material's name says that it is; None where it says nothing.
+    """Class from a node's, a product's or a material's name; None if the name has no known word.
 
-    The words of pieces go before those of structure, so that a wall lamp is a lamp; names are in the
-    languages of words.csv.
+    Words for pieces take precedence over those for structure, so that a wall lamp is a lamp; names
+    are in the languages of words.csv.
 
-    materials: of what the node shows; exporters write them behind its own name ("Sink_Chrome_0").
-    size: of what it shows, where known: between the words of a name the size decides, and a person
-    or a plant that its size refuses is none.
+    materials: of the node; exporters append them to its name ("Sink_Chrome_0").
+    size: of the node, if known: decides between words of a name, and rejects persons and plants of
+    the wrong size.
     """
     said = (_class_of_words(text, size) for text in _likely_names(name, materials))
     return next((seen for seen in said if seen is not None), None)
 
 
 def _likely_names(name: str, materials: Sequence[str]) -> Iterator[str]:
-    """What of a name may say what the thing is, the likeliest first; the whole comes last."""
+    """Parts of a name that may be the item's noun, the likeliest first; the whole name comes last."""
     own = _without_material(name, materials)
-    # "Kitchen_Sink_0": all of a room that is drawn in the material Sink.
+    # "Kitchen_Sink_0": all parts of a room with the material Sink.
     if own != name and own.lower() not in _ROOMS_AND_CABINETS:
         yield own
     # Revit: "M_Table-Coffee:0610 x 0610mm:143210", family, type and id; a maker follows a dash.
@@ -130,7 +130,7 @@ def _class_of_words(name: str, size: PieceSize | None) -> NodeClass | None:
         return NodeClass(FLOOR, ItemKind.GROUND, is_tagged=False) if is_ground else None
     if nyu40 is None:
         return None
-    # A name tells openings and lamps only by their class.
+    # For names, openings and lamps follow from the class alone.
     is_opening = nyu40 in (DOOR, WINDOW)
     kind = kind_of(piece, nyu40, is_opening=is_opening, is_light=nyu40 == LAMP)
     return NodeClass(nyu40, kind, is_tagged=False)

@@ -15,12 +15,12 @@ HARMLESS: Final = frozenset(
         "hidden-level",  # left out as the home's author chose, or read though it was hidden
         "degenerate-faces",  # faces without area, which nobody could see
         "unknown-material",  # the surface has its format's default colour
-        "unknown-type",  # a node that is no room, object, box or ground
+        "unknown-type",  # a node that is not a room, object, box or ground
         "wholly-cut-out",  # a surface whose alpha is below its cutoff everywhere: nobody sees it
         "unread-map",  # a bump, gloss or such picture of an MTL: its colour is there
         "unused-opacity-map",  # the colour map's own alpha is used
-        "door-leaf-left-out",  # of a door that was asked to stand open
-        "door-without-hinge",  # the same: it stays as it is drawn
+        "door-leaf-left-out",  # of a door requested open
+        "door-without-hinge",  # the same: it stays as drawn
         "package-version",  # of the example homes, another than the tested one
     }
 )
@@ -38,10 +38,10 @@ class Notes:
         self._notes: dict[Note, None] = {}  # in the order they first came up
 
     def add(self, kind: str, place: str, text: str) -> None:
-        """Remember a fault of the source, at most once; raise it as BadHouse when reading is strict.
+        """Record a fault of the source, at most once; raise it as BadHouse if reading is strict.
 
-        kind: a word of docs/houses/notes.md; what is in HARMLESS is never raised. place: where in the file, as
-        a reader finds it there: `nodes[3] (Sofa)`, `line 12`. text: what was left out or guessed.
+        kind: a word of docs/houses/notes.md; kinds in HARMLESS are never raised. place: where in the file, as
+        a reader finds it there: `nodes[3] (Sofa)`, `line 12`. text: the omission or assumption.
         """
         if self._strict and kind not in HARMLESS:
             raise BadHouse(self.file, place, f"{text} ({kind})", hint="read without --strict")
@@ -53,8 +53,5 @@ class Notes:
         return tuple(self._notes)
 
     def count(self, kind: str) -> int:
-        """How many notes are of a kind.
-
-        A note that came up twice at one place counts once.
-        """
+        """Number of notes of a kind; a note repeated at one place counts once."""
         return sum(note.kind == kind for note in self._notes)

@@ -1,7 +1,7 @@
-"""Openings of doors and windows: of holes that the source tells, else found in the walls' meshes; no effects.
+"""Openings of doors and windows: from the source's holes, else detected in the walls' meshes; no effects.
 
-Where the wall is cut already, as SUNCG's are (docs/spec/suncg.md section 1.5), the quad is the hole itself and
-the cutter its plug, of the wall's thickness. In a wall without a hole they have the door's or window's size.
+If the wall is cut already, as SUNCG's are (docs/spec/suncg.md section 1.5), the quad is the hole itself and
+the cutter its plug, as thick as the wall. In a wall without a hole they have the door's or window's size.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from pbrs_farm.geometry.solids import box
 
 CUTTER_REACH_M: Final = 0.02  # how far a cutter reaches out of either face of a wall without a hole
 _OVERLAP_M: Final = 0.002  # overlap of a plug with the wall around it
-_HOLE_MARGIN_M: Final = 0.10  # a hole's rim lies no farther from the door's outline
+_HOLE_MARGIN_M: Final = 0.10  # maximum distance of a hole's rim from the door's outline, metres
 _RIM_M: Final = 0.02  # from a hole's rim to the wall's end, and the least size of a hole
 LEAST_HOLE_M: Final = 0.05  # width and height; a smaller one is a flaw of the mesh
 _BESIDE_M: Final = 0.15  # a wall's faces lie no farther from the door's own plane
-_PLANAR_M: Final = 0.01  # a wall that is thinner has one face
+_PLANAR_M: Final = 0.01  # a thinner wall has one face, metres
 _THICKER_M: Final = 0.15  # how far the cutter of a planar wall reaches to either side
 _LEAST_SHARE: Final = 0.02  # a direction that has less of the wall's upright area is no face of it
 _UP: Final = np.array([0.0, 1.0, 0.0])
@@ -35,12 +35,12 @@ _SIDE_SHARE: Final = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Void:
-    """A hole that the source tells, and has cut out of walls already."""
+    """A hole given by the source and already cut out of walls."""
 
     id: str
     level_id: str
     walls: frozenset[str]  # ids of the wall items
-    points: F64  # (N, 3) world, corners of the body that was cut out
+    points: F64  # (N, 3) world, corners of the removed body
     item: Item | None = None  # the door or window in it
     is_window: bool = False
     undrawn: str = ""  # id of a door or window in it that has no mesh
@@ -59,10 +59,10 @@ class _WallFrame:
 
 
 def openings(items: Sequence[Item]) -> tuple[Opening, ...]:
-    """An opening for every door and window that has a box and stands in a wall.
+    """An opening for every door and window that has a box and is in a wall.
 
-    items: all of a house, walls among them. A leaf that stands in no wall has no opening, and is
-    not an error. Openings are not cut here: repair does that.
+    items: all of a house, including walls. A leaf outside any wall has no opening and is not an error.
+    Openings are not cut here: repair does that.
     """
     frames = [f for item in items if item.kind is ItemKind.WALL for f in _frames(item)]
     found = []
@@ -75,10 +75,10 @@ def openings(items: Sequence[Item]) -> tuple[Opening, ...]:
 
 
 def openings_of_voids(items: Sequence[Item], voids: Sequence[Void]) -> dict[str, Opening]:
-    """By the ids of their voids, the openings of holes that the source tells.
+    """Openings of the source's holes, by the ids of their voids.
 
-    items: all of a house, walls among them. A void that cut nothing out of its walls, or leaves some of
-    their thickness (a niche), has no opening, nor has one without a door or window that lies in another's.
+    items: all of a house, including walls. A void has no opening if it does not cut through its walls
+    (a niche), or if it has no door or window and is inside another void.
     """
     frames = [f for item in items if item.kind is ItemKind.WALL for f in _frames(item)]
     found: dict[str, Opening] = {}
@@ -124,7 +124,7 @@ def _opening_of_void(void: Void, frames: Sequence[_WallFrame]) -> Opening | None
         return None
     ends = np.stack([low, high])
     is_bare = not _is_covered((low + high) / 2, axes, own)
-    # Walls beside it have holes of their own, or are cut.
+    # Adjacent walls have their own holes, or are cut.
     others = [
         points
         for f in frames
@@ -167,7 +167,7 @@ def _across_void(void: Void, own: Sequence[_WallFrame]) -> F64:
 
 
 def _across_walls(ends: F64, walls: Sequence[F64]) -> F64:
-    """(2, 3) the ends of a hole, across all walls that it stands in."""
+    """(2, 3) ends of a hole, extended through all walls that it cuts."""
     low, high = ends.copy()
     low[2] = min(p[:, 2].min() for p in walls)
     high[2] = max(p[:, 2].max() for p in walls)
@@ -206,10 +206,10 @@ def _axes_of_wall(normal: F64) -> F64:
 def _opening_of_leaf(item: Item, leaf: Box, frames: Sequence[_WallFrame]) -> Opening | None:
     normal = leaf.axes[:, 2] * [1, 0, 1]  # a model's front is +z, whatever its leaf does
     if np.linalg.norm(normal) < 0.5:
-        return None  # lies flat: a roof window, which no wall holds
+        return None  # horizontal: a roof window, in no wall
     normal = normal / np.linalg.norm(normal)
     axes = _axes_of_wall(normal)
-    # Bound the door in the axes along, up and across, and find the walls it stands in.
+    # Bound the door in the axes along, up and across, and find its walls.
     corners = leaf.corners @ axes
     low, high = corners.min(0), corners.max(0)
     standing = [
@@ -257,7 +257,7 @@ def _opening(
 
 
 def _wall_points_around(frame: _WallFrame, axes: F64, low: F64, high: F64) -> list[F64]:
-    """The wall's points in axes, if it is the one (or one of those) that low..high stands in."""
+    """The wall's points in axes, if low..high is inside it."""
     if abs(frame.normal @ axes[:, 2]) < 0.999:
         return []
     points = frame.points @ axes
@@ -273,9 +273,9 @@ def _wall_points_around(frame: _WallFrame, axes: F64, low: F64, high: F64) -> li
 
 
 def _hole(points: F64, low: F64, high: F64) -> tuple[F64, F64] | None:
-    """(low, high) along and up of the hole that a wall has where low..high stands; None if none."""
+    """(low, high) along and up of the wall's hole around low..high; None if there is none."""
     s, y = points[:, 0], points[:, 1]
-    # The rim of a hole lies near the door's outline and not at the wall's ends.
+    # The rim of a hole is near the door's outline and away from the wall's ends.
     inner = (s > s.min() + _RIM_M) & (s < s.max() - _RIM_M)
     near = (s > low[0] - _HOLE_MARGIN_M) & (s < high[0] + _HOLE_MARGIN_M)
     near &= (y > low[1] - _HOLE_MARGIN_M) & (y < high[1] + _HOLE_MARGIN_M)

@@ -1,7 +1,7 @@
-"""Pictures whose stored values are to be read otherwise than they stand: a channel, a scale, a bias, a curve.
+"""Convert picture values that a format defines differently: a channel, a scale, a bias, a curve.
 
-No effects. A surface knows three kinds of pictures (colour in sRGB, roughness in green, normals); what a
-format says of a picture beyond that is done to its bytes once, here.
+No effects. A surface knows three kinds of pictures (colour in sRGB, roughness in green, normals);
+all other conventions are converted here, once.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from pbrs_farm.core.frames import linear_from_srgb, srgb_from_linear
 from pbrs_farm.read.common.material_library import opened_picture
 
 _MEAN_PX: Final = 64  # edge to which a picture is averaged before its mean is taken in linear light
-_MOST_PX: Final = 2048  # edge of a picture that is made of two: beyond it memory would be the limit
-_DIELECTRIC: Final = 0.04  # reflectance of what is no metal (glTF 2.0, appendix B)
+_MOST_PX: Final = 2048  # maximum edge of a picture combined from two, to bound memory
+_DIELECTRIC: Final = 0.04  # reflectance of dielectrics (glTF 2.0, appendix B)
 
 
 class PictureValues(NamedTuple):
-    """What is done to a picture's stored values, 0..1, before they mean what a surface takes them for."""
+    """Conversion of a picture's stored values, 0..1, to those of a surface."""
 
     channel: str = ""  # "r", "g", "b" or "a" takes the place of all three; "" = each its own
     decode: bool = False  # from sRGB to linear light, before scale and bias

@@ -73,20 +73,19 @@ def oriented_box(meshes: Sequence[Mesh], world_from_model: F64) -> Box | None:
 
 
 def assumed_light(item: Item) -> LightPart:
-    """A light in the middle of a lamp about which the scene tells nothing.
+    """A light at the centre of a lamp without light data in the scene.
 
-    Its flux is ASSUMED_LM. Use it only where the source names the item a lamp and says nothing of
-    its light.
+    Its flux is ASSUMED_LM. Use it only if the source calls the item a lamp and has no data on its
+    light.
     """
     centre = item.bounds.mean(0)
     return LightPart(triple(centre), BULB_RADIUS_M, ASSUMED_LM, PowerUnit.LUMEN)
 
 
 def across_last(box: Box) -> Box:
-    """The box with its thinnest level axis last, so that a door's or window's front is +z.
+    """Reorder the box's axes so that its thinnest horizontal axis, a door's or window's front, is +z.
 
-    A box that is not upright, which has no two level axes, comes back as it is. It is the same box:
-    only the names of its axes change.
+    A box that is not upright has no two horizontal axes and is returned unchanged.
     """
     level = np.flatnonzero(np.abs(box.axes[1]) < 0.1)
     if len(level) != 2:

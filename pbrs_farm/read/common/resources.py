@@ -23,19 +23,19 @@ class Resources(Protocol):
     """Contents by name with "/" between folders."""
 
     def read(self, name: str) -> bytes | None:
-        """The content's bytes, or None if there is none of that name."""
+        """The content's bytes, or None for an unknown name."""
         ...
 
 
 class ZipResources:
     """The entries of a zip archive in memory or on disk; every read is bounded.
 
-    Raises BadHouse for what is no zip, a damaged one, a name that leaves the archive's root, too
-    many entries, or one that is or claims to be larger than MAX_ENTRY_BYTES.
+    Raises BadHouse for data that is not a zip, a damaged archive, a name that leaves the archive's
+    root, too many entries, or one that is or claims to be larger than MAX_ENTRY_BYTES.
     """
 
     def __init__(self, data: bytes | Path, file: str) -> None:
-        """data: the archive's bytes, or where it lies: what is not read is never loaded."""
+        """data: the archive's bytes, or its path: entries are loaded on demand."""
         self._file = file
         try:
             self._zip = zipfile.ZipFile(io.BytesIO(data) if isinstance(data, bytes) else data)
@@ -63,9 +63,9 @@ class ZipResources:
             raise BadHouse(self._file, place, text)
 
     def read(self, name: str) -> bytes | None:
-        """The entry's bytes, or None if there is none of that name.
+        """The entry's bytes, or None for an unknown name.
 
-        Raises BadHouse for a damaged entry, and for one that unpacks to more than it claims.
+        Raises BadHouse for a damaged entry, and for one that unpacks to more than its declared size.
         """
         entry = self._entries.get(name)
         if entry is None:

@@ -1,7 +1,7 @@
 """Floor polygon and heights of a room from its meshes; no effects.
 
-The walkable polygon is the top of the floor's mesh less the walls that stand on it: SUNCG's floor
-slab reaches under the walls (docs/spec/suncg.md section 1.5).
+The walkable polygon is the top of the floor's mesh minus the walls on it: SUNCG's floor slab
+extends below the walls (docs/spec/suncg.md section 1.5).
 """
 
 from __future__ import annotations
@@ -30,16 +30,16 @@ _TRACE_M: Final = 0.005  # half the width of the strip that a planar wall cuts
 
 
 def floor_height(surfaces: Sequence[Surface]) -> float | None:
-    """World y of the walkable surface: of the highest upward faces; None if there are none.
+    """World y of the highest upward faces, the walkable surface; None without any.
 
-    surfaces: of one room's floor, metres. Faces that are not level do not count.
+    surfaces: of one room's floor, metres. Only horizontal faces count.
     """
     corners = _faces_looking(surfaces, 1)
     return None if not len(corners) else float(corners[..., 1].mean(1).max())
 
 
 def ceiling_height(surfaces: Sequence[Surface]) -> float | None:
-    """World y of the lowest downward faces; None if there are none."""
+    """World y of the lowest downward faces; None without any."""
     corners = _faces_looking(surfaces, -1)
     return None if not len(corners) else float(corners[..., 1].mean(1).min())
 
@@ -52,7 +52,7 @@ def floor_polygon(floor: Sequence[Surface], walls: Sequence[Surface]) -> F64 | N
     corners = _faces_looking(floor, 1)
     if not len(corners):
         return None
-    # Take the topmost faces as the floor, and what no wall stands on as walkable.
+    # Take the topmost faces as the floor, and its part without walls as walkable.
     y = corners[..., 1].mean(1)
     area = _outline_from_above(corners[y > y.max() - _SAME_HEIGHT_M])
     standing = _faces_looking(walls, 1), _faces_looking(walls, -1)
@@ -61,9 +61,9 @@ def floor_polygon(floor: Sequence[Surface], walls: Sequence[Surface]) -> F64 | N
 
 
 def covered_share(surface: Surface, polygon: F64) -> float:
-    """Share of a plan polygon (N, 2) that lies under or over the surface's level faces.
+    """Share of a plan polygon (N, 2) covered by the surface's horizontal faces.
 
-    In [0, 1], 0 for a polygon without area. Faces that lie over each other count once.
+    In [0, 1], 0 for a polygon without area. Overlapping faces count once.
     """
     # A planar ceiling may look either way.
     both = np.concatenate([_faces_looking([surface], 1), _faces_looking([surface], -1)])
@@ -94,7 +94,7 @@ def floor_polygons(
     ways += [line for bounds in doors if (line := _line_of_door(bounds)) is not None]
     parts = [p for whole in shapely.get_parts(between) for p in parted_at_doorways(whole, ways)]
     pieces = np.array(parts, object)
-    # Keep pieces that are large and wide enough; give back what the strips took.
+    # Keep pieces that are large and wide enough; restore the ground of the strips.
     narrow = shapely.is_empty(_grown(pieces, -min_width_m / 2))
     fit = pieces[(shapely.area(pieces) >= min_area_m2) & ~narrow].tolist()
     fit.sort(key=lambda p: (-p.area, p.bounds))
@@ -103,7 +103,7 @@ def floor_polygons(
 
 
 def _line_of_door(bounds: F64) -> shapely.LineString | None:
-    # A door that stands open, or askew, tells no line.
+    # An open or oblique door defines no line.
     low, high = bounds[:, [0, 2]]
     size, middle = high - low, (low + high) / 2
     across = int(np.argmax(size))
@@ -118,7 +118,7 @@ def _grown(areas: Any, by_m: float) -> Any:
 
 
 def _traces(walls: Sequence[Surface]) -> Any:
-    """Where upright faces stand, seen from above, as strips 2 _TRACE_M wide."""
+    """Ground of upright faces seen from above, as strips 2 _TRACE_M wide."""
     found = []
     for surface in walls:
         p = triangle_corners(surface.positions, surface.faces)
@@ -130,12 +130,12 @@ def _traces(walls: Sequence[Surface]) -> Any:
 
 
 def enclosed_polygon(walls: Sequence[Surface]) -> F64 | None:
-    """The largest piece of plan between walls, for a room without a floor; None if there is none.
+    """The largest plan area between walls, for a room without a floor; None if there is none.
 
-    walls: of one room. A guess: where walls do not close, what lies between them and their hull
-    counts as well. (N, 2) world (x, z).
+    walls: of one room. An estimate: if the walls do not close, the area between them and their hull
+    counts too. (N, 2) world (x, z).
     """
-    # What the walls' hull encloses and no wall covers lies between them.
+    # The area between the walls is the part of their hull that no wall covers.
     footprint = _outline_from_above(
         np.concatenate([_faces_looking(walls, 1), _faces_looking(walls, -1)])
     )

@@ -1,4 +1,4 @@
-"""How many rooms a house may have and how often they may overlap. No effects."""
+"""Limits on the number of rooms of a house and on their overlaps. No effects."""
 
 from __future__ import annotations
 

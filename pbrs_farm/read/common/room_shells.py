@@ -26,7 +26,7 @@ _WELD_M: Final = 1e-4  # corners this near are one
 _LEAST_HEIGHT_M: Final = 1.8  # least height of a room
 _LEAST_SIDE_M, _LARGEST_SIDE_M = 0.6, 200.0  # of a room in plan; a larger box is a sky
 _LEVEL_UP, _UPRIGHT_UP = 0.98, 0.1  # |y| of the normal: above is level, below is upright
-_LEAST_BOXY: Final = 0.7  # share of a room's area that is level or upright
+_LEAST_BOXY: Final = 0.7  # minimum share of a room's faces that are horizontal or vertical
 # Twice the volume over the area is the thickness of a plate: a wall has less, a room more.
 _THICKER_THAN_WALLS_M: Final = 0.3
 _THICKER_THAN_BLOCKS_M: Final = 0.5
@@ -37,9 +37,9 @@ CLASS_OF_STRUCTURE: Final = {ItemKind.WALL: WALL, ItemKind.FLOOR: FLOOR, ItemKin
 
 
 def planar_parts(item: Item) -> tuple[Item, ...]:
-    """An open wall mesh as one item per plane its faces lie in (to a degree and a centimetre).
+    """Split an open wall mesh into one item per plane (to a degree and a centimetre).
 
-    A closed wall, a wall of one plane and whatever is no wall come back as they are.
+    A closed wall, a single-plane wall and any other item are returned unchanged.
     """
     if item.kind is not ItemKind.WALL or _is_closed(item.surfaces):
         return (item,)
@@ -67,10 +67,9 @@ def _is_closed(surfaces: Sequence[Surface]) -> bool:
 
 
 def plane_of_faces(surfaces: Sequence[Surface]) -> I64:
-    """(F,) number of the plane each face lies in, either side up, in order of first appearance.
+    """(F,) plane index of each face, ignoring orientation, in order of first appearance.
 
-    Over the faces of all surfaces, one after another. Planes that agree to about a degree and a
-    centimetre count as one; the two sides of a plane have one number.
+    Faces of all surfaces, concatenated. Planes that agree to about a degree and a centimetre are one.
     """
     p = corners_of_surfaces(surfaces)
     n = area_vectors(p)
@@ -88,12 +87,11 @@ def plane_of_faces(surfaces: Sequence[Surface]) -> I64:
 
 
 def room_parts(item: Item, others: F64) -> tuple[Item, ...]:
-    """The walls, floors and ceilings of a room that item shows from inside, a plane each.
+    """The walls, floors and ceilings that an item shows on its inside, one per plane.
 
-    others: (N, 3) centres of other items; a closed block around some of them whose faces look
-    outward is seen from inside, too, and is turned. What of the item is no room comes last; its
-    outer side, which hides the room from outside only, is left out. An item that is no room comes
-    back as it is.
+    others: (N, 3) centres of other items; a closed block around some of them with outward faces is a
+    room too, and is inverted. Remaining faces come last; the outer side, visible only from outside,
+    is dropped. Other items are returned unchanged.
     """
     corners = corners_of_surfaces(item.surfaces)
     if not len(corners):
@@ -114,7 +112,7 @@ def room_parts(item: Item, others: F64) -> tuple[Item, ...]:
     shown = np.any(rooms, axis=0)
     rest = ~shown & ~_encloses(corners, bounds, shown)[shell_of_face]
     parts = _parts_by_plane(_turn_faces(item, shown) if sign > 0 else item, shown)
-    # Leave walls that stand around a room and are nothing else as they are.
+    # Leave items that are only the walls of a room unchanged.
     if sign < 0 and {p.kind for p in parts} == {item.kind}:
         return (item,)
     kept = picked(item, rest)
@@ -177,7 +175,7 @@ def bounds_of_shells(corners: F64, shell_of_face: I64) -> F64:
 
 
 def _encloses(corners: F64, bounds: F64, shown: Bools) -> Bools:
-    """(S,) shells whose box holds all that is shown: a hollow block's outer side."""
+    """(S,) true for shells whose box contains all visible faces: a hollow block's outer side."""
     low, high = corners[shown].min((0, 1)), corners[shown].max((0, 1))
     return np.asarray((bounds[:, 0] < low).all(1) & (bounds[:, 1] > high).all(1))
 

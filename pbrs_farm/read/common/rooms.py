@@ -1,4 +1,4 @@
-"""Rooms and levels of a scene: from polygons that are given, else from its floors. No effects.
+"""Rooms and levels of a scene: from given polygons, else from its floors. No effects.
 
 Polygons are JSON, metres, in the plan (x, z) of the world:
 
@@ -30,18 +30,18 @@ from pbrs_farm.read.common.room_limits import MAX_ROOMS, check_number
 
 MIN_ROOM_M2: Final = 1.0  # smaller pieces of floor are gaps under doors and walls
 MIN_ROOM_WIDTH_M: Final = 0.5
-_STOREY_M: Final = 2.5  # height of a room that nothing tells the height of
+_STOREY_M: Final = 2.5  # default height of a room, metres
 _SAME_LEVEL_M: Final = 0.5  # floors nearer in height than this are one level
-_SLACK_M: Final = 0.3  # a thing may stand so far outside its room's polygon or height
-_EDGE_M: Final = 0.1  # walls may stand so far beside the floor
+_SLACK_M: Final = 0.3  # maximum distance of an item outside its room's polygon or height, metres
+_EDGE_M: Final = 0.1  # maximum distance of a wall beside the floor, metres
 # A ceiling that covers less of a room than this share is the next room's.
 _NEXT_ROOM: Final = 0.05
 
 
 def rooms_from_json(data: bytes, file: str, items: Sequence[Item]) -> list[Room]:
-    """The rooms of a polygon file; heights it leaves out are taken from floors and ceilings.
+    """The rooms of a polygon file; missing heights are taken from floors and ceilings.
 
-    Raises BadHouse naming the room that is wrong.
+    Raises BadHouse, naming the invalid room.
     """
     return rooms_from_value(json_from_bytes(data, file), file, items)
 
@@ -49,8 +49,8 @@ def rooms_from_json(data: bytes, file: str, items: Sequence[Item]) -> list[Room]
 def rooms_from_value(value: Any, file: str, items: Sequence[Item]) -> list[Room]:
     """The rooms of the JSON value of a polygon file, or of a scene's extras.
 
-    items: of the scene; heights that a row leaves out are those of the floors and ceilings over its
-    polygon. Raises BadHouse naming the room that is wrong, as rooms_from_json.
+    items: of the scene; missing heights are those of the floors and ceilings over the polygon. Raises
+    BadHouse, naming the invalid room, as rooms_from_json.
     """
     hint = '{"rooms": [{"polygon": [[x, z], ...]}, ...]}'
     rows = checked(_RoomFile, value, file, error=BadHouse, hint=hint).rooms
@@ -86,10 +86,10 @@ def _room_of_row(row: _GivenRoom, file: str, place: str, items: Sequence[Item]) 
 
 
 def rooms_from_floors(items: Sequence[Item]) -> list[Room]:
-    """A room for every piece of floor that walls part from the others.
+    """A room for every piece of floor separated by walls.
 
-    items: of the whole scene. Walls count where they stand 1 m above the floor; pieces below 1 m2 or
-    0.5 m wide are gaps under doors and walls. The rooms have no id, name or level yet: levels_of gives
+    items: of the whole scene. Walls count if they reach 1 m above the floor; pieces below 1 m2 or
+    0.5 m wide are gaps under doors and walls. The rooms have no id, name or level yet: levels_of adds
     them.
     """
     walls = _surfaces_of_kind(items, ItemKind.WALL)
@@ -99,7 +99,7 @@ def rooms_from_floors(items: Sequence[Item]) -> list[Room]:
         height = floor_height(item.surfaces) if item.kind is ItemKind.FLOOR else None
         if height is None or len(found) > MAX_ROOMS:  # check_rooms refuses them
             continue
-        # Let walls part the floor where they stand 1 m above it.
+        # Divide the floor by walls that reach 1 m above it.
         standing = [w for w in walls if w.positions[:, 1].max() > height + 1.0]
         standing = [w for w in standing if w.positions[:, 1].min() < height + 1.0]
         low, high = item.bounds[:, [0, 2]]

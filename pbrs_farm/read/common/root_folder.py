@@ -11,7 +11,7 @@ from pbrs_farm.regular_files import fault_of, read_regular, real_path
 
 
 class RootFolder:
-    """The files of a source below root; remembers what was read, so that a digest covers it all.
+    """The files of a source below root; records all reads for a digest.
 
     Names are relative, with "/" between folders. A name or a symlink that leads out of root is
     rejected with BadHouse, as is a file larger than its limit.
@@ -33,10 +33,10 @@ class RootFolder:
         return joined
 
     def path(self, name: str) -> Path | None:
-        """The regular file of that name, or None if there is none; BadHouse if it lies outside.
+        """The regular file of that name, or None if it does not exist; BadHouse if it is outside.
 
-        name: relative, as a stranger's file names it. Links are followed first, so that none leads
-        out. The path is the real one: do not derive names from it.
+        name: relative, from an untrusted file. Links are resolved first, so that none leads out. The path
+        is the resolved one: do not derive names from it.
         """
         path = self.root / self.name_from("", name)
         try:
@@ -45,7 +45,7 @@ class RootFolder:
             real = real_path(path)
         except OSError:
             return None
-        # Follow links first: where the file really lies decides.
+        # Resolve links first: the real location decides.
         if not real.is_relative_to(self._real):
             raise BadHouse(self.root, name, "is a link that leads out of the folder")
         return real
@@ -65,10 +65,10 @@ class RootFolder:
         return [f"{folder}/{p.name}" for p in below.iterdir() if p.suffix in suffixes]
 
     def read(self, name: str, *, max_bytes: int, limit: str = "") -> bytes | None:
-        """The bytes of a file below the folder, or None if there is none; its digest is remembered.
+        """The bytes of a file below the folder, or None if it does not exist; records its digest.
 
-        max_bytes: of a file that is read. limit: the recipe field that sets max_bytes, for the message.
-        Raises BadHouse for a larger file, and for a name or a link that leads out of the folder.
+        max_bytes: limit. limit: the recipe field that sets max_bytes, for the message. Raises BadHouse for
+        a larger file, and for a name or a link that leads out of the folder.
         """
         path = self.path(name)
         if path is None:

@@ -33,9 +33,9 @@ class Layered:
 
 
 def read_mtl(folder: RootFolder, name: str) -> tuple[ObjMaterial, ...] | None:
-    """The library's materials, map_kd and map_d as names below the root; None if there is no such file.
+    """The library's materials, map_kd and map_d as names below the root; None if the file does not exist.
 
-    Raises BadHouse for a picture that lies outside the folder.
+    Raises BadHouse for a picture outside the folder.
     """
     data = folder.read(name, max_bytes=_MAX_MTL_BYTES)
     if data is None:
@@ -51,10 +51,10 @@ def read_mtl(folder: RootFolder, name: str) -> tuple[ObjMaterial, ...] | None:
 
 
 class SourceFiles:
-    """Files looked at while sources are named, each read once; state: what was found so far.
+    """Files inspected while sources are identified, each read once; state: a cache.
 
-    Listing never fails: a file that is damaged or lies outside its folder counts as absent here,
-    and the reader says what is wrong with it.
+    Listing never fails: a damaged file or one outside its folder counts as absent here; the reader
+    reports the fault.
     """
 
     def __init__(self) -> None:
@@ -72,20 +72,19 @@ class SourceFiles:
         return self._digests[key]
 
     def digest(self, folder: RootFolder, names: Iterable[str]) -> str:
-        """Digest over the names and bytes of those files that exist below a folder; "" where none does.
+        """Digest over the names and bytes of the existing files below a folder; "" if there are none.
 
-        A file that appears, changes or goes gives another digest, so that a step sees it. Files that are
-        damaged or lie outside the folder count as absent: the reader says what is wrong with them.
+        A file that is added, changed or removed changes the digest, so that the step runs again. Damaged
+        files and files outside the folder count as absent: the reader reports them.
         """
         found = {name: self._digest(folder, name) for name in names}
         lines = [f"{digest}  {name}\n" for name, digest in sorted(found.items()) if digest]
         return hashlib.sha256("".join(lines).encode()).hexdigest() if lines else ""
 
     def pictures(self, folder: RootFolder, mtl: str) -> tuple[str, ...]:
-        """Names below the root of the pictures that a material library names.
+        """Names below the root of the pictures in a material library.
 
-        A library that is missing or damaged has none. Kept, so that several models of one folder
-        read it once.
+        Empty for a missing or damaged library. Cached, so that models of one folder share the result.
         """
         key = (folder.root, mtl)
         if key not in self._pictures:

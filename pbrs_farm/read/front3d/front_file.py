@@ -1,6 +1,6 @@
-"""A 3D-FRONT house's JSON -> its meshes, furniture, rooms, doors and lights, checked; no effects.
+"""Parse and check a 3D-FRONT house's JSON: meshes, furniture, rooms, doors and lights; no effects.
 
-Structure stands in the world (metres, y up) as written; only furniture is placed by its room's child.
+Structure has world coordinates (metres, y up); only furniture is placed by its room's child.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class FrontPiece:
 
 @dataclass(frozen=True, slots=True)
 class FrontDoor:
-    """What extension.door says of a door."""
+    """A door of extension.door."""
 
     is_entry: bool
     hinge: str  # innerLeft, innerRight, outerLeft, outerRight
@@ -93,10 +93,9 @@ class FrontFile:
 
 
 def front_file(data: bytes, file: str, notes: Notes) -> FrontFile:
-    """The house of a file's bytes. Raises BadHouse naming the entry that is wrong.
+    """Parse a house. Raises BadHouse, naming the invalid entry.
 
-    data: JSON of 3D-FRONT. notes: takes what is passed over. Models are not read: pieces name them
-    by `jid`.
+    data: JSON of 3D-FRONT. notes: receives omissions. Models are not read: pieces name them by `jid`.
     """
     value = checked(dict, bounded_json(data, file), file, error=BadHouse, hint=_HINT)
     scene = value.get("scene")
@@ -209,7 +208,7 @@ def _parse_front_pieces(
     children: Sequence[tuple[str, dict[str, Any], str]], entries: dict[str, dict[str, Any]],
     meshes: set[str], lamps: set[str], file: str, notes: Notes,
 ) -> tuple[tuple[FrontPiece, ...], list[tuple[str, F64, str]]]:  # fmt: skip
-    """The pieces that are placed, and (ref, where, room) of every child that is no mesh."""
+    """The placed pieces, and (ref, location, room) of every child that is not a mesh."""
     found, places = [], []
     n_missing = n_invalid = n_flat = 0
     for room, child, place in children:

@@ -65,7 +65,7 @@ from pbrs_farm.read.front3d.front_walls import (
 _TEXTURES: Final = (
     "3D-FRONT-texture", "../3D-FRONT-texture", "../../3D-FRONT-texture", "texture",
 )  # fmt: skip
-# What the solids that are made and repair's slabs stand for.
+# Mesh types that the generated solids and repair's slabs replace.
 _MADE: Final = frozenset(
     {"WallInner", "WallOuter", "WallTop", "WallBottom", "SlabTop", "SlabSide", "SlabBottom", *HOLE_TYPES}
 )  # fmt: skip
@@ -74,13 +74,13 @@ _LIGHT_BAND_LM: Final = 800.0
 
 
 def companions_of_front3d(given: GivenFile, files: SourceFiles) -> str:
-    """Digest of the models and textures that reading may open; "" where there is none."""
+    """Digest of the models and textures that the reader may open; "" if there are none."""
     path, models = given.path, given.models
     try:
         data = RootFolder(path.parent).read(path.name, max_bytes=MAX_JSON_BYTES) or b""
         house = front_file(data, path.name, Notes(path.name, strict=False))
     except BadHouse:
-        return ""  # the reader will say what is wrong with it
+        return ""  # the reader reports the fault
     found = []
     folder = model_folder(path, models)
     if folder is not None:
@@ -95,9 +95,9 @@ def companions_of_front3d(given: GivenFile, files: SourceFiles) -> str:
 
 
 def read_front3d(given: GivenFile, fields: ReadFields) -> House:
-    """The House of the file. models: 3D-FUTURE's folder, "" = beside or above the file.
+    """Read the house. models: 3D-FUTURE's folder, "" = beside or above the file.
 
-    Raises BadHouse naming the entry that is wrong, and for a file without meshes or rooms.
+    Raises BadHouse, naming the invalid entry, and for a file without meshes or rooms.
     """
     path, models = given.path, given.models
     folder = RootFolder(path.parent)
@@ -286,7 +286,7 @@ class _Structure:
         return rooms, parts
 
     def _level(self, mesh: FrontMesh, *, up: bool) -> Surface | None:
-        """The mesh with every face turned up, or down: winding tells nothing."""
+        """The mesh with every face turned up, or down: winding is unreliable."""
         corners = mesh.points[mesh.faces]
         n = area_vectors(corners)[:, 1]
         keep = face_areas(corners) > 1e-8
@@ -325,7 +325,7 @@ class _Structure:
         return replace(item, source_class="WallInner", tags=(f"boundary_of:{sheet.room}",))
 
     def trim(self) -> list[Item]:
-        """Everything else that is drawn: skirting, dropped ceilings, columns, fitted cupboards."""
+        """All other visible meshes: skirting, dropped ceilings, columns, fitted cupboards."""
         found: list[Item] = []
         for mesh in self._house.meshes:
             if mesh.kind in _MADE or (

@@ -1,4 +1,4 @@
-"""What stands in the holes of a 3D-FRONT house: by its door list, its titles, its hole meshes; no effects."""
+"""Doors and windows in the holes of a 3D-FRONT house: by door list, titles, hole meshes; no effects."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from pbrs_farm.read.front3d.front_file import FrontFile, FrontPiece
 from pbrs_farm.read.front3d.front_walls import WallPiece
 
 HOLE_TYPES: Final = ("Door", "Window", "Hole", "BayWindow")
-_NEAR_M: Final = 0.4  # from a hole to the piece that tells it
+_NEAR_M: Final = 0.4  # maximum distance from a hole to its piece, metres
 _LEAST_SILL_M: Final = 0.25
 _FLAT_M: Final = 0.1  # a lower hole mesh is a threshold
 _MAX_NAMED: Final = 2_000  # doors and windows of a house; a home has a dozen
@@ -47,7 +47,7 @@ def holes_with_names(house: FrontFile, holes: Sequence[tuple[Hole, WallPiece]]) 
     for hole, piece in holes:
         found.append(_kinded(hole, piece, _best(hole, named)))
     found = merge_holes(sorted(found, key=lambda h: h.kind == "open"))
-    # A hole mesh that stands over no gap cuts the wall itself.
+    # A hole mesh without a gap behind it cuts the wall itself.
     extra = []
     for one in named:
         if one.box is not None and not any(_stands_in(one, hole) for hole in found):
@@ -94,7 +94,7 @@ def _openings_by_name(house: FrontFile) -> list[_NamedOpening]:
 
 
 def _best(hole: Hole, named: Sequence[_NamedOpening]) -> _NamedOpening | None:
-    """What tells the hole best: the door list, a title, a mesh; the title of the nearest piece with one."""
+    """The best source for a hole: the door list, a title, a mesh; else the nearest piece with a title."""
     near = [t for t in named if _stands_in(t, hole)]
     best = min(near, key=lambda t: (t.rank, _away(t, hole)), default=None)
     titled = min(
@@ -150,7 +150,7 @@ def _with_name_of(hole: Hole, named: _NamedOpening) -> Hole:
 
 
 def _of_mesh(named: _NamedOpening, every: Sequence[_NamedOpening]) -> Hole:
-    """The hole that a mesh of jambs shows: its thinner level side lies across the wall."""
+    """The hole framed by a mesh of jambs: its thinner horizontal side is across the wall."""
     assert named.box is not None
     low, high = named.box
     width, height, depth = (float(v) for v in high - low)

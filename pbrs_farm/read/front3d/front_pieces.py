@@ -45,7 +45,7 @@ _RGB: Final = ((1, 0.26, 0.01), (1, 0.42, 0.12), (1, 0.66, 0.39), (1, 0.81, 0.64
 
 
 def model_folder(path: Path, models: str) -> RootFolder | None:
-    """The folder of 3D-FUTURE's models: the one that is named, else beside or above the house."""
+    """The folder of 3D-FUTURE's models: the given one, else beside or above the house."""
     if models:
         below = Path(models) / "3D-FUTURE-model"
         return RootFolder(below if below.is_dir() else Path(models))
@@ -57,13 +57,13 @@ def model_folder(path: Path, models: str) -> RootFolder | None:
 
 
 def files_of_model(jid: str) -> Iterator[str]:
-    """What reading a model may open."""
+    """Files that reading a model may open."""
     if NAME.fullmatch(jid) and ".." not in jid:
         yield from (f"{jid}/{n}" for n in ("raw_model.obj", "model.mtl", "texture.png"))
 
 
 class FrontModels:
-    """Classes and models of pieces; state: the models read so far and what was missing."""
+    """Classes and models of pieces; state: a cache of models, and the missing ones."""
 
     def __init__(
         self, folder: RootFolder | None, materials: ModelMaterials, notes: Notes, fields: ReadFields
@@ -74,7 +74,7 @@ class FrontModels:
         self.n_missing = 0
 
     def item(self, piece: FrontPiece, item_id: str) -> Item | None:
-        """The piece as an item, as a box where its model is missing; None for what is not drawn."""
+        """The piece as an item, as a box if its model is missing; None if it is not drawn."""
         if is_opening(piece):
             return None
         vocabulary, name, seen = self._class(piece)
@@ -161,7 +161,7 @@ def _info(folder: RootFolder) -> dict[str, dict[str, Any]]:
 
 
 def _without_shadow(model: ParsedModel) -> ParsedModel:
-    """The model without the flat card below it that was drawn as its shadow."""
+    """The model without the flat card that imitates its shadow."""
     if len(model.meshes) < 2:
         return model
     low = min(float(m.positions[:, 1].min()) for m in model.meshes)
@@ -184,10 +184,10 @@ def light_items(
     lights: Sequence[FrontLight], items: Sequence[Item], areas: dict[str, float],
     ceilings: dict[str, float],
 ) -> list[Item]:  # fmt: skip
-    """A lamp without a shape for every listed light where no lamp stands.
+    """An invisible lamp for every listed light without a lamp item.
 
     areas, ceilings: square metres and height by room. The lights of a room share the flux that gives its
-    floor 150 lx; one within the ceiling hangs below it, and one listed twice shines once.
+    floor 150 lx; a light inside the ceiling hangs below it, and duplicates are merged.
     """
     lamps = [
         i.oriented_box.centre for i in items if i.kind is ItemKind.LAMP and (i.surfaces or i.box)

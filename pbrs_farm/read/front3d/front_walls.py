@@ -1,9 +1,9 @@
-"""The walls of a 3D-FRONT house: sheets towards rooms -> solids as thick as what is behind, and their holes.
+"""Walls of a 3D-FRONT house: from sheets facing rooms to solids with holes.
 
-No effects. Winding and normals are not believed: a sheet looks into the room beside it. Sheets in one
-plane of a room (tiles and their grout) are one wall: a hole is a gap of all of them; the sheets behind
-have it, too, or it is a niche. Solids meet in mitres, and repair
-cuts the holes, so that jambs are there whether a file has them or not.
+No effects. Winding and normals are unreliable: a sheet faces the adjacent room. Coplanar sheets
+of a room (tiles and their grout) are one wall: a hole is a gap in all of them and in the sheets
+behind, else it is a niche. Solids meet in mitres, and repair cuts the holes, so that all have
+jambs.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _DEPTH_M: Final = 0.12  # where nothing is behind
 _COLUMN_M: Final = 0.7  # a stretch without a sheet behind is no longer where a wall meets this one
 _LEAST_M: Final = 0.02
 _COPLANAR: Final = 0.9998  # least |cosine| of the normals of sheets in one plane: 1.1 degrees
-_WITHIN_M: Final = 0.03  # a sheet that stands out no further beyond another's bounds lies on it
+_WITHIN_M: Final = 0.03  # maximum overhang of a sheet that is part of another one, metres
 _SEAM_M: Final = 0.002  # between the meshes of one wall
 _HOLE_M: Final = 0.2  # least width and height
 _FILLED: Final = 0.8  # share of a gap that the sheet behind fills: a niche
@@ -57,7 +57,7 @@ class Sheet:
 
     @property
     def cover(self) -> Any:
-        """All that is wall in its plane: a place beyond it is a gap."""
+        """Wall area in its plane; the rest is gaps."""
         return self.outline if self.filled is None else self.filled
 
     @property
@@ -79,7 +79,7 @@ class WallPiece:
     sheet: Sheet
     s0: float
     s1: float
-    depth: float  # of its own solid
+    depth: float  # of the sheet's solid
     through: float  # to the sheet behind
     back: Sheet | None
 
@@ -115,11 +115,11 @@ def sheets_of(
 
 
 def _join_coplanar(sheets: Sequence[Sheet]) -> list[Sheet]:
-    """The sheets, those that lie upon a larger one of their plane and room joined with it.
+    """Merge sheets with a larger one in the same plane and room.
 
-    A wall of tiles is two meshes: the tiles, and the net of grout between them. Each is full of gaps
-    that the other fills. A sheet beside another (tiles below, paint above) stays a wall of its own,
-    and knows what the other fills.
+    A tiled wall is two meshes: the tiles, and the net of grout between them. Each fills the gaps of
+    the other. Adjacent sheets (tiles below, paint above) stay separate walls, and know each other's
+    area.
     """
     normals = np.array([s.normal for s in sheets]).reshape(-1, 3)
     offsets = np.array([s.offset for s in sheets])
@@ -247,10 +247,10 @@ def _looking(sheet: Sheet, floors: Mapping[str, Any], tree: Any, names: list[str
 
 
 def pieces_of(inner: Sequence[Sheet], outer: Sequence[Sheet]) -> list[WallPiece]:
-    """Every inner sheet in stretches of one thickness.
+    """Split every inner sheet into stretches of one thickness.
 
-    What lies behind are parallel sheets within the thickness of a wall, inner or outer; where none
-    is, a stretch has no back.
+    The back of a stretch is a parallel sheet, inner or outer, within the thickness of a wall; a
+    stretch without one has no back.
     """
     every = [*inner, *outer]
     normals = np.array([s.normal for s in every]).reshape(-1, 3)
@@ -266,7 +266,7 @@ def pieces_of(inner: Sequence[Sheet], outer: Sequence[Sheet]) -> list[WallPiece]
 
 
 def _span(other: Sheet, sheet: Sheet) -> tuple[float, float]:
-    """Where another sheet lies along this one."""
+    """Interval of another sheet along this one."""
     s0, _, s1, _ = other.bounds
     ends = [float(other.point(s, 0.0) @ sheet.along) for s in (s0, s1)]
     return min(ends), max(ends)
@@ -288,7 +288,7 @@ def _stretches(
             runs[-1][1] = high
         else:
             runs.append([low, high, *nearest])
-    # Where another wall meets this one from behind nothing is behind: take what is beside.
+    # Where another wall joins from behind, take the thickness of the adjacent stretch.
     known = [r for r in runs if r[3] is not None]
     for k, run in enumerate(runs):
         if run[3] is None and known and run[1] - run[0] < _COLUMN_M:
@@ -362,9 +362,9 @@ def _back_corner(piece: WallPiece, s: float, corner: F64, pieces: Sequence[WallP
 
 
 def holes_of(pieces: Sequence[WallPiece]) -> list[tuple[Hole, WallPiece]]:
-    """The gaps of the sheets, with the piece that each stands in; kind "open" until more is known.
+    """Gaps of the sheets with their wall pieces; kind "open" until a door or window is assigned.
 
-    A gap that the sheet behind fills is none. The hole goes through the wall's whole thickness.
+    A gap closed by the sheet behind is not a hole. Holes go through the whole thickness.
     """
     by_sheet: dict[int, list[WallPiece]] = {}
     for piece in pieces:

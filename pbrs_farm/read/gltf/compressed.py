@@ -28,7 +28,7 @@ _MOST_POINTS: Final = 20_000_000
 
 
 def draco_arrays(gltf: Gltf, primitive: dict[str, Any], place: str) -> DracoMesh | None:
-    """What a primitive's Draco data holds; None where it has none.
+    """Decode a primitive's Draco data; None if it has none.
 
     Raises BadHouse for damaged data, other counts than the accessors', and without DracoPy.
     """
@@ -41,7 +41,7 @@ def draco_arrays(gltf: Gltf, primitive: dict[str, Any], place: str) -> DracoMesh
     except ImportError:
         hint = f"{install_command('gltf')}, or gltf-transform copy IN.glb OUT.glb"
         raise BadHouse(gltf.file, place, f"{DRACO} needs DracoPy", hint=hint) from None
-    # Bound what is decoded by what the file says of it.
+    # Limit the decoding by the file's accessor counts.
     position = entry(gltf, "accessors", (primitive.get("attributes") or {}).get("POSITION"))
     n = position.get("count")
     if type(n) is not int or not 0 < n <= _MOST_POINTS:
@@ -74,9 +74,9 @@ class DracoMesh:
 
 
 def decoded_picture(data: bytes) -> bytes:
-    """PNG bytes of a KTX2 picture; other pictures as they are.
+    """PNG bytes of a KTX2 picture; other pictures unchanged.
 
-    Raises ValueError with the reason where it cannot be decoded or no decoder is installed.
+    Raises ValueError with the reason if it cannot be decoded or no decoder is installed.
     """
     if not data.startswith(_KTX2):
         return data

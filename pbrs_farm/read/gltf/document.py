@@ -24,10 +24,10 @@ from pbrs_farm.read.gltf.compressed import draco_arrays
 from pbrs_farm.read.mesh.obj import Mesh
 from pbrs_farm.read.mesh.texture_wraps import CLAMP, MIRROR, REPEAT
 
-# A relative name -> the bytes of that file beside the scene, or None if there is none.
+# Returns the bytes of a file beside the scene by relative name, or None if it does not exist.
 Fetch = Callable[[str], bytes | None]
 
-MAX_NODES: Final = 200_000  # of the scene; a node may stand in it more than once
+MAX_NODES: Final = 200_000  # of the scene; a node may have several instances
 MAX_DEPTH: Final = 200  # levels of the node tree
 _MOVES: Final = frozenset({"matrix", "rotation", "scale", "translation"})  # keys of a node
 
@@ -42,8 +42,8 @@ _TRIANGLES, _STRIP, _FAN = 4, 5, 6  # values of primitive.mode
 UNREAD: Final = "unread-part"
 _WRAPS: Final = {33071: CLAMP, 33648: MIRROR}  # values of sampler.wrapS
 
-# Extensions without which nothing that is seen is missing: what a reader without them shows is
-# there as well (compressed meshes, pictures), or they say nothing of the picture.
+# Extensions without visible effect for a reader that ignores them: a fallback is included
+# (compressed meshes, pictures), or they do not concern the picture.
 _UNSEEN: Final = frozenset({
     "KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_texture_basisu",
     "EXT_texture_avif", "MSFT_texture_dds", "KHR_materials_variants", "KHR_xmp", "KHR_xmp_json_ld",
@@ -67,9 +67,9 @@ class Placed:
 
 
 def gltf_document(data: bytes, file: str, fetch: Fetch) -> Gltf:
-    """The document and every buffer of a .glb or .gltf.
+    """Parse a .glb or .gltf with all its buffers.
 
-    Raises BadHouse for a damaged file, an extension not understood, a buffer that is missing.
+    Raises BadHouse for a damaged file, an unsupported required extension, a missing buffer.
     """
     gltf = _parse_gltf(data, file)
     if not isinstance(gltf.document.get("asset"), dict):
@@ -93,7 +93,7 @@ def _check_extensions(gltf: Gltf) -> None:
 
 
 def _parse_gltf(data: bytes, file: str) -> Gltf:
-    # Tell the two forms by their content, whatever the file is called; by the name what is neither.
+    # Distinguish the two forms by content, whatever the file's name; anything else by its name.
     is_text = data.lstrip()[:1] == b"{"
     if data[:4] == b"glTF" or (file.lower().endswith(".glb") and not is_text):
         return gltf_from_glb(data, file)
@@ -128,9 +128,9 @@ def _buffer(gltf: Gltf, index: int, fetch: Fetch) -> bytes:
 
 
 def uri_bytes(gltf: Gltf, uri: Any, place: str, fetch: Fetch) -> bytes:
-    """The bytes a uri means: a data URI's own, or those of a file beside the scene.
+    """The bytes of a uri: of a data URI, or of a file beside the scene.
 
-    Raises MissingFile if there is no such file, BadHouse for a uri that is none.
+    Raises MissingFile if the file does not exist, BadHouse for an invalid uri.
     """
     if not isinstance(uri, str):
         raise BadHouse(gltf.file, place, "uri is no text")
@@ -163,7 +163,7 @@ def image_bytes(gltf: Gltf, index: Any, fetch: Fetch) -> bytes:
 def placed_nodes(gltf: Gltf) -> Iterator[Placed]:
     """Every node of the default scene, parents before children.
 
-    Raises BadHouse for a node that is its own ancestor or not affine, or for too many of them.
+    Raises BadHouse for cycles, transforms that are not affine, and too many nodes.
     """
     scene = gltf.document.get("scene", 0)
     roots = _indices(gltf, entry(gltf, "scenes", scene), f"scenes[{scene}]", "nodes")
@@ -171,7 +171,7 @@ def placed_nodes(gltf: Gltf) -> Iterator[Placed]:
     stack = [Placed(i, (i,), np.eye(4)) for i in reversed(roots)]
     n = 0
     while stack:
-        # Those that wait count too, so that a broad tree of too many ends at once.
+        # Count pending nodes too, so that a broad tree with too many fails early.
         n_known = n + len(stack)
         top, n = stack.pop(), n + 1
         if n_known > MAX_NODES or len(top.path) > MAX_DEPTH:
@@ -233,24 +233,24 @@ def numbers(gltf: Gltf, value: Any, n: int, place: str) -> F64:
 
 
 def object_at(holder: dict[str, Any], key: str) -> dict[str, Any]:
-    """The JSON object under a key of another, {} where there is none.
+    """The JSON object under a key of another, {} if there is none.
 
-    What is optional in glTF may be missing, null or of another type; all of these read as absent.
+    Optional glTF fields may be missing, null or of another type; all of these count as absent.
     """
     value = holder.get(key)
     return value if isinstance(value, dict) else {}
 
 
 def specular_glossiness(fields_json: dict[str, Any]) -> dict[str, Any]:
-    """KHR_materials_pbrSpecularGlossiness of a material, {} where it has none or says it in metal, too."""
+    """KHR_materials_pbrSpecularGlossiness of a material, {} if absent or if metallic values exist too."""
     found = object_at(object_at(fields_json, "extensions"), "KHR_materials_pbrSpecularGlossiness")
     return {} if object_at(fields_json, "pbrMetallicRoughness") else found
 
 
 def texture_slots(gltf: Gltf, material: int | None) -> dict[str, dict[str, Any]]:
-    """The textures of a material that are looked at, by their key in glTF, the leading one first.
+    """The supported textures of a material by their glTF key, the leading one first.
 
-    A surface has one set of texture coordinates: that of the first of them.
+    A surface has one set of texture coordinates: that of the first texture.
     """
     if material is None:
         return {}
@@ -267,7 +267,7 @@ def texture_slots(gltf: Gltf, material: int | None) -> dict[str, dict[str, Any]]
 
 
 def texture_layout(gltf: Gltf, info: dict[str, Any]) -> tuple[Any, ...]:
-    """What places a texture on a surface: its set of texture coordinates, their transform, its wraps."""
+    """Placement of a texture on a surface: set of texture coordinates, transform, wraps."""
     turn = object_at(info, "extensions").get("KHR_texture_transform")
     return texture_set(info), turn, texture_wraps(gltf, info)
 
@@ -284,7 +284,7 @@ def texture_wraps(gltf: Gltf, info: dict[str, Any]) -> tuple[str, str]:
 
 
 def texture_set(info: dict[str, Any]) -> Any:
-    """The number of the texture coordinates that a texture lies by; its transform may name others."""
+    """Set of texture coordinates of a texture; its transform may override it."""
     turn = object_at(object_at(info, "extensions"), "KHR_texture_transform")
     return turn.get("texCoord", info.get("texCoord", 0))
 
@@ -336,7 +336,9 @@ def _mesh_of_primitive(gltf: Gltf, primitive: dict[str, Any], place: str) -> Mes
     if name in attributes:
         uvs = _accessor_floats(gltf, attributes[name], 2, f"{place}.TEXCOORD", known.get(name))
         uvs = _transformed(gltf, uvs, leading, place) * [1, -1] + [0, 1]  # v up
-    normals = np.zeros_like(positions)  # zero: flat, as glTF asks where there are none
+    normals = np.zeros_like(
+        positions
+    )  # zero means flat shading, as glTF specifies for missing normals
     if "NORMAL" in attributes:
         normals = _accessor_floats(
             gltf, attributes["NORMAL"], 3, f"{place}.NORMAL", known.get("NORMAL")
@@ -354,7 +356,7 @@ def _accessor_floats(
     raw = accessor_array(gltf, accessor) if decoded is None else decoded
     if raw.shape[1] != width:
         raise BadHouse(gltf.file, place, f"expected {width} components, got {raw.shape[1]}")
-    # A signalling NaN sets a flag in the cast; what is not finite is refused below.
+    # A signalling NaN sets a flag in the cast; non-finite values are rejected below.
     with np.errstate(invalid="ignore"):
         values = raw.astype(np.float64)
     if raw.dtype.kind in "iu" and entry(gltf, "accessors", accessor).get("normalized") is True:

@@ -60,7 +60,7 @@ class Emission:
 
     luminance: float  # cd m-2; 0 = of unknown strength
     rgb_linear: tuple[float, float, float]  # largest 1
-    is_coloured: bool  # the file tells that colour, also where it is white
+    is_coloured: bool  # the file gives that colour, even if it is white
 
 
 class SceneMaterials:
@@ -108,7 +108,7 @@ class SceneMaterials:
         if not glossy:
             reflected = reflected + (colour - reflected) * metallic
         specular = reflected if shininess > 0 or is_metal else np.zeros(3)
-        # What is as rough as can be and no metal is matte.
+        # Fully rough dielectrics are matte.
         roughness_map = maps.get("metallicRoughnessTexture", maps.get("specularGlossinessTexture"))
         has_coat = roughness < 1 or is_metal or roughness_map is not None
         material = Material(
@@ -132,11 +132,10 @@ class SceneMaterials:
     def _alpha(
         self, fields_json: dict[str, Any], factor: float, found: LoadedTexture | None, place: str
     ) -> tuple[float, float | None]:
-        """(opacity, alpha of the picture below which it is a hole or None) by the alpha mode.
+        """(opacity, alpha threshold of cut-outs or None) by the alpha mode.
 
-        MASK cuts out what is below its cutoff, and the rest is opaque. BLEND, which a label cannot be
-        half of, cuts its picture at one half, as Cycles' passes do; a picture that is as clear all over
-        makes glass of its mean.
+        MASK cuts out texels below its cutoff, the rest is opaque. BLEND is cut at one half, since labels
+        cannot be blended, as in Cycles' passes; a uniformly transparent picture makes glass of its mean.
         """
         mode = fields_json.get("alphaMode", "OPAQUE")
         alpha = found.alpha if found else OPAQUE_ALPHA
@@ -205,7 +204,7 @@ class SceneMaterials:
         return metallic, self._fraction(pbr, "roughnessFactor", 1.0, place)
 
     def _reflected(self, fields_json: dict[str, Any], place: str) -> F64:
-        """(3,) reflectance at right angles of what is no metal, linear."""
+        """(3,) reflectance of dielectrics at normal incidence, linear."""
         if glossy := specular_glossiness(fields_json):
             return self._specular_factor(glossy, place)
         extensions = object_at(fields_json, "extensions")
@@ -259,7 +258,7 @@ class SceneMaterials:
     ) -> MaterialKind:
         word = object_at(fields_json, "extras").get("kind")
         tagged = next((k for k in MaterialKind if k.value == word), None)
-        # What extras say goes first, then opacity, then the factors.
+        # Extras take precedence, then opacity, then the factors.
         if tagged is not None:
             return tagged
         if opacity < 1:
@@ -314,7 +313,7 @@ class SceneMaterials:
         )
 
     def _mean(self, info: Any, place: str, *, is_colour: bool) -> F64 | None:
-        """(3,) mean of a texture, of a colour in linear light; None where there is none."""
+        """(3,) mean of a texture, of a colour in linear light; None without a texture."""
         found = self._texture(info, place)
         if found is None:
             return None
@@ -326,7 +325,7 @@ class SceneMaterials:
     def _made(
         self, info: dict[str, Any], key: str, make: Callable[[bytes], bytes]
     ) -> LoadedTexture | None:
-        """The texture that is made of another's picture; None where that cannot be had."""
+        """A texture derived from another one's picture; None if that is not available."""
         found = self._texture(info, key)
         if found is None:
             return None
@@ -384,10 +383,10 @@ def _encoded(linear: Any) -> tuple[float, float, float]:
 
 
 def glass_materials(gltf: Gltf, numbers: Iterable[int | None]) -> frozenset[int]:
-    """Those of a window's or door's materials that are its glass by their names.
+    """The glass among the materials of a window or door, by name.
 
-    "Pane" and "Window glass" are, "glass frame" is not. "Window" is when nothing else of the
-    piece is clear: beside a glass it names the frame.
+    "Pane" and "Window glass" are glass, "glass frame" is not. "Window" is glass only if the piece has
+    no other clear material: beside a glass it names the frame.
     """
     rows = {n: entry(gltf, "materials", n) for n in numbers if n is not None}
     words = {n: words_of(str(row.get("name", ""))) for n, row in rows.items()}
@@ -398,13 +397,13 @@ def glass_materials(gltf: Gltf, numbers: Iterable[int | None]) -> frozenset[int]
 
 
 def material_names(gltf: Gltf, node: dict[str, Any]) -> tuple[str, ...]:
-    """Names of the materials in which a node's mesh is drawn; what is damaged has none."""
+    """Names of the materials of a node's mesh; empty for a damaged one."""
     try:
         primitives = entry(gltf, "meshes", node.get("mesh")).get("primitives")
         numbers = [p.get("material") for p in primitives] if isinstance(primitives, list) else []
         rows = [entry(gltf, "materials", n) for n in numbers if n is not None]
     except (AttributeError, BadHouse):
-        return ()  # told where the mesh is read
+        return ()  # reported where the mesh is read
     return tuple(str(row.get("name", ""))[:200] for row in rows)
 
 

@@ -1,7 +1,7 @@
-"""What a glTF node is: by its extras, by the user's mapping file, by the words of its name.
+"""Class of a glTF node: by its extras, by the user's mapping file, by the words of its name.
 
 No effects. The mapping file is JSON: {"nodes": {"Sofa*": "sofa", "Lamp_2": {"class": "lamp",
-"kind": "lamp"}}}; patterns are as in a shell, the first that fits wins, exact names come first.
+"kind": "lamp"}}}; patterns are as in a shell, the first match wins, exact names come first.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from pbrs_farm.home.names import words_of
 from pbrs_farm.read.common.furniture_classes import nyu40_of
 from pbrs_farm.read.common.name_classes import STRUCTURE_WORDS, NodeClass, class_of_node_name
 
-# Classes that are kinds of their own: wall, floor, door, lamp ...
+# Classes with an item kind of the same name: wall, floor, door, lamp ...
 _KIND_OF_CLASS: Final[dict[str, ItemKind]] = {
     kind.value: kind for kind in ItemKind if kind.value in NYU40_NAMES and kind.value != "object"
 }
@@ -50,7 +50,7 @@ class Mapping:
 
 
 def mapping_from_json(data: bytes, file: str) -> Mapping:
-    """The mapping in a JSON file; BadHouse naming the row that is wrong.
+    """The mapping in a JSON file; BadHouse, naming the invalid row.
 
     {"nodes": {"name or pattern": "class"}}; rows keep their order.
     """
@@ -75,10 +75,10 @@ def _class_of_row(row: Any, file: str, pattern: str) -> NodeClass:
 def class_of_node(
     name: str, extras: Any, mapping: Mapping, materials: Sequence[str] = ()
 ) -> NodeClass | None:
-    """What a node is: by its extras, else by the user's mapping, else by the words of its name.
+    """Class of a node: by its extras, else by the user's mapping, else by the words of its name.
 
-    extras: `nyu40` or `class`, and `kind`; materials: names of those it shows. None where none of
-    them says anything.
+    extras: `nyu40` or `class`, and `kind`; materials: names of its materials. None if none of them is
+    conclusive.
     """
     tagged = _tagged(extras) if isinstance(extras, dict) else None
     return tagged or mapping.of(name) or class_of_node_name(name, materials=materials)
@@ -91,10 +91,10 @@ _COLLECTIONS: Final = frozenset(
 
 
 def collection_of(name: str, seen: NodeClass) -> NodeClass | None:
-    """What the members of a node without a mesh are, where its name means several things.
+    """Class of the members of a node without a mesh, if its name is a collective noun.
 
-    None: the node is one thing ("Chair"). "Chairs": chairs. "Furniture", "Ground floor" (a storey):
-    no class that members would share, nyu40 0.
+    None: the node is one item ("Chair"). "Chairs": chairs. "Furniture", "Ground floor" (a storey): no
+    class shared by members, nyu40 0.
     """
     words = words_of(name)
     # words_of gives singulars beside plurals.
@@ -114,7 +114,7 @@ def _tagged(fields_json: dict[str, Any]) -> NodeClass | None:
     if isinstance(nyu40, str):
         word = re.sub(r"[ _-]", "", nyu40.lower())
         nyu40 = int(word) if word.isascii() and word.isdigit() and len(word) < 3 else _IDS.get(word)
-        # Kinds without a class of their own: a plant is otherprop, the others floor.
+        # Kinds without an NYU40 class: a plant is otherprop, the others floor.
         if nyu40 is None and word in ("ground", "plant", "stairs"):
             return NodeClass(OTHERPROP if word == "plant" else 2, ItemKind(word), is_tagged=True)
     if type(nyu40) is not int or not 0 <= nyu40 < len(NYU40_NAMES):

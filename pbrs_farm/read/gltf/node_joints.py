@@ -26,10 +26,10 @@ _LEAST: Final = 1e-3  # radians or metres; what moves less is fixed
 
 def joint_row(part: str, kind: JointKind, point: Any, axis: Any, limits: tuple[float, float],
               value: float) -> dict[str, Any]:  # fmt: skip
-    """What a node's extras hold under KEY.
+    """Joint description for a node's extras, under KEY.
 
-    limits: the least and greatest value, radians or metres. A joint that opens to its negative side is
-    told the other way round, so that it opens from 0 to its greatest value.
+    limits: minimum and maximum value, radians or metres. A joint that opens to the negative side is
+    inverted, so that it opens from 0 to its maximum.
     """
     lower, upper = limits
     axis = np.asarray(axis, np.float64)
@@ -42,10 +42,10 @@ def joint_row(part: str, kind: JointKind, point: Any, axis: Any, limits: tuple[f
 
 
 def joints_of_parts(gltf: Gltf, parts: Sequence[Placed]) -> dict[tuple[int, ...], Joint]:
-    """The joint, in the world, that each node of an item hangs on, by the node's path.
+    """The joint of each node of an item, in the world frame, by the node's path.
 
-    parts: of one item, a node after those above it. What hangs on a part that itself moves is of that
-    part: only what moves against the body counts. Raises BadHouse for numbers that are none.
+    parts: of one item, parents first. Nodes below a moving part belong to that part: only motion
+    relative to the body counts. Raises BadHouse for invalid numbers.
     """
     found: dict[tuple[int, ...], Joint] = {}
     for part in parts:

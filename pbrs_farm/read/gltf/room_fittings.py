@@ -1,8 +1,7 @@
-"""What is part of a room's mesh and no wall, floor or ceiling -> items of its own; no effects.
+"""Split windows, blinds and skirting off a room's mesh as separate items; no effects.
 
-Modellers draw a room with its windows, blinds and skirting as one mesh. Names of materials and
-connected parts say what these are; the way their faces look does not: a slat looks up, down and
-aside.
+Modellers draw a room with its fittings as one mesh. They are identified by names of materials and
+by connected parts; face directions do not help: a slat has faces in all directions.
 """
 
 from __future__ import annotations
@@ -28,7 +27,7 @@ _NARROW_M: Final = 0.12  # a part whose second side is shorter is a strip
 _THIN_M: Final = (1e-3, 0.3)  # least side of a closed part that is a board or a frame
 _LARGEST_M: Final = 2.5  # longest side of such a part
 _MOST_CLOSED: Final = 300  # parts tested for being closed, the largest first
-_BESIDE_M: Final = 0.06  # fittings nearer than this are one thing
+_BESIDE_M: Final = 0.06  # fittings closer than this are one item, metres
 _MOST_PARTS: Final = 3_000  # in a mesh of more parts, neighbours are not searched
 
 # Words of names of materials, accents folded.
@@ -77,11 +76,11 @@ _SKIRTING_WORDS: Final = frozenset(
 
 
 def parted_fittings(item: Item, *, by_shape: bool) -> tuple[Item, tuple[Item, ...]]:
-    """The item without what is fitted into a room, and those fittings, one item for what touches.
+    """The item without a room's fittings, and the fittings, touching parts merged.
 
-    Surfaces of materials named after glass, frames, windows, doors or skirting; by_shape: connected
-    parts that are strips or thin closed boards, too. The item as it is where all or nothing of it
-    is that.
+    Fittings are surfaces with materials named after glass, frames, windows, doors or skirting;
+    by_shape: also connected parts that are strips or thin closed boards. The item is unchanged if all
+    or none of it qualifies.
     """
     corners = corners_of_surfaces(item.surfaces)
     if not len(corners):
@@ -153,7 +152,7 @@ def _is_board(corners: F64, part_of_face: I64, bounds: F64) -> Bools:
 
 
 def _join_touching_parts(bounds: F64, fitted: Bools) -> I64:
-    """(P,) number of the thing each part belongs to: fitted parts whose boxes touch are one."""
+    """(P,) item index of each part: fitted parts whose boxes touch are one item."""
     numbers = np.flatnonzero(fitted)
     if len(numbers) > _MOST_PARTS:
         return np.zeros(len(bounds), np.int64)

@@ -39,7 +39,7 @@ _SMALL_M, _LARGE_M = 0.3, 150.0  # a scene beyond is in other units than metres
 
 @dataclass(frozen=True, slots=True)
 class Beside:
-    """What lies beside a scene."""
+    """Files beside a scene."""
 
     fetch: Fetch = lambda _name: None  # any other file by its relative name
     mapping: bytes | None = None  # JSON, None = no file
@@ -95,7 +95,7 @@ def read_gltf(data: bytes, name: str, *, fields: ReadFields, beside: Beside | No
     mapping = Mapping()
     if beside.mapping is not None:
         mapping = mapping_from_json(beside.mapping, f"{stem}.classes.json")
-    # Read what is in the scene, then cut its floors into rooms.
+    # Read the scene's content, then cut its floors into rooms.
     gltf = gltf_document(data, name, beside.fetch)
     copyright_line = gltf.document["asset"].get("copyright", "")
     source = Source("gltf", name, keys.sha256(data), attribution=str(copyright_line)[:500])
@@ -143,13 +143,13 @@ def house_of_gltf(
 
 
 def _rooms_of_scene(gltf: Gltf) -> Any:
-    """What the scene's extras say of rooms, as our own exports do."""
+    """The rooms in the scene's extras, as written by this project's exports."""
     scene = entry(gltf, "scenes", gltf.document.get("scene", 0))
     return object_at(scene, "extras").get("rooms")
 
 
 def _of_its_size(items: Sequence[Item], kind: str) -> str:
-    """What to say of a scene that is no size of a house, as one exported in centimetres; or ""."""
+    """Warning text for a scene that does not have the size of a house, as if exported in centimetres; or ""."""
     bounds = np.array([i.bounds for i in items if i.n_faces]).reshape(-1, 2, 3)
     if not len(bounds):
         return ""

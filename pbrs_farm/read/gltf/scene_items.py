@@ -39,14 +39,14 @@ from pbrs_farm.read.gltf.scene_lights import emitted, punctual_light
 from pbrs_farm.read.gltf.structure_parts import centres_of, structure_parts
 from pbrs_farm.read.mesh.obj import Mesh
 
-_LEAST_EXTENT_M: Final = 1e-6  # below it float32 cannot tell a thing from a point
+_LEAST_EXTENT_M: Final = 1e-6  # minimum extent of an item, limited by float32, metres
 _UNMAPPED: Final = NodeClass(
     OTHERPROP, ItemKind.OBJECT, is_tagged=False
-)  # class of a thing whose name says nothing
+)  # class of an item with an unknown name
 
 
 def _place_in_file(gltf: Gltf, thing: _Thing) -> str:
-    """Where a thing stands in its file: a node, or what another format calls it."""
+    """Location of an item in its file: a node, or the other format's term for it."""
     is_gltf = gltf.file.lower().endswith((".glb", ".gltf"))
     if not is_gltf and "item" in thing.extras:
         return str(thing.extras["item"])
@@ -57,24 +57,24 @@ def _place_in_file(gltf: Gltf, thing: _Thing) -> str:
 class _Thing:
     """An item while its nodes are gathered."""
 
-    root: Placed  # the node that says what it is
+    root: Placed  # the node that gives the class
     name: str
     seen: NodeClass
     extras: dict[str, Any]  # the root's
     materials: tuple[str, ...] = ()  # names of the root's
-    is_by_name: bool = False  # whether the root's name says what it is
-    parts: list[Placed] = field(default_factory=list)  # the root and what it owns below
+    is_by_name: bool = False  # whether the class is from the root's name
+    parts: list[Placed] = field(default_factory=list)  # the root and its descendants in the item
 
 
 def items_of_scene(
     gltf: Gltf, mapping: Mapping, materials: SceneMaterials, notes: Notes, fields: ReadFields
 ) -> Iterator[Item]:
-    """The items of the scene in the world, not yet on a level or in a room.
+    """The items of the scene in the world frame, not yet on a level or in a room.
 
-    A node with all below it is one item, unless it only groups others or shows a whole room, which is
-    parted. Raises BadHouse for more triangles or items than are read, and for what lies too far away.
+    A node with its descendants is one item, unless it is a group or a whole room, which is split.
+    Raises BadHouse for too many triangles or items, and for coordinates too far away.
     """
-    known: dict[Any, list[tuple[int | None, Mesh]]] = {}  # mesh number -> what is in it
+    known: dict[Any, list[tuple[int | None, Mesh]]] = {}  # mesh number -> its primitives
     taken: set[str] = set()  # ids
     n_faces = n_items = 0
     found: list[tuple[_Thing, str, Item]] = []  # with the place that notes name
@@ -93,7 +93,8 @@ def items_of_scene(
             text = f"more than {fields.max_triangles} triangles or {MAX_INSTANCES} items"
             raise BadHouse(gltf.file, place, text, hint="limit: read.max_triangles")
         found.append((thing, place, item))
-    # Part what shows a room or says by its materials what it is; tags of the file or user hold.
+    # Split rooms and items with class names in their materials; tags of the file or user take
+    # precedence.
     centres = centres_of([item for _, _, item in found])
     for thing, place, item in found:
         if thing.extras.get("solid") is True or item.joints:
@@ -106,7 +107,7 @@ def items_of_scene(
             notes.add("unmapped-class", place, "names no class; it is otherprop")
         if sum(part.n_faces for part in parts) < item.n_faces:
             notes.add("outer-side", place, "the side around the room it shows is left out")
-        # Give each part an id of its own: names need not differ in glTF.
+        # Give each part a unique id: names in glTF may repeat.
         for part in parts:
             unique, k = part.id, 2
             while unique in taken:
@@ -119,7 +120,7 @@ def items_of_scene(
 
 
 def _glazed(part: Item, whole: Item, materials: SceneMaterials) -> Item:
-    """A window or door that was part of a room's mesh, its glass as panes."""
+    """A window or door split off a room's mesh, with its glass as panes."""
     openings = (ItemKind.WINDOW, ItemKind.DOOR)
     if part.kind not in openings or whole.kind in openings:
         return part
@@ -137,11 +138,11 @@ def _glazed(part: Item, whole: Item, materials: SceneMaterials) -> Item:
 
 
 def _gather_things(gltf: Gltf, mapping: Mapping) -> list[_Thing]:
-    """The scene's nodes gathered by the item they are part of.
+    """Group the scene's nodes into items.
 
-    A node belongs to the nearest node above it (or itself) that is an item: the outermost whose
-    class is known, and below it those that are tagged. Members of a collection ("Chairs") that
-    have no class of their own have the collection's.
+    A node belongs to its nearest ancestor (or itself) that is an item: the outermost with a known
+    class, and tagged ones below it. Members of a collection ("Chairs") without a class of their own
+    inherit the collection's.
     """
     # By path from the root: the item a node belongs to, and the class its members inherit.
     owner: dict[tuple[int, ...], _Thing] = {}
@@ -158,7 +159,7 @@ def _gather_things(gltf: Gltf, mapping: Mapping) -> list[_Thing]:
         if own and inherited and not own.is_tagged and _is_shown(own, inherited):
             own = None
         seen = own or inherited
-        # A group whose name means several things is no item.
+        # A group named by a collective noun is not an item.
         if extras.get("group") is True:
             seen = None
         if seen and not seen.is_tagged and "mesh" not in fields_json:
@@ -205,7 +206,7 @@ def _item(
         thing.seen = replace(sized, is_tagged=is_tagged) if sized else _UNMAPPED
     kind = thing.seen.kind
     is_opening = kind in (ItemKind.WINDOW, ItemKind.DOOR)
-    # What lets light through is a pane in an opening, glass elsewhere.
+    # Transparent materials are panes in an opening, glass elsewhere.
     clear = MaterialKind.PANE if is_opening else MaterialKind.GLASS
     lights = _punctual_lights(gltf, thing)
     numbers = [number for _, meshes in parts for number, _ in meshes]
@@ -258,7 +259,7 @@ def _item(
 def _with_surfaces(
     lights: list[LightPart], surfaces: Sequence[Surface], glowing: Sequence[int]
 ) -> list[LightPart]:
-    """The lights, each with the glowing surfaces that are nearest to it."""
+    """The lights, each with the emissive surfaces nearest to it."""
     places = np.array([light.position for light in lights])
     owned: dict[int, list[int]] = {}
     for k in glowing:
@@ -279,7 +280,7 @@ def _box_of_thing(
         return across_last(box) if box else None
     world = thing.root.world_from_node
     is_opening = thing.seen.kind in (ItemKind.WINDOW, ItemKind.DOOR)
-    # An item of several meshes has a box of its own where its file says so.
+    # An item of several meshes keeps the box given in its file.
     has_frame = is_opening or thing.extras.get("has_frame") is True
     if not filled or not has_frame or is_flattening(world[:3, :3]):
         return None
@@ -329,7 +330,7 @@ def _meshes(
 
 
 def _extent_m(meshes: Sequence[tuple[int | None, Mesh]], world_from_node: F64) -> float:
-    """The longest side of the box around meshes where they stand."""
+    """Longest side of the bounding box of meshes in their world pose."""
     low, high = _bounds(meshes, world_from_node)
     return float((high - low).max())
 
@@ -341,7 +342,7 @@ def _bounds(meshes: Sequence[tuple[int | None, Mesh]], world_from_node: F64) -> 
 
 
 def _size_of(parts: list[tuple[Placed, list[tuple[int | None, Mesh]]]]) -> PieceSize | None:
-    """How large the parts of a thing are together; None where they have no points."""
+    """Size of an item's parts together; None without points."""
     boxes = [_bounds(meshes, part.world_from_node) for part, meshes in parts if meshes]
     if not boxes:
         return None

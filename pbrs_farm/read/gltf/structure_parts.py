@@ -1,4 +1,4 @@
-"""What one node shows of a room, parted into walls, floors and ceilings, or named by its materials. No effects."""
+"""Split one node of a room into walls, floors and ceilings, or classify it by its materials. No effects."""
 
 from __future__ import annotations
 
@@ -20,24 +20,25 @@ _THICKEST_OPENING_M: Final = 1.5  # a porch of glass has less
 
 
 def centres_of(items: Sequence[Item]) -> F64:
-    """(N, 3) centres of items that are no part of a room."""
+    """(N, 3) centres of items that are not part of a room."""
     found = [i.bounds.mean(0) for i in items if i.n_faces and i.kind not in _STRUCTURE]
     return np.array(found, np.float64).reshape(-1, 3)
 
 
 def structure_parts(item: Item, others: F64) -> tuple[Item, ...]:
-    """The items that a node's item is, where it is a wall, floor or ceiling, or is not known.
+    """Split a node's item that is structure or unknown.
 
-    others: centres_of all items. A room seen from inside is parted by how its faces look, after
-    what is fitted into it (room_fittings); what is no room by the names of its materials; open walls are parted plane by plane. A node whose name
-    holds the word window or door ("Room with windows") may be a room, too, where it is as large,
-    and so may one called "Ground" or "Ground floor".
+    others: centres_of all items. After its fittings (room_fittings), a room seen from inside is split
+    by face directions; other meshes by the names of their materials; open walls plane by plane. A node
+    whose name contains window or door ("Room with windows"), or is "Ground" or "Ground floor", may be
+    a room too if it is large enough.
     """
     is_unknown = UNMAPPED in item.tags
     may_be_room = item.kind in (*_STRUCTURE, ItemKind.GROUND) or is_unknown
     if not (may_be_room or _is_too_large_for_an_opening(item)):
         return (item,)
-    # What names and connected parts tell apart is no room's side, whichever way its faces look.
+    # Parts identified by name or connectivity are not sides of the room, whatever their face
+    # directions.
     own, fittings = parted_fittings(item, by_shape=True)
     parts = room_parts(own, others)
     if fittings and parts[0] is own:
@@ -59,7 +60,7 @@ def _is_too_large_for_an_opening(item: Item) -> bool:
 
 def _by_materials(item: Item) -> tuple[Item, ...]:
     kinds = [class_of_node_name(s.name) for s in item.surfaces]
-    # Part what is wall, floor and ceiling; surfaces that say nothing stay with the item.
+    # Separate wall, floor and ceiling; surfaces with inconclusive names stay with the item.
     groups: dict[ItemKind | None, list[Surface]] = {}
     for surface, seen in zip(item.surfaces, kinds, strict=True):
         kind = seen.kind if seen and seen.kind in _STRUCTURE else None
@@ -79,8 +80,9 @@ def _by_materials(item: Item) -> tuple[Item, ...]:
 
 
 def _name_by_materials(item: Item) -> Item:
-    # An unknown thing is what all of its materials say, if its size agrees: a plane drawn in Grass
-    # is ground, a board of Pine no plant.
+    # An unknown item takes the class that all of its materials agree on, if the size fits: a plane
+    # of
+    # Grass is ground, a board of Pine is not a plant.
     if UNMAPPED not in item.tags or not item.n_faces:
         return item
     width, height, depth = np.ptp(item.bounds, axis=0).tolist()

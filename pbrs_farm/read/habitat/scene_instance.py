@@ -58,11 +58,11 @@ _ARRAYS: Final = ("buffers", "bufferViews", "accessors", "meshes", "materials", 
 
 
 def read_habitat(given: GivenFile, fields: ReadFields) -> House:
-    """The House of a scene instance. Raises BadHouse naming file and place.
+    """Read a scene instance. Raises BadHouse, naming file and place.
 
-    given.models: folder of the data set, where it is not above the file. A scene whose light is
-    baked into pictures is refused, and one of which more than a third of the objects are missing.
-    Articulated objects stand as their instances' joint poses say, with the joints of their URDF.
+    given.models: folder of the data set, if it is not above the file. Scenes with light baked into
+    pictures are refused, and scenes with more than a third of their objects missing. Articulated
+    objects have the instances' joint poses and the joints of their URDF.
     """
     path, models = given.path, given.models
     dataset = _Dataset(path, models)
@@ -107,7 +107,7 @@ def read_habitat(given: GivenFile, fields: ReadFields) -> House:
 
 
 def companions_of_habitat(given: GivenFile, files: SourceFiles) -> str:
-    """Digest of the configs and models that the scene names; "" where there is none."""
+    """Digest of the configs and models referenced by the scene; "" if there are none."""
     path, models = given.path, given.models
     try:
         dataset = _Dataset(path, models)
@@ -134,7 +134,7 @@ def companions_of_habitat(given: GivenFile, files: SourceFiles) -> str:
 
 
 class _Dataset:
-    """The files below the folder of a data set's config; state: what was parsed."""
+    """The files below the folder of a data set's config; state: a cache of parsed files."""
 
     def __init__(self, path: Path, models: str) -> None:
         above = [path.parent, *path.parents[1:_LEVELS_UP]]
@@ -157,7 +157,7 @@ class _Dataset:
         return [n for n in self._files if fnmatchcase(posixpath.basename(n), pattern)]
 
     def json(self, name: str) -> dict[str, Any]:
-        """The JSON object of a file; BadHouse where it is none."""
+        """The JSON object of a file; BadHouse for any other content."""
         if name not in self._parsed:
             data = self.folder.read(name, max_bytes=_MOST_JSON_BYTES)
             value = json_from_bytes(data or b"", name)
@@ -186,7 +186,7 @@ class _Dataset:
         return {asset, *(self.folder.name_from(at, uri) for uri in files_of_gltf(data, asset))}
 
     def urdf(self, template: str) -> str | None:
-        """The name of the URDF of an articulated object's template; None where it has none."""
+        """Name of the URDF of an articulated object's template; None if it has none."""
         config = self.config(template, "ao")
         named = self.json(config).get("urdf_filepath") if config else None
         if config and isinstance(named, str):
@@ -206,7 +206,7 @@ class _Dataset:
         return {f for model in models if model in self._known for f in self.files_of("", model)}
 
     def class_of(self, template: str) -> str:
-        """What objects.csv calls a model: its category, "" where it says nothing."""
+        """Category of a model in objects.csv, "" if it has none."""
         if self._classes is None:
             self._classes = {}
             for name in self.named("*objects.csv"):
@@ -229,7 +229,7 @@ def _names_below(root: Path) -> list[str]:
 
 @dataclass(slots=True)
 class _Built:
-    """One glTF document of all assets, each once; state: what was added."""
+    """One glTF document of all assets, each once; state: the assets added so far."""
 
     file: str
     document: dict[str, Any] = field(default_factory=dict)
@@ -298,7 +298,7 @@ class _Built:
         lights += own if isinstance(own, list) else []
 
     def place(self, roots: list[int], matrix: F64, name: str, extras: dict[str, Any]) -> None:
-        """Set an asset's roots below a node of its own."""
+        """Put an asset's roots below a new node."""
         node = {
             "name": name, "matrix": matrix.T.reshape(-1).tolist(), "children": roots, "extras": extras
         }  # fmt: skip
@@ -376,7 +376,7 @@ def _add_stage(dataset: _Dataset, template: str, built: _Built) -> None:
     if found is None:
         raise BadHouse(config, "render_asset", f"{name} does not exist")
     matrix = _upright_matrix(row, found[1], config)
-    # Each root of the stage stays by itself, so that its names and extras tell what it is.
+    # Keep the stage's roots separate, so that their names and extras give their classes.
     for root in found[0]:
         built.place([root], matrix, "", {})
 
@@ -532,7 +532,7 @@ def _add_lights(dataset: _Dataset, named: Any, built: _Built, notes: Notes) -> N
 
 
 def _centre(gltf: Gltf, inner: F64, settings: dict[str, Any], config: str) -> F64:
-    """What the instance's translation moves: the given centre of mass, else the box's middle."""
+    """Origin of the instance's translation: the given centre of mass, else the box's centre."""
     if "COM" in settings:
         return numbers(Gltf({}, (), config), settings["COM"], 3, "COM")
     points = []
@@ -564,7 +564,7 @@ def _upright_matrix(row: dict[str, Any], gltf: Gltf, config: str) -> F64:
 
 
 def _rooms_of_regions(dataset: _Dataset, named: Any, stem: str) -> bytes | None:
-    """The regions of the scene's semantic config as a room file; None where there are none."""
+    """The regions of the scene's semantic config as a room file; None without regions."""
     base = posixpath.basename(named) if isinstance(named, str) else stem
     base = base.removesuffix(".semantic_config.json")
     found = next((n for n in dataset.named(f"{base}.semantic_config.json")), None)

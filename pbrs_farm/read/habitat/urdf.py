@@ -1,4 +1,4 @@
-"""A thing with joints as URDF says it: links, what is seen of them, how they hang together; no effects."""
+"""Read an articulated object from URDF: links, their visible shapes, their joints; no effects."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Visual:
 
 @dataclass(frozen=True, slots=True)
 class LinkJoint:
-    """How a link hangs on the one above it."""
+    """Joint between a link and its parent."""
 
     name: str
     kind: JointKind | None  # None: fixed
@@ -44,7 +44,7 @@ class LinkJoint:
     upper: float
 
     def parent_from_link(self, value: float) -> F64:
-        """(4, 4) where the link stands at a value, radians or metres."""
+        """(4, 4) pose of the link at a value, radians or metres."""
         moved = np.eye(4)
         if self.kind is JointKind.REVOLUTE:
             moved[:3, :3] = Rotation.from_rotvec(value * self.axis).as_matrix()
@@ -65,17 +65,17 @@ class Link:
 
 @dataclass(frozen=True, slots=True)
 class Robot:
-    """The links of a URDF, each after the one it hangs on."""
+    """The links of a URDF, parents first."""
 
     links: tuple[Link, ...]
     moving: tuple[str, ...]  # names of joints that are not fixed, in the file's order
-    n_unread: int  # shapes that are no models: boxes, cylinders, spheres
+    n_unread: int  # skipped primitive shapes: boxes, cylinders, spheres
 
     def values(self, pose: Any, file: str, place: str, order: str = "") -> dict[str, float]:
-        """Joint -> its value, radians or metres, as a Habitat scene gives them.
+        """Joint values by name, radians or metres, from a Habitat scene.
 
-        pose: a list in the order of the links ("urdf_order": of the file, else of the tree), or an
-        object by joints' names; what it does not say is 0. Raises BadHouse for anything else.
+        pose: a list in the order of the links ("urdf_order": of the file, else of the tree), or an object
+        by joints' names; missing joints are 0. Raises BadHouse for anything else.
         """
         if not pose:
             return {}

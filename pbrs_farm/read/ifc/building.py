@@ -73,7 +73,7 @@ _LEAST_ROOM_M2: Final = 0.3
 _COVERED: Final = 0.5  # share of a room that a slab covers to be its floor or ceiling
 _BELOW_SLAB_M: Final = 0.005  # a room's own ceiling hangs so far below a slab
 _OPENINGS: Final = (ItemKind.DOOR, ItemKind.WINDOW)
-# Entities of what stands in rooms: structure and openings are none of them, whatever their names say.
+# Entities of furniture and fixtures, which are never structure or openings, whatever their names.
 _PIECES: Final = (
     "IfcFurnishingElement", "IfcFlowTerminal", "IfcElectricAppliance", "IfcSanitaryTerminal",
 )  # fmt: skip
@@ -102,7 +102,7 @@ class _Space:
 
 
 class _Building:
-    """A building while it is read. State: what was found so far."""
+    """A building while it is read. State: the items read so far."""
 
     def __init__(self, path: Path, fields: ReadFields) -> None:
         from ifcopenshell.util.unit import calculate_unit_scale
@@ -148,7 +148,7 @@ class _Building:
             voids_of_walls(self._model, self._meshes, self._world, by_id, builder.level_of)
         )
         told = openings_of_voids(builder.items, voids)
-        # Build what has no shape in the file to the size of its hole.
+        # Build doors and windows without a shape to the size of their hole.
         for void in voids:
             if not void.undrawn or (opening := told.get(void.id)) is None:
                 continue
@@ -234,7 +234,7 @@ class _Building:
     def _class(
         self, product: Any, mesh: ProductMesh
     ) -> tuple[ItemKind, int, tuple[str, ...]] | None:
-        """(kind, NYU40 class, tags); None of what is not drawn."""
+        """(kind, NYU40 class, tags); None for products that are not drawn."""
         given = _given(product)
         place = f"#{product.id()} {product.is_a()}"
         if given is not None and given.kind == "none":
@@ -263,7 +263,7 @@ class _Building:
     def _class_of_covering(
         self, product: Any, mesh: ProductMesh
     ) -> tuple[ItemKind, int, tuple[str, ...]]:
-        """Ceiling, floor or wall by where a covering of no known type lies."""
+        """Ceiling, floor or wall, by the position of a covering of unknown type."""
         low, high = mesh.world.min(0), mesh.world.max(0)
         if high[2] - low[2] > (high - low)[:2].min():
             return ItemKind.WALL, WALL, ()
@@ -297,7 +297,7 @@ class _Building:
         return z if is_placed else building_z + (self._elevation(storey) or 0.0)
 
     def _elevation(self, storey: Any) -> float | None:
-        """Metres, z of the file; None where the storey tells none."""
+        """Metres, z of the file; None if the storey has no elevation."""
         height = getattr(storey, "Elevation", None)
         return float(height) * self._metres if height is not None and np.isfinite(height) else None
 
@@ -343,7 +343,7 @@ class _Building:
         )  # fmt: skip
 
     def _unstyled(self, product: Any) -> Material:
-        """The material of what has no style: its name says what it is made of, no colour."""
+        """Material of a product without a style, from its name."""
         import ifcopenshell.util.element as element
 
         found = element.get_material(product, should_skip_usage=True)
@@ -370,7 +370,7 @@ class _Building:
     # Rooms and levels
 
     def _rooms_of_spaces(self) -> list[tuple[Room, F64]]:
-        """The rooms that the building tells, each with the triangles of the top of its body."""
+        """The IfcSpaces as rooms, each with the triangles of the top of its body."""
         spaces = [
             _Space(row, self._meshes[row.id()])
             for row in self._model.by_type("IfcSpace")
@@ -381,7 +381,7 @@ class _Building:
     def _under_ceilings(
         self, told: Sequence[tuple[Room, F64]], overheads: Overheads
     ) -> list[tuple[Room, F64 | None]]:
-        """The rooms as high as the ceiling that hangs there; those on a roof, under nothing, are none."""
+        """Limit the rooms to the height of their ceilings; drop rooms on a roof, with nothing above."""
         found: list[tuple[Room, F64 | None]] = []
         for room, top in told:
             above = overheads.over(room)
@@ -420,7 +420,7 @@ class _Building:
         return room, corners[unit_normals(corners)[:, 1] > _UPWARD]
 
     def _named(self, levels: Sequence[Level]) -> tuple[Level, ...]:
-        """The levels of the rooms' floors, each named as the storey that is nearest."""
+        """The levels of the rooms' floors, each named after the nearest storey."""
         storeys = [
             (z + float(self._world[1, 3]), str(row.LongName or row.Name or "")[:60])
             for row in self._model.by_type("IfcBuildingStorey")
@@ -436,10 +436,10 @@ class _Building:
     def _covers(
         self, rooms: Sequence[tuple[Room, F64 | None]], items: Sequence[Item], overheads: Overheads
     ) -> list[Item]:
-        """A floor or a ceiling for each room over or under which the building has none.
+        """A floor or ceiling for each room without one in the building.
 
-        rooms: each with the top of its space's body, which a ceiling follows where it slopes. A slab is
-        the floor of what is above; its underside gets the ceiling of the room below.
+        rooms: each with the top of its space's body, which a sloped ceiling follows. A slab is the floor
+        of the room above; its underside gets the ceiling of the room below.
         """
         white = self._library.index(Material("", diffuse=(0.9, 0.9, 0.9), is_default=True))
         found: list[Item] = []
@@ -520,7 +520,7 @@ def _given(product: Any) -> GivenClass | None:
             return found
     if product.is_a("IfcSlab"):
         return GivenClass("floor", FLOOR)
-    # A newer or older entity is what it is a kind of.
+    # Entities of other schema versions are handled as their supertype.
     for entity in (
         "IfcWall",
         "IfcDoor",
@@ -536,7 +536,7 @@ def _given(product: Any) -> GivenClass | None:
 
 
 def _part_of_wall(product: Any, mesh: ProductMesh) -> tuple[ItemKind, int, tuple[str, ...]]:
-    """What a plate or a bar is: glass of a curtain wall is a window, other plates are wall."""
+    """Class of a plate or a bar: glass of a curtain wall is a window, other plates are wall."""
     in_wall = any(
         rel.RelatingObject.is_a("IfcCurtainWall")
         for rel in getattr(product, "Decomposes", ()) or ()
@@ -562,7 +562,7 @@ def _top_of_item(item: Item) -> float:
 
 
 def _heights_of_floors(items: Sequence[Item], room: Room) -> list[float]:
-    """The heights near the room's floor of the slabs that are it."""
+    """Heights of the slabs that form the room's floor."""
     low, high = room.polygon.min(0), room.polygon.max(0)
     found = []
     for item in items:
@@ -583,7 +583,7 @@ def _is_called_attic(name: str) -> bool:
 def _rooms_between_walls(
     items: Sequence[Item], overheads: Overheads
 ) -> list[tuple[Room, F64 | None]]:
-    """The rooms of a building that tells none, as high as what hangs over most of them."""
+    """Rooms of a building without IfcSpaces, as high as the ceiling over most of their area."""
     found: list[tuple[Room, F64 | None]] = []
     for room in rooms_from_floors(items):
         above = overheads.over(room)
@@ -610,14 +610,14 @@ def _floor_or_ceiling_item(room: Room, kind: ItemKind, surface: Surface) -> Item
 
 
 def _is_walled(room: Room, items: Sequence[Item], least_m: float) -> bool:
-    """Whether walls stand around most of a room's outline: a terrace and a roof have none."""
+    """True if walls surround most of a room's outline; false for terraces and roofs."""
     ring: Any = shapely.Polygon(room.polygon).exterior
     points = shapely.points(
         [ring.interpolate(d).coords[0] for d in np.arange(0, ring.length, 0.25)]
     )
     lines: list[Any] = []
     for item in items:
-        # Leave out what is lower, and what stands below.
+        # Skip lower walls and walls below.
         if item.kind is not ItemKind.WALL or _top_of_item(item) < room.floor_y + least_m:
             continue
         for s in item.surfaces:

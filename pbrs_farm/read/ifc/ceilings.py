@@ -1,8 +1,8 @@
-"""What hangs over the rooms of an IFC building: ceilings, roofs, undersides of slabs; no effects.
+"""Ceilings over the rooms of an IFC building: ceilings, roofs, undersides of slabs; no effects.
 
 Programs write a room's height as that of its space's body, which may end at the slab above a suspended
-ceiling or in the sky over a sloped roof: what hangs there counts. They write roofs as slabs without a
-type, which their names and their place tell.
+ceiling or above a sloped roof: the real ceiling takes precedence. They write roofs as slabs without a
+type; names and positions identify these.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _KNEE_M: Final = 0.3  # above the floor: a sloped roof that comes lower is no ce
 _HEADROOM_M: Final = 1.8  # above the floor: a slab that hangs lower is a platform, a wall a parapet
 _LEVEL_M: Final = 0.025  # samples that differ less from the middle one are at its height
 _HALF: Final = 0.5  # share of a room, or of a slab, that counts as most of it
-_JOINT_M: Final = 0.6  # from a wall's end to the slab that it stands on or carries
+_JOINT_M: Final = 0.6  # maximum distance from a wall's end to the slab below or above it, metres
 _WELD_DECIMALS: Final = 4  # of metres: corners nearer than .1 mm are one
 _CARRIES: Final = 0.1  # share of a slab's plan that a space on it covers at least
 
@@ -48,7 +48,7 @@ _NO_ROOF_WORDS: Final = frozenset(_TERRACE_NAMES.split())
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Overhead:
-    """What hangs over a room at samples of its plan."""
+    """Heights above a room at samples of its plan."""
 
     heights: F64  # (N,) y of the lowest ceiling, roof or slab above; inf = none
     is_ceiling: Bools  # (N,) it is a ceiling or a roof, not the underside of a slab
@@ -83,7 +83,7 @@ class Overheads:
         self._slabs = np.concatenate([none, *_undersides(items, ItemKind.FLOOR)])
 
     def over(self, room: Room) -> Overhead:
-        """What hangs over a room of a polygon and a floor."""
+        """Heights above a room's polygon and floor."""
         points = _samples_of_plan(room.polygon)
         ceiling = lowest_above(points, self._ceilings, room.floor_y + _KNEE_M)
         slab = lowest_above(points, self._slabs, room.floor_y + _HEADROOM_M)
@@ -114,11 +114,11 @@ def _samples_of_plan(polygon: F64) -> F64:
 
 
 def with_roofs(items: Sequence[Item], rooms: Sequence[Room]) -> list[Item]:
-    """The items, slabs that are roofs made ceilings: by their names, or by their place.
+    """The items, with roof slabs turned into ceilings, by name or by position.
 
-    rooms: those that the building tells; a slab under one is no roof, nor is one with the walls of a
-    storey around it, whatever its name. By its place a slab is a roof that lies on walls, and on which
-    neither a room nor a wall of a storey stands (parapets do).
+    rooms: those in the file; a slab below a room is not a roof, nor is one with the walls of a storey
+    around it, whatever its name. By position, a slab is a roof if it is on walls and carries neither a
+    room nor a storey's wall (parapets are allowed).
     """
     walls = [i.bounds for i in items if i.kind is ItemKind.WALL]
     bounds = np.array(walls).reshape(-1, 2, 3)
@@ -138,7 +138,7 @@ def with_roofs(items: Sequence[Item], rooms: Sequence[Room]) -> list[Item]:
 
 
 def is_called_roof(name: str) -> bool:
-    """Whether a name says roof, and not that one stands on it (a roof terrace)."""
+    """True if a name contains roof, and is not a place on a roof (a roof terrace)."""
     words = words_of(name)
     return bool(words & ROOF_WORDS) and not words & _NO_ROOF_WORDS
 
@@ -152,7 +152,7 @@ def _carries_room(slab: Item, rooms: Sequence[Room]) -> bool:
 
 
 def _carries_storey(slab: Item, walls: F64) -> bool:
-    """Whether walls around most of a slab stand on it: a roof beside a higher house has one. walls: (W, 2, 3) bounds."""
+    """True if walls stand on most of a slab's outline; a roof beside a higher house has one. walls: (W, 2, 3) bounds."""
     low, high = slab.bounds
     on_it = [w for w in _walls_above(slab, walls) if w[0, 1] > low[1] - _JOINT_M]
     if not on_it:
@@ -162,7 +162,7 @@ def _carries_storey(slab: Item, walls: F64) -> bool:
 
 
 def _walls_above(slab: Item, walls: F64) -> F64:
-    """Those of the walls (W, 2, 3) over a slab that are as high as a storey above it."""
+    """The walls (W, 2, 3) on a slab that are as high as a storey."""
     near = _walls_over_or_under(slab, walls)
     return np.asarray(near[near[:, 1, 1] > slab.bounds[1, 1] + _HEADROOM_M])
 
@@ -175,7 +175,7 @@ def _walls_over_or_under(slab: Item, walls: F64) -> F64:
 
 
 def _is_placed_as_roof(slab: Item, walls: F64) -> bool:
-    """Whether a slab lies on walls and carries none. walls: (W, 2, 3) bounds."""
+    """True if a slab is supported by walls and carries none. walls: (W, 2, 3) bounds."""
     low, high = slab.bounds
     near = _walls_over_or_under(slab, walls)
     carrying = (near[:, 1, 1] > low[1] - _JOINT_M) & (near[:, 0, 1] < high[1] - _HEADROOM_M)

@@ -1,7 +1,7 @@
-"""Doors and windows of an IFC building: which is which, the holes they stand in, how they open, what is glass.
+"""Doors and windows of an IFC building: kind, hole, operation, glass.
 
-No effects. Relations say which hole was cut out of which wall (IfcRelVoidsElement) and what stands in it
-(IfcRelFillsElement).
+No effects. IfcRelVoidsElement relates a wall to its holes, and IfcRelFillsElement a hole to its door
+or window.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from pbrs_farm.read.common.name_classes import class_of_node_name
 from pbrs_farm.read.common.openings import Void
 from pbrs_farm.read.ifc.meshes import ProductMesh
 
-_THIN_M: Final = 0.045  # a part of a window that is no thicker may be its glass
+_THIN_M: Final = 0.045  # maximum thickness of a window part that may be glass, metres
 _THRESHOLD_M: Final = 0.3  # above the storey: a door begins lower
 _SILL_M: Final = 0.5  # above the storey: what begins higher may be a window
 _DOOR_HEIGHT_M: Final = 1.7  # least height of a door
@@ -39,11 +39,11 @@ _GARAGE: Final = frozenset({"overhead", "garage"})
 def kind_of_opening(
     product: Any, kind: ItemKind, names: Sequence[str], foot_m: float, height_m: float
 ) -> ItemKind:
-    """Door or window. kind: what the entity says, which is wrong in some exports.
+    """Door or window. kind: by the entity, which is wrong in some exports.
 
-    names: of the product and its type. foot_m: above the storey's floor. A window that is typed as a door,
-    or called one and stands on the floor as one, is a door; a door that is called a window and begins
-    above a sill is a window.
+    names: of the product and its type. foot_m: above the storey's floor. A window with a door's type,
+    or with a door's name and on the floor, is a door; a door with a window's name and above a sill is
+    a window.
     """
     import ifcopenshell.util.element as element
 
@@ -70,7 +70,7 @@ def _says(name: str, nyu40: int, families: Sequence[str]) -> bool:
 
 
 def tags_of_name(names: Sequence[str]) -> tuple[str, ...]:
-    """Tags of how a door opens that its family tells, for doors whose entity has no operation."""
+    """Tags for a door's operation from its family name, for entities without one."""
     words = frozenset().union(*(words_of(name) for name in names))
     if words & _GARAGE:
         return ("garage",)
@@ -120,7 +120,7 @@ def voids_of_walls(
 
 
 def hole_of_undrawn(opening: Opening, product: Any) -> Hole:
-    """What is to be built in an opening whose door or window, product, has no shape."""
+    """The hole to fill for a door or window without a shape."""
     normal = opening.normal
     axes = np.stack([np.cross([0.0, 1.0, 0.0], normal), [0.0, 1.0, 0.0], normal], 1)
     corners = opening.quad @ axes

@@ -23,16 +23,16 @@ _STRING: Final = re.compile(rb"'(?:[^']|'')*'")
 _COMMENT: Final = re.compile(rb"/\*.*?\*/", re.DOTALL)
 _NUMBER: Final = re.compile(rb"#(\d{1,18})(\s*=)?")
 _SCHEMA: Final = re.compile(r"(FILE_SCHEMA\s*\(\s*\(\s*')([^']{1,40})'", re.IGNORECASE)
-# What a schema's name begins with, and the one of its family that the library knows.
+# Prefixes of schema names, and the supported schema of each family.
 _SCHEMAS: Final = (("IFC2X", "IFC2X3"), ("IFC4X", "IFC4X3_ADD2"), ("IFC4", "IFC4"))
 _NAMED: Final = ("Name", "Description", "ObjectType", "Tag", "LongName", "ElementType")
 
 
 def model_of(path: Path) -> Any:
-    """The ifcopenshell.file of a .ifc or .ifczip. Raises BadHouse naming the row that is wrong.
+    """The ifcopenshell.file of a .ifc or .ifczip. Raises BadHouse, naming the invalid row.
 
-    The file is looked through before the library gets it, and damage of the library's own finding
-    is a BadHouse, too. Needs ifcopenshell.
+    The file is checked before the library opens it, and errors of the library become BadHouse too.
+    Needs ifcopenshell.
     """
     import ifcopenshell
 
@@ -78,7 +78,7 @@ def _bytes_of(path: Path) -> bytes:
 
 
 def _check_step_file(data: bytes, path: Path) -> None:
-    """Raise BadHouse for what is no IFC in STEP's form, or damaged so that the library may not end."""
+    """Raise BadHouse for data that is not IFC in STEP form, or damaged so that the library might hang."""
     head = data[:2000].lstrip(b"\xef\xbb\xbf \r\n\t")
     hint = "export it as IFC (.ifc, STEP), IFC2x3 or IFC4"
     if head[:1] == b"<":

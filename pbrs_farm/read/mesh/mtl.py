@@ -40,10 +40,9 @@ class ObjMaterial:
 
 
 def parse_mtl(data: bytes) -> tuple[ObjMaterial, ...]:
-    """The materials in the order of the file; lines that cannot be read are passed over.
+    """The materials in the order of the file; unreadable lines are skipped.
 
-    Bytes that are no UTF-8 are replaced. Pictures are named, not opened. A name that comes twice is
-    there twice.
+    Invalid UTF-8 is replaced. Pictures are named, not opened. Repeated names are kept.
     """
     materials: list[ObjMaterial] = []
     fields: dict[str, object] | None = None
@@ -109,7 +108,7 @@ def _add_unread(fields: dict[str, object], what: str) -> None:
 
 
 def _pair_of_option(words: list[str] | None, default: float) -> tuple[float, float]:
-    """The first two numbers after -s or -o; what is left out is the default."""
+    """The first two numbers after -s or -o; the default for missing ones."""
     found = [_mtl_number(w) for w in (words or [])[:2]] + [None, None]
     u, v = (default if value is None else value for value in found[:2])
     return u, v
@@ -129,7 +128,7 @@ _OPTIONS = {"-s": 3, "-o": 3, "-t": 3, "-mm": 2, "-bm": 1, "-clamp": 1, "-blendu
 
 
 def _picture_of_line(words: list[str], raw: str) -> tuple[dict[str, list[str]], str]:
-    """(option -> what follows it, the picture's name) of a map_ line; what is left is the name, blanks included."""
+    """(option -> its arguments, picture name) of a map_ line; the name may contain spaces."""
     options: dict[str, list[str]] = {}
     at = 0
     while at < len(words) and words[at].lower() in _OPTIONS:

@@ -30,13 +30,13 @@ class Mesh:
     material: str
     positions: F64  # (V, 3)
     faces: I32  # (F, 3)
-    uvs: F64 | None  # (V, 2); None = the file has none
+    uvs: F64 | None  # (V, 2); None without texture coordinates
     normals: F64  # (V, 3) unit, creased where none are given
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ObjModel:
-    """What an OBJ holds."""
+    """Contents of an OBJ file."""
 
     meshes: tuple[Mesh, ...]  # in the file's order
     mtllibs: tuple[str, ...]  # as written
@@ -67,10 +67,10 @@ class _Statements:
 
 
 def parse_obj(data: bytes, file: str, *, max_triangles: int = 2_000_000) -> ObjModel:
-    """Parse OBJ bytes; file names them in errors.
+    """Parse OBJ bytes; file is for error messages.
 
-    Raises BadHouse for a number that is none or not finite, a face index out of range, or more
-    than max_triangles triangles.
+    Raises BadHouse for an invalid or non-finite number, a face index out of range, or more than
+    max_triangles triangles.
     """
     data = data.removeprefix(BOM_UTF8)
     # Bound the work by counting lines before any is looked at.
@@ -148,7 +148,7 @@ def _decoded_name(rest: bytes) -> str:
 def _parse_rows(lines: list[bytes], n: int, file: str, what: str) -> F64:
     if not lines:
         return np.zeros((0, n))
-    # Parse all lines at once where each has as many numbers; else pad or cut them.
+    # Parse all lines at once if they have equally many numbers; else pad or cut them.
     tokens = b" ".join(lines).split()
     # Colours after a position, or a third texture coordinate, are cut off below.
     per_line = len(tokens) // len(lines)
@@ -170,7 +170,7 @@ def _parse_rows(lines: list[bytes], n: int, file: str, what: str) -> F64:
 
 
 def _word_at_fault(lines: list[bytes], what: str, kind: type[int] | type[float]) -> tuple[str, str]:
-    """(place, text) of the first word of an OBJ's lines of one kind that is no number."""
+    """(place, text) of the first invalid number in an OBJ's lines of one kind."""
     for number, line in enumerate(lines, start=1):
         for word in line.split():
             try:
@@ -185,8 +185,8 @@ def _word_at_fault(lines: list[bytes], what: str, kind: type[int] | type[float])
 
 
 def _indices(part: _Part, pools: tuple[F64, ...], file: str) -> I64:
-    # (n corners, 3) vertex, uv and normal index from 0; -1 = none.
-    # Parse all corners at once where they have one form: v, v/vt, v//vn or v/vt/vn.
+    # (n corners, 3) zero-based vertex, uv and normal index; -1 = none.
+    # Parse all corners at once if they have one form: v, v/vt, v//vn or v/vt/vn.
     joined = b" ".join(part.lines).replace(b"//", b"/0/")
     tokens = joined.split()
     slashes = {t.count(b"/") for t in tokens}
@@ -204,11 +204,11 @@ def _indices(part: _Part, pools: tuple[F64, ...], file: str) -> I64:
     indices = np.zeros((len(tokens), 3), np.int64)
     indices[:, :columns] = given
     if (given < 0).any():
-        # Count negative indices back from what was there when the face was written.
+        # Negative indices are relative to the vertices read before the face.
         per_line = [len(x.split()) for x in part.lines]
         seen = np.repeat(np.asarray(part.seen, np.int64).reshape(-1, 3), per_line, axis=0)
         indices = np.where(indices < 0, indices + seen + 1, indices)
-    # Refuse a vertex that does not exist; without a texture or normal one can go on.
+    # A missing vertex is an error; missing textures and normals are tolerated.
     for k, what in enumerate(("vertex", "texture", "normal")):
         low, high = int(indices[:, k].min()), int(indices[:, k].max())
         if low < (1 if k == 0 else 0) or high > len(pools[k]):
@@ -237,9 +237,9 @@ def mesh_from_corners(
     pools: tuple[F64, ...],
     crease_rad: float = DEFAULT_CREASE_RAD,
 ) -> tuple[Mesh | None, int]:
-    """The mesh of polygons, None of none with an area, and how many triangles were dropped.
+    """The mesh of polygons (None without area), and the number of dropped triangles.
 
-    indices: (n corners, 3) of position, uv and normal from 0, -1 = none; sizes: corners of each
+    indices: (n corners, 3) zero-based position, uv and normal, -1 = none; sizes: corners of each
     polygon; pools: positions (V, 3), uvs (T, 2), normals (N, 3).
     """
     # Triangulate, and drop triangles without area.

@@ -32,7 +32,7 @@ def crease_normals(points: F64, faces: I64, crease_rad: float) -> tuple[F64, I64
 
 
 def _normal_of_corner(points: F64, faces: I64, unit: F64, min_cos: float) -> tuple[int, I32]:
-    # How many normals there are, and which each of the 3 F corners has.
+    # Number of normals, and the index for each of the 3 F corners.
     _, welded = numbered_points(points[faces.ravel()])
     first, second = _smooth_links(welded.reshape(-1, 3), unit, min_cos)
     # Corners that smooth edges join, directly or through others, share one normal.

@@ -30,7 +30,7 @@ class Wraps:
 
 
 def leaves_picture(mesh: Mesh, wraps: tuple[str, str]) -> bool:
-    """Whether a mesh lies beyond the edges of its picture where that does not repeat."""
+    """True if a mesh extends beyond the edges of a picture that does not repeat."""
     if mesh.uvs is None or not len(mesh.uvs):
         return False
     ends = zip(wraps, mesh.uvs.min(0), mesh.uvs.max(0), strict=True)

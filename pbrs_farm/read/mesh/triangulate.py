@@ -26,7 +26,7 @@ def triangulated_corners(positions: F64, sizes: I64) -> I64:
             continue
         which = np.flatnonzero(sizes == n)
         corners = starts[which][:, None] + np.arange(n)
-        # Cut all convex polygons of one size at once, as fans about their first corner.
+        # Triangulate all convex polygons of one size at once, as fans round their first corner.
         first = np.broadcast_to(corners[:, :1], (len(which), n - 2))
         fans = np.stack([first, corners[:, 1:-1], corners[:, 2:]], -1)
         if n == 3:
@@ -49,7 +49,7 @@ def triangulated_corners(positions: F64, sizes: I64) -> I64:
 
 
 def _newell(polygons: F64) -> F64:
-    # Newell's normal: also of polygons that are neither convex nor quite flat.
+    # Newell's normal, valid for non-convex and slightly non-planar polygons.
     following = np.roll(polygons, -1, axis=1)
     return np.asarray(np.cross(polygons, following).sum(1))
 

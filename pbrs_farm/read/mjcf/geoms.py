@@ -32,7 +32,7 @@ class Shape:
 
 
 def rgba_of(model: Any, geom: int) -> tuple[float, ...]:
-    """What colour a geom is shown in, as the file has it: its own, else its material's."""
+    """Colour of a geom in the file: its own, else its material's."""
     own = tuple(float(c) for c in model.geom_rgba[geom])
     material = int(model.geom_matid[geom])
     if material < 0 or not np.allclose(own, _GREY):
@@ -52,9 +52,9 @@ def is_endless(model: Any, geom: int) -> bool:
 
 
 def shape_of(model: Any, geom: int, half_m: F64) -> Shape | None:
-    """The triangles of a geom; None of kinds that have none here.
+    """The triangles of a geom; None for unsupported types.
 
-    half_m: (2,) half the sides of an endless plane.
+    half_m: (2,) half the sides of an infinite plane.
     """
     kind, size = _TYPE(int(model.geom_type[geom])), model.geom_size[geom]
     if kind == _TYPE.mjGEOM_MESH:
@@ -102,7 +102,7 @@ def _laid(uvs_m: F64, model: Any, material: int) -> F64:
     """Texture coordinates of a solid: repeats a metre where its material says so, else a side."""
     repeat = model.mat_texrepeat[material] if material >= 0 else np.ones(2)
     if material < 0 or not model.mat_texuniform[material]:
-        # Each side of a solid has its own corners: stretch what lies on it to one.
+        # Each side of a solid has separate corners: stretch its texture to one tile.
         quads = uvs_m.reshape(-1, 4, 2) if len(uvs_m) % 4 == 0 else uvs_m[None]
         low = quads.min(1, keepdims=True)
         span = np.maximum(quads.max(1, keepdims=True) - low, 1e-9)
@@ -185,5 +185,5 @@ def png_of_texture(model: Any, texture: int) -> bytes:
 
 
 def name_of(model: Any, kind: Any, number: int) -> str:
-    """The name of an element; "" where it has none."""
+    """The name of an element; "" if it has none."""
     return str(mujoco.mj_id2name(model, kind, number) or "")

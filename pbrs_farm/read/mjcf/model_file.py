@@ -1,7 +1,7 @@
-"""A home as a model of MuJoCo (MJCF) -> House. Effects: reads files.
+"""Read a MuJoCo model (MJCF) as a House. Effects: reads files.
 
-MuJoCo compiles the model, so that defaults, includes and attached models count. What its viewer shows
-becomes one glTF scene, which the glTF reader reads: a body of the world with all below it is an item.
+MuJoCo compiles the model, so that defaults, includes and attached models are resolved. The visible
+geoms become one glTF scene for the glTF reader: a top-level body with its descendants is an item.
 """
 
 from __future__ import annotations
@@ -45,17 +45,17 @@ _KINDS: Final = {
     mujoco.mjtJoint.mjJNT_HINGE: JointKind.REVOLUTE, mujoco.mjtJoint.mjJNT_SLIDE: JointKind.PRISMATIC,
 }  # fmt: skip
 _Y_UP: Final = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
-_FLAT_M: Final = 0.02  # a part of a room that is no higher is its floor
-_LEAST_ROOM_M: Final = 2.0  # a body of a room's name that is smaller is a thing: a kitchen's units
+_FLAT_M: Final = 0.02  # maximum height of a room's floor geom, metres
+_LEAST_ROOM_M: Final = 2.0  # minimum size of a room; a smaller body with a room's name is an item, such as a kitchen unit
 _MOST_JSON_BYTES: Final = 16 * 2**20
 _LIGHTS: Final = "KHR_lights_punctual"
 
 
 def read_mjcf(given: GivenFile, fields: ReadFields) -> House:
-    """The House of a model. Raises BadHouse naming file and place.
+    """Read a model. Raises BadHouse, naming file and place.
 
-    given.models: a folder that holds the model and all it names, where these do not lie below the
-    model's own folder. Joints stand as the first keyframe says, else as the model is written.
+    given.models: a folder with the model and all its files, if these are not below the model's own
+    folder. Joint values are those of the first keyframe, else of the model.
     """
     path = given.path
     folder, name = root_of(given)
@@ -76,7 +76,7 @@ def read_mjcf(given: GivenFile, fields: ReadFields) -> House:
 
 
 def _compiled(given: GivenFile) -> tuple[Any, Any, list[bool]]:
-    """The model, where its parts stand, and whether each of its geoms collides."""
+    """The model, its body poses, and whether each of its geoms collides."""
     try:
         spec = mujoco.MjSpec.from_file(str(given.path))
         for mesh in spec.meshes:
@@ -99,7 +99,7 @@ def _compiled(given: GivenFile) -> tuple[Any, Any, list[bool]]:
 
 
 class _Scene:
-    """Collects the glTF scene of a model. State: what was added."""
+    """Collects the glTF scene of a model. State: the parts added so far."""
 
     def __init__(
         self,
@@ -131,7 +131,7 @@ class _Scene:
         self._high = boxes[:, 1].max(0) if len(boxes) else np.ones(3)
 
     def _shown_geoms(self, collides: list[bool]) -> dict[int, list[int]]:
-        """Body -> geoms that are seen: none that only collide where others show the thing."""
+        """Body -> visible geoms; pure collision geoms are excluded if the item has visual ones."""
         model = self._model
         found: dict[int, list[int]] = {}
         for geom in range(model.ngeom):
@@ -141,7 +141,7 @@ class _Scene:
                     self._unread[UNREAD_SHAPES[kind]] = self._unread.get(UNREAD_SHAPES[kind], 0) + 1
                 else:
                     found.setdefault(int(model.geom_bodyid[geom]), []).append(geom)
-        # Visual geoms do not collide; a thing that has some has its colliders beside them.
+        # Visual geoms do not collide; items with visual geoms have separate colliders.
         drawn = {int(model.body_rootid[b]) for b, geoms in found.items() if b
                  and not all(collides[g] for g in geoms)}  # fmt: skip
         return {
@@ -166,7 +166,7 @@ class _Scene:
         return self._writer.gltf(document, self._file)
 
     def _group(self, body: int, above: int) -> None:
-        """Add what a body groups: each of its geoms, and each body below it, by itself."""
+        """Add the members of a grouping body separately: its geoms, and its child bodies."""
         has_floor = any(
             "floor" in self._words(g).lower() and not is_endless(self._model, g)
             for geoms in self._geoms.values() for g in geoms
@@ -189,7 +189,7 @@ class _Scene:
                 self._item(child, above)
 
     def _is_group(self, body: int) -> bool:
-        """Whether a body is a room or holds several things that say what they are."""
+        """True if a body is a room or contains several items with class names."""
         name = self._body_name(body)
         if self._model.body_jntnum[body]:
             return False
@@ -221,7 +221,7 @@ class _Scene:
         self._parts(body, number, is_moving=False)
 
     def _parts(self, body: int, above: int, *, is_moving: bool) -> None:
-        """Add the geoms of a body and those below it; what hangs on a joint below a node of its own."""
+        """Add the geoms of a body and its descendants; parts with a joint get a separate node."""
         joint = None if is_moving else self._joint(body)
         if joint is not None:
             above = self._add({"name": "", "children": [], "extras": {KEY: joint}}, above)
@@ -317,7 +317,7 @@ class _Scene:
         return self._known[key]
 
     def _lights_of(self, body: int, *, below: bool = True) -> list[int]:
-        """Lights that stand in a thing; those of the world are the viewer's."""
+        """Lights inside an item; lights of the world belong to the viewer."""
         bodies = set(self._below(body)) if below else {body}
         directional = mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
         return [
@@ -348,7 +348,7 @@ class _Scene:
         return name_of(self._model, _OBJECT.mjOBJ_BODY, body)
 
     def _words(self, geom: int) -> str:
-        """What a geom is called: by itself, its mesh or its material, the first that names a class."""
+        """Name of a geom for classification: its own, its mesh's or its material's, the first with a class."""
         model = self._model
         names = [name_of(model, _OBJECT.mjOBJ_GEOM, geom)]
         if model.geom_dataid[geom] >= 0:

@@ -1,6 +1,6 @@
-"""The files that a model of MuJoCo names; effects: reads the XML among them.
+"""List the files that a MuJoCo model references; effects: reads its XML files.
 
-MuJoCo opens them by itself: they are listed before, so that none lies outside the model's folder.
+MuJoCo opens files itself, so they are checked first: none may be outside the model's folder.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def root_of(given: GivenFile) -> tuple[RootFolder, str]:
 
 
 def files_of_model(folder: RootFolder, name: str) -> set[str]:
-    """Names below the root of every file of a model that is there, its own among them.
+    """Names below the root of all existing files of a model, including its own.
 
     Raises BadHouse for XML that cannot be read, and for a name that leads out of the root.
     """
@@ -61,7 +61,7 @@ def files_of_model(folder: RootFolder, name: str) -> set[str]:
             names = [_below(folder, f, file, own) for f in (folders[:1] if is_model else folders)]
             there = [n for n in names if folder.path(n) is not None]
             if is_model:
-                # Files that an included one names lie as if it stood in its place.
+                # File names in an included file are relative to the including one.
                 waiting += [(n, at if row.tag == "include" else "") for n in there]
             else:
                 found |= set(there)
@@ -69,7 +69,7 @@ def files_of_model(folder: RootFolder, name: str) -> set[str]:
 
 
 def companions_of_mjcf(given: GivenFile, files: SourceFiles) -> str:
-    """Digest of every other file of the model; "" where there is none."""
+    """Digest of all other files of the model; "" if there are none."""
     try:
         folder, name = root_of(given)
         names = files_of_model(folder, name) - {name}

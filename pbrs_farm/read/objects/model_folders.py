@@ -39,7 +39,7 @@ class ObjectModel:
     path: Path  # the file, or its library
     root: Path  # where its textures lie
     entry: str = ""  # its name in a library
-    size_m: tuple[float, float, float] | None = None  # width, height, depth; None = as it is
+    size_m: tuple[float, float, float] | None = None  # width, height, depth; None = unscaled
     attribution: str = ""
 
 
@@ -72,7 +72,7 @@ def pick_models(
         if not any(_is_of(model, category) for model in models):
             raise BadInput("models", category, "no model of this category")
     chosen = [m for m in models if not wanted or any(_is_of(m, c) for c in wanted)]
-    # Sort by a hash of seed and id: a random order that each model has by itself.
+    # Sort by a hash of seed and id: a random order, independent of the other models.
     chosen.sort(key=lambda m: hashlib.sha256(f"{seed}/{m.id}".encode()).digest())
     return chosen[:count]
 

@@ -1,7 +1,7 @@
-"""A mesh of the user's own in its own frame, in metres: GLB, glTF, OBJ, PLY, STL, OFF.
+"""A user's mesh in its own frame, in metres: GLB, glTF, OBJ, PLY, STL, OFF.
 
-Effects: reads the file and its pictures. Colours a vertex become one colour a triangle, kept in a
-small picture, since a surface has one material. What is left out or guessed is a note of the shape.
+Effects: reads the file and its pictures. Vertex colours become one colour per triangle, kept in a
+small picture, since a surface has one material. Omissions and assumptions are notes of the shape.
 """
 
 from __future__ import annotations
@@ -44,7 +44,9 @@ SUFFIXES: Final = (".glb", ".gltf", ".obj", ".ply", ".stl", ".off")
 MAX_EXTENT_M: Final = 100.0
 """A model larger than that is a slip of its unit."""
 _MIN_EXTENT_M: Final = 1e-4
-_PLY_HEADER_BYTES: Final = 65_536  # a header that is longer names no picture
+_PLY_HEADER_BYTES: Final = (
+    65_536  # maximum header length; longer headers are not searched for a picture
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,7 +56,7 @@ class ModelShape:
     surfaces: tuple[Surface, ...]  # materials index into materials
     materials: tuple[Material, ...]
     textures: dict[str, Texture]
-    notes: tuple[Note, ...] = ()  # what is missing or guessed; places begin with the file's name
+    notes: tuple[Note, ...] = ()  # omissions and assumptions; places begin with the file's name
 
     @property
     def points(self) -> F64:
@@ -101,14 +103,14 @@ def model_shape(model: ModelRef, fields: ReadFields) -> ModelShape:
 
 
 def _with_file(note: Note, file: str) -> Note:
-    """The note with the file before its place: in a home it stands among notes of other files."""
+    """The note with the file's name before its place, since a home has notes of several files."""
     return note if note.place.startswith(file) else replace(note, place=f"{file}: {note.place}")
 
 
 def companions_digest(path: Path) -> str:
-    """Digest of the files beside a model that reading it opens; "" where there are none.
+    """Digest of the files beside a model that the reader opens; "" if there are none.
 
-    It changes with the bytes of each of them, so that a changed picture gives another digest.
+    It changes with the bytes of each file, such as a replaced picture.
     """
     files, folder = SourceFiles(), RootFolder(path.parent)
     if _is_plain(path):
@@ -127,7 +129,7 @@ def _pictures_of_ply(path: Path) -> list[str]:
         with open_regular(path, MAX_SCENE_BYTES) as file:
             header, end, _data = file.read(_PLY_HEADER_BYTES).partition(b"end_header")
     except OSError:
-        return []  # the reader says what is wrong with it
+        return []  # the reader reports the fault
     if not end or not header.startswith(b"ply"):
         return []
     lines = (line.split(None, 2) for line in header.decode("utf-8", "replace").splitlines())

@@ -96,10 +96,10 @@ def model_surfaces(
 
 
 def object_companions(model: ObjectModel, files: SourceFiles) -> Iterator[str]:
-    """Names below the model's root of all files beside its own that reading it may open.
+    """Names below the model's root of all other files that the reader may open.
 
-    Names as the files give them, normalised below the root; some may not exist. A damaged model
-    yields what was found before.
+    Names as in the files, normalised below the root; some may not exist. For a damaged model, the
+    names before the damage.
     """
     if model.entry:
         return  # in a furniture library, which is one file
@@ -113,7 +113,7 @@ def object_companions(model: ObjectModel, files: SourceFiles) -> Iterator[str]:
             for reference in files_of_gltf(data, name):
                 yield folder.name_from(posixpath.dirname(name), reference)
     except BadHouse:
-        return  # the reader will say what is wrong with it
+        return  # the reader reports the fault
 
 
 @contextmanager
@@ -158,9 +158,9 @@ def _obj(
 
 
 def material_library(folder: RootFolder, name: str) -> str:
-    """The first mtllib of an OBJ as a name below the folder; `<stem>.mtl` where it has none.
+    """The first mtllib of an OBJ as a name below the folder; `<stem>.mtl` without one.
 
-    Only looks for the line: the library may not exist. A name with blanks is taken whole.
+    Only searches for the line: the library may not exist. Names may contain spaces.
     """
     data = folder.read(name, max_bytes=MAX_SCENE_BYTES) or b""
     reference = posixpath.splitext(posixpath.basename(name))[0] + ".mtl"

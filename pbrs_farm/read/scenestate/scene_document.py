@@ -46,7 +46,7 @@ class _Align(Given):
 
 
 class AssetTransform(Given):
-    """What is done to the models of a source before they are placed."""
+    """Transform of a source's models before placement."""
 
     align: _Align = Field(_Align(), alias="alignTo")
     scale: _Scale = Field(1.0, alias="scaleTo")
@@ -90,7 +90,7 @@ class _Document(Given):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlacedModel:
-    """An object: its model's source and id, and where it stands."""
+    """An object: its model's source and id, and its pose."""
 
     place: str
     source: str
@@ -119,14 +119,14 @@ class SceneDocument:
     elements: tuple[SceneElement, ...]
     room_types: dict[str, tuple[str, ...]]  # by the room's id, in the file's order
     objects: tuple[PlacedModel, ...]
-    pictures: dict[str, str]  # name of a texture -> its data URL, "" where the file has none
+    pictures: dict[str, str]  # name of a texture -> its data URL, "" if missing
 
 
 def scene_document(data: bytes, file: str, notes: Notes) -> SceneDocument:
-    """The document of a file's bytes. Raises BadHouse naming the element that is wrong.
+    """Parse a document. Raises BadHouse, naming the invalid element.
 
-    data: JSON of the Scene State format; notes: takes elements of unknown types. Lengths become
-    metres.
+    data: JSON of the Scene State format; notes: receives elements of unknown types. Lengths are
+    converted to metres.
     """
     value = bounded_json(data, file)
     # Some exports nest the scene twice.
@@ -242,7 +242,7 @@ class _Pictures:
         found = [self._material(row) for row in rows] if isinstance(rows, list) else []
         if len(found) > 1 and str(found[0]["name"]).lower() in ("outside", "surface2"):
             found.reverse()
-        # An element's thickness of 0 is none.
+        # A thickness of 0 means not given.
         read = {k: v for k, v in raw.items() if not (k == "depth" and v in (0, None))}
         return read | extra | {"materials": found, "roomId": "", "id": str(raw.get("id", ""))}
 
@@ -295,7 +295,7 @@ class ArchMaterials(ModelMaterials):
 
 
 def _bytes_of(url: str) -> bytes | None:
-    """The picture of a data URL; None where there is none."""
+    """The picture in a data URL; None for an empty one."""
     head, comma, body = url.partition(",")
     if not comma or not head.startswith("data:"):
         return None

@@ -42,7 +42,7 @@ _TABLES: Final = (
 _MAX_TABLE_BYTES: Final = 64_000_000
 _BESIDE: Final = ("", "..", "../..")  # where models and tables lie when no folder is named
 
-# Width, height, depth of a thing whose model is missing, by class, metres.
+# Default width, height, depth by class for items with a missing model, metres.
 _USUAL: Final = {
     "bathtub": (1.7, 0.58, 0.75), "bed": (1.6, 0.9, 2.05), "bookshelf": (0.9, 1.8, 0.32),
     "cabinet": (0.9, 0.9, 0.45), "chair": (0.52, 0.85, 0.55), "counter": (1.2, 0.9, 0.6),
@@ -57,7 +57,7 @@ _USUAL: Final = {
 @dataclass(frozen=True, slots=True)
 class _Row:
     category: str
-    size: tuple[float, float, float] | None  # width, height, depth where the table tells it
+    size: tuple[float, float, float] | None  # width, height, depth if the table has them
 
 
 def roots_of(path: Path, models: str) -> list[RootFolder]:

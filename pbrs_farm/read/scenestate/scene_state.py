@@ -1,4 +1,4 @@
-"""A sceneState file (HSSD-200, Rent3D++, text-to-scene generators) -> House. Effects: reads files.
+"""Read a sceneState file (HSSD-200, Rent3D++, text-to-scene generators) as a House. Effects: reads files.
 
 Walls become slabs, rooms get a floor and a ceiling, holes a door or a window; objects are models of
 a folder, or stand-ins by their category.
@@ -55,27 +55,27 @@ from pbrs_farm.read.scenestate.scene_walls import StandingWall, standing_walls
 MAX_WALLS, MAX_SLABS, MAX_HOLES = 3_000, 1_500, 2_000
 _AS_IT_STANDS: Final = Arch(np.eye(4), {})
 _STOREY_M: Final = 2.7
-_ON_FLOOR_M: Final = 0.02  # an object whose origin is so near to a height stands at it
+_ON_FLOOR_M: Final = 0.02  # maximum distance of an object's origin from a support's height, metres
 _LEAST_SILL_M: Final = 0.2  # a hole of no type that begins lower is a door's
 _AREA_M2: Final = 0.05  # least area of a floor
 
 
 def companions_of_scenestate(given: GivenFile, files: SourceFiles) -> str:
-    """Digest of the models and tables that reading may open; "" where there is none."""
+    """Digest of the models and tables that the reader may open; "" if there are none."""
     path, models = given.path, given.models
     notes = Notes(path.name, strict=False)
     try:
         data = RootFolder(path.parent).read(path.name, max_bytes=MAX_JSON_BYTES) or b""
         ids = {o.model for o in scene_document(data, path.name, notes).objects}
     except BadHouse:
-        return ""  # the reader will say what is wrong with it
+        return ""  # the reader reports the fault
     names = [*table_names(), *(n for model in sorted(ids) for n in names_of_model(model))]
     digests = [files.digest(root, names) for root in roots_of(path, models)]
     return keys.digest(*digests) if any(digests) else ""
 
 
 def read_scenestate(given: GivenFile, fields: ReadFields) -> House:
-    """The House of the file. Raises BadHouse naming the element that is wrong, and for a file without walls and floors."""
+    """Read the house. Raises BadHouse, naming the invalid element, and for a file without walls and floors."""
     path, models = given.path, given.models
     folder = RootFolder(path.parent)
     data = folder.read(path.name, max_bytes=MAX_JSON_BYTES)
@@ -147,7 +147,7 @@ def _check_number(document: SceneDocument, file: str) -> None:
 def _sort_by_name_or_place(
     item: Item, builder: HouseBuilder, id_of_room: Mapping[str, str]
 ) -> Item:
-    """The item with its level, and its room by the one it names, else by where it stands."""
+    """The item with its level and room, by the room's name in the file, else by position."""
     box = item.oriented_box if item.surfaces or item.box else None
     at = np.zeros(3) if box is None else box.centre
     low = at[1] if box is None else float(box.corners[:, 1].min())
@@ -184,7 +184,7 @@ class _Shell:
         self._drawn, self._standing = standing_walls(walls, areas)
 
     def _sunk(self, one: SceneElement) -> SceneElement:
-        """The slab upwards from its points; a floor on whose points things stand goes down."""
+        """The slab above its points; below them for a floor with items on the points."""
         e = one.element
         if e.kind != "Floor" or e.depth_m <= 0:
             return one
@@ -328,7 +328,7 @@ class _Shell:
         is_window = word == "window" if word in ("door", "window") else v0 > _LEAST_SILL_M
         axes = frame.axes * [np.linalg.det(frame.axes), 1, 1]
         centre = frame.start + frame.axes @ [(u0 + u1) / 2, (v0 + v1) / 2, e.depth_m / 2]
-        # A door stands on the floor, not below it.
+        # A door begins at the floor, not below it.
         foot = float(frame.start[1] + v0)
         here = next((r.floor_y for r in rooms if r.id == room_at(rooms, centre)), foot)
         if not is_window and foot < here < foot + 0.3:

@@ -1,7 +1,7 @@
-"""The walls of a sceneState: which side is out, and one wall where two rooms tell it; no effects.
+"""Walls of a sceneState: orientation, and merging of walls listed by two rooms; no effects.
 
-A wall of one room is a slab outward of its line. One between two rooms stands in the middle of its
-line, and is one wall where both rooms tell it, also where they tell different stretches of it.
+A wall of one room is a slab outward of its line. A wall between two rooms is centred on its line, and
+is one wall if both rooms list it, even with different stretches.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class StandingWall:
 def standing_walls(
     elements: Sequence[SceneElement], floors: Mapping[str, Any]
 ) -> tuple[list[StandingWall], list[StandingWall]]:
-    """(every wall as it is drawn, with its frame; the walls that stand, each once).
+    """(all walls as drawn, with frames; the merged walls, each once).
 
     floors: room -> the plan area (shapely) of its floor.
     """
@@ -50,7 +50,7 @@ def standing_walls(
     for k, wall in enumerate(drawn):
         if wall.is_between:
             lines[_line_key(wall)].append(k)
-    # Unite what lies on one line; everything else stands as it is drawn.
+    # Merge collinear walls; leave the others unchanged.
     united = {k: pieces for ks in lines.values() if len(ks) > 1 for k, pieces in _united(drawn, ks)}
     standing: list[StandingWall] = []
     for k, wall in enumerate(drawn):
@@ -72,7 +72,7 @@ def _stand_wall(one: SceneElement, tree: Any, names: list[str]) -> StandingWall 
     sides = [_rooms_beside(start, end, sign * left, tree, names) for sign in (1, -1)]
     own = [bool(set(side) & set(one.rooms)) for side in sides]
     is_between = len(one.rooms) > 1 or all(sides)
-    # Out of the first room that tells it, else of the floor that is there.
+    # Outward from the first room that lists it, else from the adjacent floor.
     is_left_in = own[0] if own[0] != own[1] else bool(sides[0]) and not sides[1]
     first = one.rooms[:1]
     if is_between and first and own == [True, True]:
@@ -112,7 +112,7 @@ def _line_key(wall: StandingWall) -> tuple[int, int]:
 def _united(
     drawn: Sequence[StandingWall], on_line: Sequence[int]
 ) -> list[tuple[int, list[StandingWall]]]:
-    """Of each wall on a line the pieces that stand for it: those it tells before all others."""
+    """For each wall on a line the merged pieces that replace it: those listed by it first."""
     first = drawn[on_line[0]]
     origin, axis = first.frame.start, first.frame.axes[:, 0]
     spans = {k: _span(drawn[k], origin, axis) for k in on_line}
@@ -133,7 +133,7 @@ def _united(
     found = []
     for k in on_line:
         runs = pieces[k]
-        # A wall that nobody else tells keeps its id and its ends.
+        # A wall listed by one room only keeps its id and its ends.
         whole = len(runs) == 1 and runs[0][2] == (k,)
         found.append((k, [drawn[k]] if whole else _cut_at_crossings(drawn, k, runs, origin, axis)))
     return found
@@ -159,7 +159,7 @@ def _cut_at_crossings(
     found = []
     for number, (low, high, here) in enumerate(runs):
         others = [drawn[j] for j in here if j != k]
-        # What the other room paints inside is this wall's outside.
+        # The other room's inside paint is this wall's outside paint.
         back = next((o for o in others if o.frame.axes[:, 2] @ axes[:, 2] < 0), None)
         overrides = e.overrides
         if back is not None and back.element.overrides and e.overrides:

@@ -1,8 +1,8 @@
-"""SUNCG v2's wall/<id>/<id>.arch.json -> structure items and openings (docs/spec/suncg.md section 1.7).
+"""Read SUNCG v2's wall/<id>/<id>.arch.json as structure items and openings (docs/spec/suncg.md section 1.7).
 
 No effects. Walls become solids of their own depth, outward from their points; floors and ceilings
-slabs upwards from their offset, as v1's released meshes are (the format does not say which way it
-means); holes become openings that repair cuts.
+slabs upwards from their offset, like v1's released meshes (the format does not define the direction);
+holes become openings that repair cuts.
 """
 
 from __future__ import annotations
@@ -36,13 +36,13 @@ from pbrs_farm.read.common.openings import CUTTER_REACH_M, LEAST_HOLE_M, box_bet
 from pbrs_farm.read.suncg.house_json import Node
 
 MAX_ELEMENTS: Final = 100_000
-_BESIDE_M: Final = 0.15  # a hole's middle lies no farther out of its door's bounds
+_BESIDE_M: Final = 0.15  # maximum distance of a hole's centre from its door's bounds, metres
 _LEAST_SILL_M: Final = 0.2  # a hole that begins lower is a door's
 _MODEL_ROOM: Final = re.compile(r"fr_(\d+)(?:rm|gd)_(\d+)")
 
 
 def arch_from_json(data: bytes, file: str) -> Arch:
-    """The elements of arch.json by room; BadHouse naming the element that is wrong."""
+    """The elements of arch.json by room; BadHouse, naming the invalid element."""
     hint = "an arch.json has a list of elements"
     document = checked(_Document, json_from_bytes(data, file), file, error=BadHouse, hint=hint)
     found: dict[str, list[Element]] = {}
@@ -87,7 +87,7 @@ def arch_items(arch: Arch, node: Node, room_id: str, materials: ModelMaterials) 
 def arch_openings(
     arch: Arch, rooms: Iterable[tuple[Node, str]], items: Sequence[Item]
 ) -> tuple[Opening, ...]:
-    """The holes of the walls of (node, room id), with the door or window that stands in each."""
+    """The holes of the walls of (node, room id), each with its door or window."""
     found = []
     for node, room_id in rooms:
         for item_id, e, outline in _elements_of(arch, node, room_id):
@@ -107,7 +107,7 @@ def _elements_of(arch: Arch, node: Node, room_id: str) -> Iterator[tuple[str, El
     named = [node.id, *([f"{known[1]}_{known[2]}"] if known else [])]
     elements = next((arch.elements[n] for n in named if n in arch.elements), [])
     outline = next((e.points[0] for e in elements if e.kind == "Floor"), None)
-    # Leave out what the node hides; walls are numbered with those that are left.
+    # Skip elements hidden by the node; wall numbers count the remaining ones.
     hides = {"Wall": "Walls", "Ground": "Floor"}
     n_walls = 0
     for e in elements:

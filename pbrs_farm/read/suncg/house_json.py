@@ -58,12 +58,12 @@ class Bounds(Given):
 
 
 class Node(Given):
-    """A node of house.json that is valid."""
+    """A valid node of house.json."""
 
     id: str
     level_id: str
     kind: str = Field(alias="type")
-    place: str  # where it stands, for messages
+    place: str  # location in the file, for messages
     index: int  # its position in the level
     model_id: FileName = Field("", alias="modelId")
     # (4, 4), identity for rooms and grounds
@@ -75,13 +75,13 @@ class Node(Given):
     # As written; the transform decides.
     is_mirrored: Annotated[bool | None, BeforeValidator(_flag)] = Field(None, alias="isMirrored")
     dimensions: Annotated[tuple[_Size, _Size, _Size], exactly(3)] = (0.0, 0.0, 0.0)  # of a Box, m
-    # Positions of a room's nodes, and what it is for.
+    # Indices of a room's nodes, and its types.
     members: Annotated[tuple[StrictInt, ...], FailFast(), Lenient] = Field((), alias="nodeIndices")
     types: Annotated[tuple[Label, ...], FailFast(), Lenient] = Field((), alias="roomTypes")
     hidden: frozenset[str]  # Floor, Ceiling, Walls
 
 
-# What a node of each type must say, and what of it is not read.
+# Required fields of each node type, and its ignored fields.
 _NEEDED: Final = {k: {"dimensions" if k == "Box" else "modelId": None} for k in NODE_TYPES}
 _UNREAD: Final = {"Object": ("dimensions",), "Box": ("modelId",)} | dict.fromkeys(
     ("Room", "Ground"), ("transform", "dimensions")
@@ -111,9 +111,9 @@ class HouseRecord:
 
 
 def house_record(data: bytes, file: str) -> HouseRecord:
-    """The records of house.json; nodes that are invalid or of no known type are left out.
+    """The records of house.json; invalid nodes and unknown types are left out.
 
-    Raises BadHouse naming the level and the node where a value does not fit.
+    Raises BadHouse, naming the level and the node of an invalid value.
     """
     hint = "a SUNCG house.json has levels, and levels have nodes"
     document = checked(_House, json_from_bytes(data, file), file, error=BadHouse, hint=hint)
@@ -150,7 +150,7 @@ def house_record(data: bytes, file: str) -> HouseRecord:
 
 
 def _node(file: str, raw: Any, level_id: str, i: int, index: int) -> Node | str | None:
-    """The node, its type where it is none that is known, or None where it is invalid."""
+    """The node, its type if that is unknown, or None if the node is invalid."""
     place = f"level {i} node {index}"
     raw = checked(dict, raw, file, place, error=BadHouse)
     if not _flag(raw.get("valid", 1)):

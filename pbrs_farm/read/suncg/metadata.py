@@ -43,7 +43,7 @@ _KIND_OF_CLASS: Final = {
 
 @dataclass(frozen=True, slots=True)
 class ModelClass:
-    """What ModelCategoryMapping says of a model."""
+    """A model's row of ModelCategoryMapping."""
 
     name: str  # fine-grained class
     nyu40: int
@@ -80,7 +80,7 @@ def read_tables(folder: RootFolder, notes: Notes) -> Tables:
 
 
 def table_places(name: str) -> tuple[str, str]:
-    """Where a table may stand below the root; the first goes first."""
+    """Candidate locations of a table below the root; the first takes precedence."""
     return f"metadata/{name}", name
 
 
@@ -184,7 +184,7 @@ def _read_light_table(folder: RootFolder, notes: Notes) -> dict[str, tuple[Light
         text = "no lamp's light is known; bulbs get an assumed power"
         notes.add("missing-table", "metadata/suncgModelLights.json", text)
         return {}
-    # Rows are model id -> its lamps; what is no list is passed over.
+    # Rows are model id -> its lamps; values that are not lists are ignored.
     name, data = found
     table = checked(dict, json_from_bytes(data, name), name, error=BadHouse)
     return {

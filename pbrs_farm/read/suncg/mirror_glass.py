@@ -12,7 +12,9 @@ from pbrs_farm.core.mesh import area_vectors, triangle_corners
 from pbrs_farm.read.common.model_cache import ParsedModel
 
 _REFLECTANCE: Final = 0.9
-_FLAT_COS: Final = 0.98  # a face within this cosine of the glass's normal lies flat
+_FLAT_COS: Final = (
+    0.98  # minimum cosine between a face's normal and the glass's for the face to be part of it
+)
 _FLAT_SHARE: Final = 0.45  # least flat share of a material; a pane with back and edges has half
 _NAMES: Final = ("mirror", "spiegel", "glass")  # an MTL's names are material_0, material_1 mostly
 
@@ -38,7 +40,7 @@ def mirror_slot(model: ParsedModel) -> int | None:
 
 
 def _areas_of_slots(model: ParsedModel, across: int) -> dict[int, list[float]]:
-    """Position in the MTL -> all of its area, and what of it lies flat across an axis."""
+    """Index in the MTL -> total area, and area perpendicular to an axis."""
     areas: dict[int, list[float]] = {}
     for mesh, slot in zip(model.meshes, model.slots, strict=True):
         normals = area_vectors(triangle_corners(mesh.positions, mesh.faces))

@@ -44,7 +44,7 @@ GAPS exchanges the materials of -x and +x (docs/spec/suncg.md section 1.5).
 
 @dataclass(frozen=True, slots=True)
 class ReaderContext:
-    """What nodes are built from."""
+    """Shared inputs for building nodes."""
 
     house: str  # id
     folder: RootFolder  # the SUNCG root
@@ -131,9 +131,9 @@ def _object_model(context: ReaderContext, node: Node) -> tuple[str, ParsedModel]
 def _surfaces_and_bulbs(
     context: ReaderContext, node: Node, model: ParsedModel, seen: ModelClass, lamp: LampMaterials
 ) -> tuple[tuple[Surface, ...], list[int]]:
-    """(surfaces in the model's order, the indices of those that are bulbs)."""
+    """(surfaces in the model's order, indices of the bulbs)."""
     world_from_model = context.world_from_house @ node.house_from_model
-    # Call glass a pane where it stands in a wall: light is carried without panes.
+    # Glass in a wall is a pane: panes do not refract light.
     is_opening = seen.kind in (ItemKind.WINDOW, ItemKind.DOOR)
     clear = MaterialKind.PANE if is_opening else MaterialKind.GLASS
     surfaces: list[Surface] = []
@@ -158,7 +158,7 @@ def _surfaces_and_bulbs(
         )
         if surface is None:
             continue
-        # Part bulbs that one mesh holds: each is a light source of its own.
+        # Split bulbs in one mesh: each is a light source.
         parts = separate_bulbs(surface) if is_bulb else (surface,)
         bulbs += range(len(surfaces), len(surfaces) + len(parts)) if is_bulb else ()
         surfaces += parts

@@ -63,9 +63,9 @@ def arch_file(house_id: str) -> str:
 
 
 def suncg_companions(folder: RootFolder, house_id: str, files: SourceFiles) -> Iterator[str]:
-    """Names below the root of all files beside house.json that reading the house may open.
+    """Names below the root of all other files that reading the house may open.
 
-    Some may not exist. Never raises: what is wrong with a file the reader says.
+    Some may not exist. Never raises: the reader reports faults of files.
     """
     for table in (*CLASS_TABLES, VARIANT_TABLE, LAMP_TABLE, LIGHT_TABLE):
         yield from table_places(table)
@@ -89,7 +89,7 @@ def _document(folder: RootFolder, name: str) -> Any:
     try:
         return json_from_bytes(folder.read(name, max_bytes=MAX_HOUSE_BYTES) or b"{}", name)
     except BadHouse:
-        return {}  # the reader will say what is wrong with it
+        return {}  # the reader reports the fault
 
 
 def _names_in_document(document: Any) -> Iterator[tuple[str, str]]:
@@ -149,7 +149,7 @@ def read_suncg(root: Path, house_id: str, fields: ReadFields) -> House:
 
 
 def _record(folder: RootFolder, house_id: str, file: str, notes: Notes) -> HouseRecord:
-    """house.json below the root, with notes on what is odd about it."""
+    """house.json below the root, with notes on irregularities."""
     # Check the id first: it becomes part of paths.
     if not _HOUSE_ID.fullmatch(house_id):
         raise BadHouse(folder.root, "house", f"{house_id[:80]!r} is no house id")

@@ -26,7 +26,7 @@ PARALLEL_SINE = math.sin(math.radians(20.0))  # largest angle between a wall and
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StandingWall:
-    """A wall's plan polygon with the heights between which it stands."""
+    """A wall's plan polygon with its bottom and top height."""
 
     wall: HomeWall
     polygon: shapely.Geometry  # plan, m
@@ -45,7 +45,7 @@ def opening_of(
     *,
     is_window: bool,
 ) -> Opening | None:
-    """The opening of a door or window, or None (with a note) if it stands in no wall.
+    """The opening of a door or window, or None (with a note) outside of walls.
 
     ids: of the opening, of its level, of its item.
     """
@@ -91,7 +91,7 @@ def _local_outline(outline: Points2, door: DoorFrame, frame: PieceFrame) -> Poin
 def _depth_span(
     frame: PieceFrame, door: DoorFrame, walls: list[StandingWall]
 ) -> tuple[float, float] | None:
-    # The range along the piece's depth in which the walls it stands in lie.
+    # Range of its walls along the piece's depth.
     half_x, half_y, half_z = frame.half
     low_y, high_y = frame.origin[1] - half_y, frame.origin[1] + half_y
     if min(half_x, half_y) < MIN_HALF_M:
@@ -108,12 +108,12 @@ def _depth_span(
         if shared.is_empty or shared.area < 1e-4 * smaller:
             continue
         z = _depths(shared, frame)
-        # Reach through the whole thickness of walls that the piece stands along.
+        # Cut through the whole thickness of walls parallel to the piece.
         if _is_along(standing.wall, frame) and door.cuts_both_sides:
             parts = shapely.get_parts(shapely.intersection(strip, standing.polygon))
             near = [p for p in parts if p.intersects(piece)]
             z = np.concatenate([z, *(_depths(p, frame) for p in near)])
-        # Add the baseboard, which stands out from the wall.
+        # Add the baseboard, which protrudes from the wall.
         board = standing.board if _is_along(standing.wall, frame) else 0.0
         spans.append((float(z.min()) - board, float(z.max()) + board))
     if not spans:

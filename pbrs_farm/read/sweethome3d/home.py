@@ -74,9 +74,9 @@ def stored_cameras(plan: HomePlan) -> tuple[StoredCamera, ...]:
 
 
 def check_plan_bounds(plan: HomePlan, file: str) -> None:
-    """Raise BadHouse, naming the file, for a plan of too many parts, or drawn over itself.
+    """Raise BadHouse, naming the file, for a plan with too many parts or excessive overlaps.
 
-    Levels that are left out count for nothing.
+    Hidden levels do not count.
     """
     walls = _by_level(plan, plan.walls)
     pieces = [p for found in _by_level(plan, plan.pieces).values() for p in found]
@@ -95,7 +95,7 @@ def check_plan_bounds(plan: HomePlan, file: str) -> None:
 
 
 def _by_level(plan: HomePlan, drawn: Sequence[_Drawn]) -> dict[str, list[_Drawn]]:
-    """What is drawn on each level that is shown."""
+    """Drawn elements of each visible level."""
     found: dict[str, list[_Drawn]] = {}
     for one in drawn:
         found.setdefault(one.level, []).append(one)
@@ -103,7 +103,7 @@ def _by_level(plan: HomePlan, drawn: Sequence[_Drawn]) -> dict[str, list[_Drawn]
 
 
 def _commonest(pieces: Sequence[PlanPiece]) -> str:
-    # What a program copied by the thousand bears one name.
+    # Pieces duplicated by a program by the thousand share one name.
     name, n = max(Counter(p.name for p in pieces).items(), key=lambda row: row[1])
     return f"; {n} of them are called {shown(name)!r}" if 2 * n > len(pieces) else ""
 
@@ -123,11 +123,11 @@ def read_home(
     package: str = "",
     package_note: str = "",
 ) -> House:
-    """The house in a .sh3d archive or a bare Home.xml, unrepaired; equal bytes give equal Houses.
+    """Read a .sh3d archive or a bare Home.xml, unrepaired; deterministic.
 
     name: the file's, for messages and the house's id. resources: the program's own models, for
-    files that refer to them. package: where the file came from; package_note: what is odd about
-    it (homes_package.Package). Raises BadHouse, which names the file and the place.
+    files that refer to them. package: origin of the file; package_note: its irregularities
+    (homes_package.Package). Raises BadHouse, naming the file and the place.
     """
     container = open_container(data, PurePath(name).name, resources)
     sha256, fields = keys.sha256(data), fields or ReadFields()
@@ -145,7 +145,7 @@ def house_from_container(
     package: str = "",
     package_note: str = "",
 ) -> House:
-    """As read_home, of a home file that is taken apart; sha256: of what the home is known by."""
+    """Like read_home, for an opened home file; sha256: identity of the home."""
     file = PurePath(name).name
     notes = Notes(file, strict=fields.strict)
     plan = _read_plan(container.root, file, fields, notes)
@@ -169,7 +169,7 @@ def house_from_container(
     cuts = staircase_cuts(plan, materials, house_level)  # of floors, of ceilings
     structure = wall_items(plan, outlines, materials, house_level)
     structure += plane_items(rooms, ceilings, materials, *cuts)
-    # Place the furniture last: it stands in rooms and cuts walls.
+    # Place the furniture last: it needs rooms, and cuts walls.
     models = PieceModels(materials, file, fields.max_model_triangles, container.parsed)
     pieces, openings = _read_pieces(
         plan, models, materials, outlines, rooms, house_level, file, fields
@@ -192,7 +192,7 @@ def house_from_container(
 
 
 def _read_plan(root: Element, file: str, fields: ReadFields, notes: Notes) -> HomePlan:
-    """The plan: levels that are hidden go, what is absurd is refused."""
+    """The plan without hidden levels; implausible plans are rejected."""
     plan = _shown(parse_plan(root, file, fields.max_extent_m), fields, notes)
     check_plan_bounds(plan, file)
     return plan

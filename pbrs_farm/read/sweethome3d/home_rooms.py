@@ -27,7 +27,7 @@ from pbrs_farm.read.sweethome3d.wall_solids import picture_uvs
 MIN_AREA_M2 = 0.01  # smaller rooms are left out
 LEAST_ROOM_M2 = 1.0  # a smaller area between walls is a shaft
 LEAST_WALL_M = 1.8  # lower walls enclose no room
-GAP_M = 0.1  # between walls that were meant to meet
+GAP_M = 0.1  # maximum gap between walls that were meant to touch, metres
 ACROSS_M = 0.01  # half the width that a doorway is closed by
 DOOR_SILL_M = 0.3  # what begins higher is a window
 SLIVER_M2 = 1e-4  # smaller pieces come of rounding
@@ -86,7 +86,7 @@ def rooms_between_walls(plan: HomePlan, outlines: dict[str, Outline]) -> tuple[H
         met = shapely.union_all(feet).buffer(GAP_M / 2, join_style="mitre")
         standing = shapely.union_all([met.buffer(-GAP_M / 2, join_style="mitre"), *feet])
         ways = [*doorways(standing), *_door_lines(plan, level_id)]
-        # What lies within the outer edge of walls and doorways, and under no wall.
+        # The area within the outer edge of walls and doorways, minus the walls.
         closed = shapely.union_all([standing, *(way.buffer(ACROSS_M) for way in ways)])
         whole = shapely.union_all([shapely.Polygon(p.exterior) for p in _polygons(closed)])
         pieces = _polygons(shapely.difference(whole, standing))
@@ -180,10 +180,10 @@ def plane_items(
     floor_cuts: dict[str, shapely.Geometry],
     ceiling_cuts: dict[str, shapely.Geometry],
 ) -> list[Item]:
-    """Floor and ceiling of each room as an item, level planes or, below a roof, sloped ones.
+    """Floor and ceiling of each room as an item, horizontal or, below a roof, sloped.
 
-    Where rooms overlap the later one has the floor. floor_cuts, ceiling_cuts: by level id, what staircases
-    take of them.
+    Where rooms overlap the later one has the floor. floor_cuts, ceiling_cuts: areas of staircases by
+    level id.
     """
     items = []
     for k, room in enumerate(rooms):
@@ -200,7 +200,7 @@ def plane_items(
 def _left_of(
     room: ReadRoom, later: list[shapely.Polygon], cuts: dict[str, shapely.Geometry]
 ) -> list[shapely.Polygon]:
-    # What later rooms and the level's staircases leave of the room's outline.
+    # The room's outline minus later rooms and the level's staircases.
     taken = [*later, cuts.get(room.level_id, shapely.Polygon())]
     return _polygons(shapely.difference(room.outline, shapely.union_all(taken)))
 

@@ -1,7 +1,7 @@
-"""Doors between rooms, swung open about the hinges that their models name; no effects.
+"""Open the doors between rooms about the hinges in their models; no effects.
 
 A model's leaf hangs on a hinge ("sweethome3d_opening_on_hinge_1_door" on "sweethome3d_hinge_1_2"), and
-swings to the side on which the hinge stands out of it.
+swings to the side on which the hinge protrudes.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from pbrs_farm.read.sweethome3d.piece_models import (
 )
 from pbrs_farm.read.sweethome3d.placement import PieceFrame, local_from_model
 
-ANGLES_DEG: Final = (85.0, 70.0, 55.0)  # the widest that nothing stands in the way of
+ANGLES_DEG: Final = (85.0, 70.0, 55.0)  # the widest free angle is taken
 _UPRIGHT: Final = 0.99  # of a hinge's direction
 _SHUT: Final = 2.5  # times as wide as it reaches out of the wall, handles included
 _SIDE_M: Final = 0.5  # from a door's middle, where its rooms have begun
@@ -57,10 +57,10 @@ class Leaf:
 def shut_leaves(
     meshes: Iterable[Mesh], matrix: F64, told: Sequence[Joint] = ()
 ) -> tuple[Leaf, ...]:
-    """The leaves of a door's model that hang on an upright hinge and lie in the wall.
+    """The closed leaves of a door's model with an upright hinge.
 
-    matrix: (4, 4) from the model's frame to the piece's. told: the joints that the file tells, in the
-    model's frame; they stand before the hinges that the model names.
+    matrix: (4, 4) from the model's frame to the piece's. told: joints from the file, in the model's
+    frame; they take precedence over the hinges in the model.
     """
     if told:
         return tuple(_told_leaves(tuple(meshes), matrix, told))
@@ -94,18 +94,18 @@ def _find_leaf(joint: str, parts: list[F64], hinge_parts: list[F64]) -> Leaf | N
     points, hinge = np.concatenate(parts), np.concatenate(hinge_parts)
     axis = (hinge.min(0) + hinge.max(0))[[0, 2]] / 2
     low, high = points.min(0), points.max(0)
-    # Leave what stands open, and what hangs on a lying hinge: a flap.
+    # Skip open leaves, and flaps with a horizontal hinge.
     width, _height, out = high - low
     if width < _SHUT * out or np.ptp(hinge[:, 0]) > np.ptp(hinge[:, 1]):
         return None
-    # The leaf's far end goes to the side on which the hinge stands out of its plane.
+    # The leaf's far end moves to the side on which the hinge protrudes.
     away = np.sign((low + high)[0] / 2 - axis[0]) or 1.0
     side = np.sign(axis[1] - np.median(points[:, 2])) or 1.0
     return Leaf(joint, axis, points, float(-away * side))
 
 
 def _fills_its_hole(meshes: Iterable[Mesh], matrix: F64) -> bool:
-    """Whether a triangle lies across the middle of a door: one without is a frame alone."""
+    """True if a triangle covers the centre of a door; otherwise it is only a frame."""
     corners = [m.positions[m.faces] @ matrix[:3, :3].T + matrix[:3, 3] for m in meshes]
     a, b, c = np.moveaxis(np.concatenate(corners)[:, :, :2] - _OFF_MIDDLE_M, 1, 0)
     # A place beside the middle, where diagonals meet, is on the same side of all three edges.
@@ -195,10 +195,10 @@ def opened_doors(
     rooms: list[ReadRoom],
     walls: Sequence[StandingWall],
 ) -> list[Item]:
-    """The items of placed pieces, the shut doors between rooms among them swung open.
+    """The items of placed pieces, with the closed doors between rooms swung open.
 
-    A leaf that would meet a wall or a thing at every one of ANGLES_DEG is left out, with a note; a
-    door whose model names no hinge stays as it is drawn, with a note.
+    A leaf blocked by a wall or an item at each of ANGLES_DEG is left out, with a note; a door without
+    a hinge in its model stays as drawn, with a note.
     """
     items = [p.item for p in placed]
     for k, door in enumerate(placed):

@@ -50,7 +50,7 @@ def piece_item(
     model = models.get(piece.model, piece.place, piece.transformations)
     if model is None:
         return None
-    # Fit the model into the piece's box, then stand the box in the house.
+    # Fit the model into the piece's box, then place the box in the house.
     matrix = local_from_model(piece, model)
     points = [m.positions @ matrix[:3, :3].T + matrix[:3, 3] for m in model.meshes]
     frame = frame_of(piece, level, np.concatenate(points) if points else None)
@@ -147,10 +147,10 @@ def piece_opening(
     materials: HomeMaterials,
     material: int,
 ) -> Opening | None:
-    """What a door or window cuts out of the walls that it touches; None for a piece that cuts nothing.
+    """Opening cut by a door or window out of its walls; None for a piece that cuts nothing.
 
-    walls: those of its level, with their plans and heights. material: index for the cutter, which nobody
-    sees. One that touches no wall cuts nothing, with a note.
+    walls: those of its level, with their plans and heights. material: index for the invisible cutter. A
+    piece outside of walls cuts nothing, with a note.
     """
     if piece.frame is None:
         return None

@@ -1,6 +1,6 @@
-"""What of a piece moves: by the joints that its file tells, else by the hinges and rails of its model; no effects.
+"""Joints of a piece: from its file, else from the hinges and rails of its model; no effects.
 
-The program calls a model's groups by what they hang on: "sweethome3d_opening_on_hinge_1_door" turns about
+The program names a model's groups by their joint: "sweethome3d_opening_on_hinge_1_door" turns about
 "sweethome3d_hinge_1", "sweethome3d_opening_on_rail_2" slides along "sweethome3d_rail_2". The longest side of a
 hinge or rail is its axis.
 """
@@ -22,7 +22,9 @@ from pbrs_farm.read.sweethome3d.piece_models import fixed_joint_of, hanger_of, j
 from pbrs_farm.read.sweethome3d.placement import PieceFrame
 
 _WIDE_OPEN_RAD: Final = np.pi / 2
-_SHUT: Final = 1.5  # times as wide as it reaches out of its plane: else it stands open already
+_SHUT: Final = (
+    1.5  # minimum ratio of a closed leaf's width to its depth; otherwise the leaf is open
+)
 _LEAST_TRAVEL_M: Final = 0.02
 _HANGERS: Final = {JointKind.REVOLUTE: "hinge", JointKind.PRISMATIC: "rail"}
 
@@ -63,7 +65,7 @@ def piece_joints(
 
 
 def _points_by_joint(meshes: Sequence[Mesh], matrix: F64) -> tuple[dict[str, F64], dict[str, F64]]:
-    """The points of what hangs on each joint, and those of the hinge or rail itself."""
+    """Points of the parts moved by each joint, and points of the hinge or rail itself."""
     hung: dict[str, list[F64]] = {}
     fixed: dict[str, list[F64]] = {}
     for mesh in meshes:
@@ -96,7 +98,7 @@ def _joint(part: str, name: str, hung: F64, fixed: F64) -> Joint | None:
     wide, thin = sorted((k for k in range(3) if k != along), key=lambda k: least[k] - most[k])
     if most[wide] - least[wide] < _SHUT * (most[thin] - least[thin]):
         return None
-    # The far end goes to the side on which the hinge stands out of the leaf's plane.
+    # The far end moves to the side on which the hinge protrudes from the leaf.
     away = np.sign((least + most)[wide] / 2 - middle[wide]) or 1.0
     side = np.sign(middle[thin] - np.median(hung[:, thin])) or 1.0
     turn = np.cross(axis, np.eye(3)[wide])[thin] * away * side

@@ -22,24 +22,24 @@ class PieceMaterial:
 
     name: str  # the surface's: role and material
     material: int  # index in the library
-    picture: PlanPicture | None  # how the home lays a texture of its own; None: by the model's uv
+    picture: PlanPicture | None  # layout of the home's own texture; None: by the model's uv
     emits: bool
 
 
 def piece_material(
     piece: PlanPiece, mesh: Mesh, model: PieceModel, materials: HomeMaterials
 ) -> PieceMaterial | None:
-    """The material of one mesh of a piece, and how its texture lies; None if the home makes it invisible.
+    """Material of one mesh of a piece, and its texture layout; None if the home makes it invisible.
 
-    The home's material of the same name goes before the piece's colour or texture, and both before the
-    model's. What lets light through is a pane in doors and windows, glass elsewhere.
+    The home's material of the same name takes precedence over the piece's colour or texture, and both
+    over the model's. Transparent materials are panes in doors and windows, glass elsewhere.
     """
     base = model.materials.get(mesh.material) or ObjMaterial(mesh.material or "default")
     role = mesh.group
     paint = dict(piece.materials).get(mesh.material, Paint())
     if paint.is_hidden:
         return None
-    # The whole piece's paint covers what no paint of its own has; panes and mirrors stay.
+    # The piece's paint covers parts without a paint; panes and mirrors stay.
     if paint.is_empty and role not in (PANE, MIRROR):
         paint = Paint(
             piece.paint.colour,
@@ -57,7 +57,7 @@ def piece_material(
         shine = min(max(paint.shininess, 0.0), 1.0)
         specular, shininess = (shine, shine, shine), shine * SHININESS_SCALE
     kind = _material_kind(piece, role, base, emits=emits, is_textured=loaded is not None)
-    # Glass whose model says opaque lets light pass all the same.
+    # Glass is transparent even if its model is opaque.
     opacity = base.d
     if kind in (MaterialKind.PANE, MaterialKind.GLASS) and opacity > CLEAR:
         opacity = PANE_OPACITY

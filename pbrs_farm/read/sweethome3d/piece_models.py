@@ -80,7 +80,7 @@ def hangs_on(mesh: Mesh, joints: frozenset[str]) -> bool:
 
 
 def _transformed(mesh: Mesh, matrix: F64) -> Mesh:
-    """The mesh moved by a 3 x 4 matrix; as it is where the matrix flattens it."""
+    """The mesh transformed by a 3 x 4 matrix; unchanged if the matrix is singular."""
     linear = matrix[:, :3]
     if is_flattening(linear):
         return mesh
@@ -98,7 +98,7 @@ class PieceModel:
     """A parsed model."""
 
     meshes: tuple[Mesh, ...]  # in the model's frame
-    hangers: tuple[str, ...]  # of each mesh, what it hangs on: "hinge_1", "" = nothing
+    hangers: tuple[str, ...]  # joint of each mesh: "hinge_1", "" = none
     materials: dict[str, ObjMaterial]  # by name
     folder: str  # of its content, for its pictures
     low: F64  # corner of its box
@@ -106,7 +106,7 @@ class PieceModel:
 
 
 def role_of(group: str) -> str:
-    """What the program makes of a group by its name: pane, mirror, light, or "" for nothing."""
+    """The program's role for a group name: pane, mirror, light, or "" for none."""
     for word in group.split():
         for prefix, role in _ROLES:
             if word.startswith(prefix):
@@ -250,8 +250,7 @@ def _model_format(data: bytes) -> str:
 
 
 def _merge_meshes(meshes: tuple[Mesh, ...]) -> tuple[tuple[Mesh, ...], tuple[str, ...]]:
-    # One mesh per material, role, (having texture coordinates) and what it hangs on, in order of
-    # first use.
+    # One mesh per material, role, (having texture coordinates) and joint, in order of first use.
     grouped: dict[tuple[str, str, bool, str], list[Mesh]] = {}
     for mesh in meshes:
         key = (role_of(mesh.group), mesh.material, mesh.uvs is not None, hanger_of(mesh.group))

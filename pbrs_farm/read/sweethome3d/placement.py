@@ -40,17 +40,17 @@ class PieceFrame:
 
 
 def frame_of(piece: PlanPiece, level: PlanLevel, local_height: F64 | None = None) -> PieceFrame:
-    """Where a piece stands: its centre and axes in the world, its size.
+    """Pose of a piece: its centre and axes in the world, its size.
 
-    local_height: (N, 3) the points of its model in its own frame; a tilted piece stands as high as they
-    reach once tilted. Angles of the file run clockwise seen from above; pitch goes before roll.
+    local_height: (N, 3) the points of its model in its own frame; they give the height of a tilted
+    piece. Angles of the file run clockwise seen from above; pitch is applied before roll.
     """
     width, depth, height = piece.size
     half = np.array([width, height, depth]) / 2
     # Pitch, then roll, then turn about the vertical; the program's angles run clockwise.
     tilt = _rotation_z(-piece.roll) @ _rotation_x(-piece.pitch)
     axes = rotation_y(-piece.angle) @ tilt
-    # A tilted piece stands as high as it reaches once tilted.
+    # The height of a tilted piece is that of its tilted points.
     in_plan = height
     if piece.pitch or piece.roll:
         if local_height is not None and len(local_height):
@@ -76,7 +76,7 @@ def local_from_model(piece: PlanPiece, model: PieceModel) -> F64:
         high = np.max([p.max(0) for p in points], axis=0)
     extent = high - low
     width, depth, height = piece.size
-    # Scale it to the piece's size; what is flat along an axis stays so.
+    # Scale it to the piece's size; axes without extent are kept.
     wanted = np.array([width, height, depth])
     scale = np.where(extent > _FLAT, wanted / np.maximum(extent, _FLAT), 1)
     scale[0] *= -1.0 if piece.is_mirrored else 1.0

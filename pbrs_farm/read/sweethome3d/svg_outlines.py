@@ -30,7 +30,7 @@ _TRAILING_POINT: Final = re.compile(r"(?<=\d)\.(?!\d)")  # "1." is SVG, but not 
 def polygons_from_path(text: str) -> tuple[Points2, ...]:
     """The path's closed sub-paths as (N, 2) polygons, N >= 3.
 
-    Raises ValueError for what is no path or too long, and for coordinates beyond MAX_COORDINATE.
+    Raises ValueError for an invalid or too long path, and for coordinates beyond MAX_COORDINATE.
     """
     segments = _segments(text)
     # Bound the number of points before any is computed.
@@ -62,7 +62,7 @@ def _segments(text: str) -> list[Any]:
         segments = list(Path(_TRAILING_POINT.sub("", text)))
     except (ValueError, ArithmeticError, IndexError, TypeError):
         raise ValueError("no path: a command lacks numbers") from None
-    # Reflect the control point of T at curves of its own kind only, as of S (SVG 1.1, 8.3.7).
+    # T reflects the control point of quadratic curves only, S that of cubic ones (SVG 1.1, 8.3.7).
     for before, segment in pairwise(segments):
         for kind, control, last in _SMOOTH:
             if isinstance(segment, kind) and segment.smooth:

@@ -31,7 +31,7 @@ class Outline:
 
 
 def outlines_of(walls: tuple[HomeWall, ...]) -> dict[str, Outline]:
-    """Mitred outline of each wall by id; walls without length or thickness have none."""
+    """Mitred outline of each wall by id; walls without length or thickness are omitted."""
     bare = {w.id: _unjoined(w) for w in walls if _has_size(w)}
     order = {w.id: k for k, w in enumerate(walls)}
     by_id = {w.id: w for w in walls}

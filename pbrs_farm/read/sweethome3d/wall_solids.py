@@ -22,7 +22,7 @@ from pbrs_farm.read.sweethome3d.home_file.home_xml import (
 from pbrs_farm.read.sweethome3d.home_materials import HomeMaterials
 from pbrs_farm.read.sweethome3d.wall_outlines import Outline, outlines_of
 
-SUNK_M = 0.002  # How deep a baseboard's back stands in its wall, so that the two share no plane
+SUNK_M = 0.002  # Depth of a baseboard's back inside its wall, to avoid coplanar faces
 
 
 def wall_items(
@@ -83,7 +83,7 @@ def _wall_item(
         materials.painted(wall.right, "wall", f"{place} right"),
         materials.painted(wall.right if wall.left.is_empty else wall.left, "wall", place),
     )
-    # Let the wall reach down through the floor slab it stands on.
+    # Extend the wall down through the floor slab.
     foot = level.elevation - level.reach_down
     left_top = level.elevation + top_heights(wall, outline.left, outline.along)
     right_top = level.elevation + top_heights(wall, outline.right, outline.along)
@@ -123,7 +123,7 @@ def _baseboard_item(
     height = min(board.height, float(top_heights(wall, line, outlines[0].along).min()))
     if height <= 1e-3:
         return None
-    # A board without paint of its own has its side's.
+    # A board without paint takes its side's.
     paint = board.paint
     if paint.is_empty:
         paint = wall.left if board.is_left else wall.right

@@ -1,6 +1,6 @@
-"""Prims of a composed stage -> nodes of a glTF document in metres, y up; no effects of its own.
+"""Convert the prims of a composed stage to nodes of a glTF document in metres, y up; no effects.
 
-The reader of glTF makes items of them. What a prim is goes along as the node's extras.
+The glTF reader makes items of them. Properties of a prim become the node's extras.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ _Row = dict[str, Any]
 
 @dataclass(frozen=True, slots=True)
 class _Above:
-    """What a prim inherits from those above it."""
+    """Properties inherited from ancestors of a prim."""
 
     node: int
     depth: int
@@ -50,7 +50,7 @@ class _Above:
 
 
 class StageNodes:
-    """Collects the nodes of a stage. State: what was added."""
+    """Collects the nodes of a stage. State: the nodes added so far."""
 
     def __init__(
         self, stage: Any, file: str, notes: Notes, shaders: Shaders, fields: ReadFields
@@ -92,7 +92,7 @@ class StageNodes:
         return self._writer.gltf(document, self._file)
 
     def _visit(self, prim: Any, above: _Above) -> Iterator[tuple[Any, _Above]]:
-        """Add a prim's node; the prims below that are to be visited."""
+        """Add a prim's node; yields the children to visit."""
         if _is_hidden(prim) or _is_no_place(prim):
             return
         if above.depth >= MAX_DEPTH:
@@ -110,7 +110,7 @@ class StageNodes:
         if not xformable:
             return None
         if xformable.GetResetXformStack():
-            # Undo what stands above it.
+            # Undo the transforms of its ancestors.
             cache = UsdGeom.XformCache(self._time)
             world = np.array(cache.GetLocalToWorldTransform(prim))
             parent = np.array(cache.GetParentToWorldTransform(prim))
@@ -144,7 +144,7 @@ class StageNodes:
         return _Above(len(self._nodes) - 1, above.depth + 1, path, in_lamp, label)
 
     def _class(self, prim: Any, above: _Above, node: _Row) -> NodeClass | None:
-        """What the prim is; said in the node's extras where the prim has them."""
+        """The prim's class; written to the node's extras if the prim has it."""
         own_extras = prim.GetAttribute(EXTRAS_ATTRIBUTE).Get()
         if own_extras:
             from pbrs_farm.core.checked_json import json_from_bytes
@@ -175,7 +175,7 @@ class StageNodes:
         return NodeClass(seen.nyu40, seen.kind, is_tagged=True)
 
     def _is_group(self, prim: Any) -> bool:
-        """Whether a prim is a room's scope, or holds things that say themselves what they are."""
+        """True if a prim is a room's scope, or contains items with classes of their own."""
         own = class_of_node_name(prim.GetName())
         if own is not None and own.kind is ItemKind.LAMP:
             return False
@@ -280,9 +280,9 @@ class StageNodes:
         return next(filter(None, (self._shaders.uv_name(m) for m in materials if m)), "")
 
     def _bound_material(self, prim: Any) -> Any:
-        """The material of full renders, which is all purposes' where none is bound for these alone.
+        """The material for full renders, else the one for all purposes.
 
-        That of previews where it is the one that is understood.
+        The preview material if it is the only supported one.
         """
         binding = UsdShade.MaterialBindingAPI(prim)
         full = binding.ComputeBoundMaterial(UsdShade.Tokens.full)[0]
@@ -387,7 +387,7 @@ def _is_hidden(prim: Any) -> bool:
 
 
 def _is_no_place(prim: Any) -> bool:
-    """Whether a prim is a material, a subset of faces, a camera: nothing that stands somewhere."""
+    """True if a prim has no place: a material, a subset of faces, a camera."""
     if prim.IsA(UsdShade.NodeGraph) or prim.IsA(UsdShade.Shader):  # a material is a graph of nodes
         return True
     return bool(prim.IsA(UsdGeom.Subset) or prim.IsA(UsdGeom.Camera))
@@ -434,7 +434,7 @@ def _own_label(prim: Any) -> str:
 
 
 def _light_colour(prim: Any) -> tuple[tuple[float, float, float], bool]:
-    """(linear colour, largest 1; whether the stage tells it)."""
+    """(linear colour, largest 1; whether the stage gives it)."""
     colour = prim.GetAttribute("inputs:color")
     has_temperature = bool(prim.GetAttribute("inputs:enableColorTemperature").Get())
     value = np.array(list(colour.Get() or (1, 1, 1)), np.float64)

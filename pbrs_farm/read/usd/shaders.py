@@ -29,7 +29,7 @@ _REPEAT: Final = 10497  # glTF's number for a picture that goes on beyond its ed
 _MODES: Final = ("uaddressmode", "vaddressmode")  # of MaterialX's image nodes
 _USUAL_IOR: Final = 1.5
 _MOST_NODES: Final = 16  # between a surface and its picture
-_MOST_FOLLOWED: Final = 1000  # connections that are followed for one material
+_MOST_FOLLOWED: Final = 1000  # maximum connections to follow per material
 _FIRST_TILE: Final = "1001"  # of a picture in tiles: where u and v are within 0..1
 _TRANSFORMS: Final = {
     "UsdTransform2d": ("rotation", "scale", "translation"),
@@ -56,7 +56,7 @@ class _Changed(NamedTuple):
 
     @property
     def path(self) -> str:
-        """Of the picture that is changed."""
+        """Path of the modified picture."""
         return str(self.asset.path)
 
 
@@ -64,14 +64,14 @@ class _Picture(NamedTuple):
     """A picture as the node that reads it says."""
 
     info: _Row  # glTF's textureInfo
-    channel: str  # the output that is taken: "rgb", "r", "g", "b", "a", MaterialX's "out"
+    channel: str  # output channel: "rgb", "r", "g", "b", "a", MaterialX's "out"
     scale: tuple[float, ...] = (1.0,) * 4
     bias: tuple[float, ...] = (0.0,) * 4
     space: str = ""  # "raw", "sRGB", "" = what its use means
 
 
 class Shaders:
-    """The materials of a stage as glTF has them, each once. State: what was asked for."""
+    """The materials of a stage in glTF form, each once. State: a cache."""
 
     def __init__(self, notes: Notes, text_of: Callable[[Any], str], time: Any) -> None:
         """text_of: the text of an asset that an MDL material names, "" where it cannot be read."""
@@ -81,16 +81,16 @@ class Shaders:
         self.samplers: list[_Row] = [{"wrapS": _REPEAT, "wrapT": _REPEAT}]
         self.images: list[_Row] = []
         self.assets: list[Any] = []  # Sdf.AssetPath, _Masked or _Changed of each image
-        self._n_followed = 0  # connections of the material that is being read
-        self._n_nodes = 0  # between a surface and the node that is being read
+        self._n_followed = 0  # connections of the current material
+        self._n_nodes = 0  # nodes between a surface and the current node
         self._understood: dict[str, bool] = {}  # by the material's path
         self._uv_names: dict[str, str] = {}  # by the material's path
-        self._uv_name = ""  # of the material that is being read
+        self._uv_name = ""  # of the current material
         self._numbers: dict[str, int] = {}
         self._pictures: dict[str, int] = {}
 
     def number(self, material: Any) -> int | None:
-        """The row of a UsdShade.Material, None of none."""
+        """The row of a UsdShade.Material; None for no material."""
         if not material:
             return None
         path = str(material.GetPath())
@@ -99,7 +99,7 @@ class Shaders:
         return self._numbers[path]
 
     def plain(self, rgb: tuple[float, ...]) -> int:
-        """A row for what has a colour and no material."""
+        """A row for a colour without a material."""
         key = f"colour {rgb}"
         if key not in self._numbers:
             self._numbers[key] = self._add(_pbr("", [*rgb, 1.0], 1.0, 0.0))
@@ -127,7 +127,7 @@ class Shaders:
         return self._understood[path]
 
     def uv_name(self, material: Any) -> str:
-        """The texture coordinates by which a material's first picture lies, "" where it names none."""
+        """Texture coordinates of a material's first picture, "" if it names none."""
         self.number(material)
         return self._uv_names.get(str(material.GetPath()), "") if material else ""
 
@@ -284,7 +284,7 @@ class Shaders:
                 return (default if value is None else value), None
             self._n_followed += 1
             if self._n_nodes >= _MOST_NODES or self._n_followed > _MOST_FOLLOWED:
-                return default, None  # a node that is connected to itself, or nodes without end
+                return default, None  # a cycle of nodes, or too many
             self._n_nodes += 1
             try:
                 return self._followed(attribute, default)
@@ -293,7 +293,7 @@ class Shaders:
         return default, None
 
     def _followed(self, output: Any, default: Any) -> tuple[Any, _Picture | None]:
-        """What a node's output gives: its picture, a constant, else what its own inputs are connected to."""
+        """Value of a node's output: its picture, a constant, else the values connected to its inputs."""
         node = UsdShade.Shader(output.GetPrim())
         kind = str(node.GetIdAttr().Get() or "") if node else ""
         channel = output.GetName().rpartition(":")[2]
@@ -316,7 +316,7 @@ class Shaders:
         return default, None
 
     def _through(self, picture: _Picture, node: Any, kind: str, channel: str) -> _Picture:
-        """A picture after a node that stands between it and its surface."""
+        """A picture modified by a node between it and its surface."""
         if kind.startswith(("ND_separate", "ND_extract")):
             number = _finite(self._input(node, "index", 0)[0], 0) if "extract" in kind else None
             word = channel.removeprefix("out")[:1] if number is None else "rgba"[int(number) % 4]
@@ -357,7 +357,7 @@ class Shaders:
         return "sRGB" if word.lower().startswith("srgb") else ""
 
     def _place_of_picture(self, node: Any) -> dict[str, _Row]:
-        """KHR_texture_transform of UsdTransform2d, or of what MaterialX's nodes say; {} of none."""
+        """KHR_texture_transform of UsdTransform2d, or of MaterialX's nodes; {} without one."""
         st = node.GetInput("st") or node.GetInput("texcoord")
         for attribute in st.GetValueProducingAttributes() if st else ():
             turn = UsdShade.Shader(attribute.GetPrim())
@@ -408,7 +408,7 @@ class Shaders:
         return asset
 
     def _is_lost(self, picture: _Picture) -> bool:
-        """Whether a picture's file is not there; its note says what stands for it."""
+        """True if a picture's file is missing; the note names the replacement."""
         asset = self._asset(picture.info)
         if asset.resolvedPath:
             return False
@@ -576,7 +576,7 @@ def _omniverse(material: Any) -> str:
 
 
 def _grey(name: str) -> _Row:
-    """What is not understood: a matte grey."""
+    """Matte grey, for unsupported shaders."""
     return _pbr(name, [float(c) for c in (*linear_from_srgb(np.array(GREY)), 1.0)], 1.0, 0.0)
 
 

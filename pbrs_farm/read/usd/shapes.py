@@ -15,8 +15,8 @@ from pbrs_farm.geometry.solids import box, lathe, quads_surface, sphere
 from pbrs_farm.read.mesh.triangulate import triangulated_corners
 
 _ROUND: Final = 24  # segments around a round shape
-_OFF_M: Final = 0.005  # a flat light is moved out of the ceiling that it lies in
-# What else is a shape, and has no triangles here.
+_OFF_M: Final = 0.005  # offset of a flat light from its ceiling, metres
+# Other shape types, which are not triangulated.
 NOT_READ: Final = (
     "BasisCurves", "NurbsCurves", "NurbsPatch", "HermiteCurves", "Points", "TetMesh", "Volume",
 )  # fmt: skip
@@ -34,9 +34,9 @@ class Shape:
 
 
 def mesh_shape(prim: Any, time: Any, file: str, uv_name: str = "") -> Shape | None:
-    """The triangles of a UsdGeom.Mesh; None where it has none. BadHouse where they are damaged.
+    """The triangles of a UsdGeom.Mesh; None without any. BadHouse for a damaged mesh.
 
-    uv_name: the texture coordinates that its material asks for.
+    uv_name: the texture coordinates of its material.
     """
     mesh = UsdGeom.Mesh(prim)
     points = _float_rows(mesh.GetPointsAttr().Get(time), 3)
@@ -56,7 +56,7 @@ def mesh_shape(prim: Any, time: Any, file: str, uv_name: str = "") -> Shape | No
     pairs = [_texture_coordinates(prim, time, uv_name), _normals(mesh, time)]
     of_points = [_of_points(*pair, len(points)) for pair in pairs]
     of_corners = [_of_corners(*pair, indices, sizes) for pair in pairs]
-    # Where a corner has values of its own, every corner becomes a vertex.
+    # If corners have separate values, every corner becomes a vertex.
     if any(p is None and c is not None for p, c in zip(of_points, of_corners, strict=True)):
         points, faces = points[indices], triangles
         spread = [None if p is None else p[indices] for p in of_points]
@@ -109,7 +109,7 @@ def _is_pair(primvar: Any) -> bool:
 
 
 def _normals(mesh: Any, time: Any) -> tuple[F64 | None, str]:
-    """(values, interpolation) of the normals of a mesh that is no cage of a smoother one."""
+    """(values, interpolation) of the normals of a mesh that is not subdivided."""
     if mesh.GetSubdivisionSchemeAttr().Get() != UsdGeom.Tokens.none:
         return None, ""
     primvar = UsdGeom.PrimvarsAPI(mesh).GetPrimvar("normals")
@@ -122,7 +122,7 @@ def _normals(mesh: Any, time: Any) -> tuple[F64 | None, str]:
 
 
 def _of_points(values: F64 | None, interpolation: str, n_points: int) -> F64 | None:
-    """(V, k) values of points; None where there are none, or they are of something else."""
+    """(V, k) values per point; None for another interpolation or without values."""
     if values is None or not np.isfinite(values).all():
         return None
     if interpolation == "constant" and len(values) == 1:
@@ -140,7 +140,7 @@ def _of_corners(values: F64 | None, interpolation: str, indices: I64, sizes: I64
 
 
 def solid_shape(prim: Any, time: Any) -> Shape | None:
-    """The triangles of a cube, sphere, cylinder, cone, capsule or plane; None of what is none."""
+    """Triangulate a UsdGeom primitive (cube, sphere, cylinder, cone, capsule, plane); None for any other prim."""
 
     def value(name: str, default: float) -> float:
         found = prim.GetAttribute(name).Get(time)

@@ -71,7 +71,7 @@ def read_usd(given: GivenFile, fields: ReadFields) -> House:
 
 
 def companions_of_usd(given: GivenFile, files: SourceFiles) -> str:
-    """Digest of what reading opens beside the file; "" where there is none."""
+    """Digest of the files that reading opens besides this one; "" if there are none."""
     path, models = given.path, given.models
     if not is_installed("pxr"):
         return ""
@@ -121,7 +121,7 @@ def _mapping(folder: StageFolder, path: Path) -> Mapping:
 def _given_rooms(
     stage: Any, folder: StageFolder, path: Path, scale: float, *, is_z_up: bool
 ) -> list[dict[str, Any]]:
-    """Rooms as the room file of a glTF scene has them; [] where nothing tells any."""
+    """Rooms in the form of a glTF scene's room file; [] if no source has any."""
     prim = stage.GetDefaultPrim()
     own = prim.GetAttribute(ROOMS_ATTRIBUTE).Get() if prim else None
     if own:
@@ -164,7 +164,7 @@ def _of_stage(row: Any, place: str, scale: float, *, is_z_up: bool) -> dict[str,
 
 
 def _name_by_scope(room: Room, items: Sequence[Item]) -> Room:
-    """The room with the name of the scope that most of what stands in it lies below."""
+    """The room, named after the USD scope that holds most of its items."""
     area: Any = shapely.Polygon(room.polygon)
     votes: Counter[str] = Counter()
     for item in items:

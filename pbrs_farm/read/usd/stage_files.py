@@ -1,6 +1,6 @@
-"""The layers of an OpenUSD stage and what lies beside them; nothing outside the folder is read.
+"""The layers of an OpenUSD stage and files beside them; only files inside the folder are read.
 
-Effects: reads files below one folder; opens the stage in a process that may die, then in this one.
+Effects: reads files below one folder; opens the stage first in a process that may crash, then in this one.
 """
 
 from __future__ import annotations
@@ -44,20 +44,20 @@ class StageFolder:
 
     @classmethod
     def of(cls, path: Path, models: str) -> StageFolder:
-        """The file's own folder, or the one that --models names where the file lies in it."""
+        """The file's own folder, or the folder of --models if the file is inside it."""
         real = real_path(path)
         if models and real.is_relative_to(real_path(Path(models))):
             return cls(real, RootFolder(real_path(Path(models))))
         return cls(real, RootFolder(real.parent))
 
     def name_of(self, path: str) -> str | None:
-        """The name below the root of a path that the library resolved; None where it lies outside."""
+        """Name below the root of a path resolved by the library; None if it is outside."""
         real = real_path(Path(path))
         root = real_path(self.root.root)
         return str(real.relative_to(root)) if real.is_relative_to(root) else None
 
     def picture(self, asset: Any) -> bytes | None:
-        """The bytes of an asset that the stage resolved, also in a package; None where there is none."""
+        """The bytes of an asset resolved by the stage, also in a package; None if it does not exist."""
         resolved = str(asset.resolvedPath)
         package, is_inside, _ = resolved.partition("[")
         if not resolved or self.name_of(package) is None:
@@ -100,7 +100,7 @@ def _named_in(path: Path) -> list[str]:
 
 
 def _with_tiles(layer: Path) -> Iterator[str]:
-    """The names in a layer; of a picture in tiles (UDIM) each tile's that is there."""
+    """The names in a layer; a tiled picture (UDIM) is expanded to its existing tiles."""
     for asset in _named_in(layer):
         head, mark, tail = asset.partition("<UDIM>")
         if not mark or "://" in head:
@@ -115,7 +115,7 @@ def _name_below_root(folder: StageFolder, layer: str, asset: str) -> str | None:
     """The name below the root that an asset of a layer means; None where it does not exist."""
     if "://" in asset or "[" in asset or "\0" in asset:
         return None
-    # What no dot anchors is looked for beside the layer, too.
+    # Paths without a leading dot may also be relative to the layer.
     path = (folder.root.root / layer).parent / asset
     try:
         if not path.exists():
@@ -141,10 +141,9 @@ def _name_below_root(folder: StageFolder, layer: str, asset: str) -> str | None:
 
 
 def opened_stage(folder: StageFolder, notes: Notes) -> Any:
-    """The composed stage; what it names and cannot be opened is a note.
+    """The composed stage; unresolved references become notes.
 
-    Raises BadHouse for a damaged file, too many prims, or where a third of the references is
-    missing.
+    Raises BadHouse for a damaged file, too many prims, or if a third of the references is missing.
     """
     path = folder.path
     if path.stat().st_size > MAX_SCENE_BYTES:
@@ -214,11 +213,11 @@ def _fault_of(path: str, _size: int, _changed: int, n_bytes: int) -> str:
 
 
 FAULTS: Final = (Tf.ErrorException, UnicodeDecodeError)
-"""What the library raises of damaged files; texts that are no UTF-8 fail in its own error."""
+"""Errors of the library for damaged files; invalid UTF-8 raises a separate one."""
 
 
 def damaged(path: Path, error: Exception) -> BadHouse:
-    """What the library says of a damaged file, in one line."""
+    """The library's error message for a damaged file, in one line."""
     try:
         found = _SAID.search(str(error))
     except UnicodeDecodeError:
@@ -230,7 +229,7 @@ def damaged(path: Path, error: Exception) -> BadHouse:
 
 
 def _note_missing(said: Any, notes: Notes) -> int:
-    """How many references the library could not open; a note each."""
+    """Number of references that the library could not open; a note each."""
     n = 0
     for row in said.TakeUncoalescedDiagnostics():
         text = " ".join(str(row.commentary).split())

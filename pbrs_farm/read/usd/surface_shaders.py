@@ -1,7 +1,7 @@
-"""What the inputs of surface shaders are called: UsdPreviewSurface and those of MaterialX. No effects.
+"""Input names of surface shaders: UsdPreviewSurface and those of MaterialX. No effects.
 
-MaterialX's nodes come as ND_<name>_surfaceshader; Arnold's standard_surface has the same inputs. A shader
-that is none of these is not read: its material is a matte grey, with a note.
+MaterialX's nodes are called ND_<name>_surfaceshader; Arnold's standard_surface has the same inputs. Other
+shaders are not supported: their material is a matte grey, with a note.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from typing import Any, Final, NamedTuple
 
 
 class SurfaceWords(NamedTuple):
-    """Names of a surface shader's inputs ("" = it has none), and what they are where nothing says it."""
+    """Names of a surface shader's inputs ("" = none), and their defaults."""
 
     colour: str
     roughness: str
@@ -50,13 +50,13 @@ _BY_NAME: Final = {
     "gltf_pbr": _GLTF,
     "open_pbr_surface": _OPEN,
 }
-_CONTEXTS: Final = ("", "mtlx")  # render contexts that are asked first: what all renderers share
+_CONTEXTS: Final = ("", "mtlx")  # render contexts in order of preference, the shared one first
 
 
 def surface_of(material: Any) -> tuple[Any, SurfaceWords | None]:
-    """(the surface shader of a UsdShade.Material that is understood, its words), else (any, None).
+    """(surface shader of a UsdShade.Material, its input names), or (shader, None) if unsupported.
 
-    (None, None) where the material has none at all.
+    (None, None) without any shader.
     """
     first = None
     outputs = (o.GetBaseName().rpartition(":")[0] for o in material.GetSurfaceOutputs())

@@ -1,1 +1,1 @@
-"""A home file's bytes -> Plan: what it says, as values; nothing is built yet; no effects."""
+"""Parse a home file into a Plan of plain values, without building geometry; no effects."""

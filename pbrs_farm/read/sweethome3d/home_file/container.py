@@ -22,9 +22,9 @@ MAX_DEPTH = 200  # nested elements
 
 @dataclass(frozen=True, slots=True)
 class Container:
-    """The root element <home> and whatever holds models and textures.
+    """The root element <home>, and the source of models and textures.
 
-    parsed: models by content name that need no reading: those of a home that was just generated.
+    parsed: models by content name that are in memory already: those of a home just generated.
     """
 
     root: Element
@@ -33,9 +33,9 @@ class Container:
 
 
 def open_container(data: bytes, file: str, resources: Resources | None) -> Container:
-    """Take a home file apart; resources: the program's own models, for files that refer to them.
+    """Open a home file; resources: the program's own models, for files that refer to them.
 
-    Raises BadHouse for what is neither a zip nor XML, has no Home.xml, or is unsafe.
+    Raises BadHouse for a file that is neither zip nor XML, has no Home.xml, or is unsafe.
     """
     if data.startswith(b"PK"):
         archive = ZipResources(data, file)
@@ -61,7 +61,7 @@ def needs_program(data: bytes, file: str) -> bool:
         named = {e.get(key) for e in root.iter() for key in ("model", "image")}
         return not {posixpath.normpath(name) for name in named if name} <= set(held)
     except BadHouse:
-        return False  # the reader will say what is wrong with it
+        return False  # the reader reports the fault
 
 
 def _parse_xml(xml: bytes, file: str, entry: str) -> Element:

@@ -1,4 +1,4 @@
-"""What a Home.xml says, as values in metres and radians; no effects.
+"""Values of a Home.xml in metres and radians; no effects.
 
 Plan points are (x, y) of the file = (x, z) of the world. Colours are sRGB-encoded 0..1.
 """
@@ -32,7 +32,7 @@ class PlanPicture:
 
 @dataclass(frozen=True, slots=True)
 class Paint:
-    """What covers a surface; nothing given = the default."""
+    """Finish of a surface; empty = the default."""
 
     colour: Rgb | None = None  # sRGB-encoded
     picture: PlanPicture | None = None
@@ -153,7 +153,7 @@ class PlanPiece:
     power: float = 0.0  # 0..1, 0 = off
     staircase_cut_out: str = ""  # SVG path
     group: str = ""  # name of the group that holds it
-    joints: tuple[Joint, ...] = ()  # in the model's frame, where the file tells them
+    joints: tuple[Joint, ...] = ()  # in the model's frame, if the file has them
 
 
 @dataclass(frozen=True, slots=True)

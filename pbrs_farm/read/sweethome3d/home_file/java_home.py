@@ -25,7 +25,7 @@ _ALONE: Final = "holds no Home.xml, only the binary form of older versions,"
 _MODEL: Final = "com.eteks.sweethome3d.model."
 _MAX_GROUP_DEPTH: Final = 100
 _UPRIGHT: Final = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
-# Fields that are attributes of the same name: numbers, flags, texts.
+# Fields stored as attributes of the same name: numbers, flags, texts.
 _WALL: Final = "xStart yStart xEnd yEnd thickness height heightAtEnd arcExtent"
 _PIECE: Final = (
     "catalogId name creator x y elevation angle pitch roll width depth height modelMirrored"
@@ -116,7 +116,7 @@ class _Converter:
 
     def root(self) -> Element:
         """The element <home> with everything in it."""
-        # Write what stands on the element itself, then the properties.
+        # Write the element's own attributes, then the properties.
         version = _unbox(self._home.get("version"))
         root = Element("home", version=str(version or ""))
         _set_attribute(root, "name", self._home.get("name"))

@@ -53,7 +53,7 @@ _Call: TypeAlias = Generator["_Call", Any, Any]
 
 
 class _End:
-    """What stands where a class's own writing ends."""
+    """End marker of a class's own data."""
 
 
 _ENDED: Final = _End()
@@ -156,7 +156,7 @@ class _Reader:
         if code in (_STRING, _LONG_STRING):
             count = self._number("H" if code == _STRING else "q")
             return self._remember(self._utf(count))
-        # Blocks are what a class wrote by itself; their end has a mark of its own.
+        # Blocks contain data written by a class's own method; an end marker follows.
         if code in (_BLOCK, _LONG_BLOCK):
             return self._bytes(self._number("B" if code == _BLOCK else "i"))
         if code == _END:

@@ -28,10 +28,10 @@ FALLBACK_HEIGHT_M = 2.5  # of walls and levels without a height
 
 
 def parse_plan(root: Element, file: str, max_extent_m: float) -> HomePlan:
-    """Every element of a home's XML that the pipeline uses, as values in metres and radians.
+    """All elements of a home's XML used by the pipeline, as values in metres and radians.
 
-    max_extent_m: the largest coordinate that is taken (read.max_extent_m). Raises BadHouse naming the
-    element that is wrong.
+    max_extent_m: largest allowed coordinate (read.max_extent_m). Raises BadHouse, naming the invalid
+    element.
     """
     home = Attributes(file, "home", root, max_extent_m)
     # Bound the work before any element is read.

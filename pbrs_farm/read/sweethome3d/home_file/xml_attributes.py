@@ -29,7 +29,7 @@ class Attributes:
         return BadHouse(self.file, self.place, message)
 
     def text(self, name: str, default: str = "") -> str:
-        """The attribute as it stands."""
+        """The attribute, unconverted."""
         return self.element.get(name, default)
 
     def optional(self, name: str) -> float | None:
@@ -61,8 +61,8 @@ class Attributes:
     def metres(self, name: str, default_m: float | None = None) -> float:
         """A length or coordinate given in centimetres, in metres.
 
-        default: in metres, None = the attribute must be there. Raises BadHouse, naming the element, for
-        what is no number and for what lies beyond read.max_extent_m.
+        default: in metres, None = required. Raises BadHouse, naming the element, for an invalid number and
+        for one beyond read.max_extent_m.
         """
         value = self.optional_metres(name)
         if value is not None:
