@@ -1,9 +1,9 @@
-"""Mirrors mirror and panes are clear, also those that are part of another piece; no effects.
+"""Give mirrors a mirror material and panes a transparent one, also as parts of other pieces; no effects.
 
-Sources draw a mirror as a white or grey board, with or without a frame. What faces the room in the
-plane that holds most of the piece's area becomes a mirror's surface; frame, back and sides stay.
-Of other pieces (a dressing table, a cabinet with panes) the parts that are called mirror or glass
-count; the label stays the piece's.
+Sources draw a mirror as a white or grey board, with or without a frame. The room-facing faces in
+the plane with most of the piece's area become the mirror's surface; frame, back and sides stay. In
+other pieces (a dressing table, a cabinet with panes) parts named mirror or glass count; the label
+stays the piece's.
 """
 
 from __future__ import annotations
@@ -42,9 +42,10 @@ _NEAR_BEST: Final = 0.7  # of the largest plane's area, from which facing the ro
 
 
 def with_mirrors(house: House) -> tuple[House, tuple[str, ...]]:
-    """The house whose mirrors mirror, and the ids of the items that did not before.
+    """The house with working mirrors, and the ids of the changed items.
 
-    Of a piece of another class what is called a mirror counts. A piece that has a mirror's material anywhere stays as it is; so does one without a flat part.
+    In a piece of another class, parts named mirror count. Pieces that already have a mirror material,
+    and pieces without a flat part, are unchanged.
     """
     materials = list(house.materials)
     glass: dict[int, int] = {}  # material as read -> its mirror
@@ -67,9 +68,9 @@ def with_mirrors(house: House) -> tuple[House, tuple[str, ...]]:
 
 
 def with_clear_panes(house: House) -> House:
-    """The house in which one sees through the panes of cabinets, tables and shelves.
+    """The house with transparent panes in cabinets, tables and shelves.
 
-    Panes are thin flat parts that are called glass and drawn in one light, opaque colour.
+    Panes are thin flat parts named glass with a single light, opaque colour.
     """
     materials = list(house.materials)
     clear: dict[int, int] = {}  # material as read -> one that lets light through
@@ -113,7 +114,7 @@ def _is_pane(surface: Surface, material: Material) -> bool:
 def _named_mirror(
     item: Item, materials: Sequence[Material], rooms: Mapping[str, Room]
 ) -> Bools | None:
-    """(F,) which faces mirror of a piece with a part that is called a mirror; None without one."""
+    """(F,) mirror faces of a piece with a part named mirror; None without such a part."""
     is_named = [
         (names_mirror(s.name) or names_mirror(materials[s.material].name))
         and materials[s.material].kind is MaterialKind.OPAQUE
@@ -151,7 +152,7 @@ def _glass_of(item: Item, rooms: Mapping[str, Room]) -> Bools | None:
     sizes = np.array([areas[plane].sum() for plane in planes])
     if sizes.max() < max(_LEAST_M2, _LEAST_SHARE * areas.sum()):
         return None
-    # Front and back are often alike: the glass is what faces the room, and lies behind no other.
+    # Front and back are often alike: the glass is the foremost face towards the room.
     facing = [float(_towards_room(item, corners, rooms) @ normals[np.argmax(p)]) for p in planes]
     best = [k for k in range(len(planes)) if sizes[k] >= _NEAR_BEST * sizes.max()]
     return planes[max(best, key=lambda k: (round(facing[k], 2), sizes[k]))]
@@ -186,7 +187,7 @@ def _with_glass(item: Item, faces: Bools, materials: list[Material], glass: dict
             continue
         surfaces[k] = _part(surface, ~part)
         more.append(replace(_part(surface, part), name=f"{surface.name}_glass", material=number))
-    # New surfaces stand last, so that LightPart.emitting keeps its meaning.
+    # Append new surfaces, so that LightPart.emitting stays valid.
     return replace(item, surfaces=(*surfaces, *more))
 
 

@@ -1,4 +1,4 @@
-"""What repair changed and measured, in counts and names: repair.json. Frozen values, no effects."""
+"""Changes and measurements of repair, as counts and names: repair.json. Frozen values, no effects."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ Point = tuple[float, float, float]
 
 
 class Removed(Record):
-    """An item that was taken out."""
+    """An item that was removed."""
 
     item_id: str
     name: str
@@ -45,7 +45,7 @@ class WallLoss(Record):
 
 
 class StructureReport(Record):
-    """What was done to walls, floors, ceilings and openings."""
+    """Changes to walls, floors, ceilings and openings."""
 
     n_walls: int = 0
     n_walls_thickened: int = 0  # planar as read
@@ -57,8 +57,10 @@ class StructureReport(Record):
     n_stairwells_closed: int = 0  # floors and ceilings over stairwells that no room covers
     n_openings: int = 0
     n_openings_cut: int = 0  # the others touch no wall
-    n_frames_moved: int = 0  # doors, windows and things that lay in the faces of walls or floors
-    n_parts_moved: int = 0  # parts of things that lay in the faces of others
+    n_frames_moved: int = (
+        0  # doors, windows and items moved out of coplanar faces of walls or floors
+    )
+    n_parts_moved: int = 0  # parts of items moved out of coplanar faces of others
     left_as_is: tuple[LeftAsIs, ...] = ()
     areas: tuple[SideArea, ...] = ()  # of every wall, floor and ceiling
     walls_lost: tuple[WallLoss, ...] = ()
@@ -137,28 +139,28 @@ class Floating(Record):
     """A piece that nothing carries."""
 
     item_id: str
-    gap_m: float  # down to what is below it; -1 = nothing is
+    gap_m: float  # distance to the next surface below; -1 = none
 
 
 class FurnitureAudit(Record):
-    """Furniture that shares volume, floats, or stands twice in the same place."""
+    """Furniture that overlaps, floats, or is duplicated in place."""
 
     overlaps: tuple[Overlap, ...] = ()
     floating: tuple[Floating, ...] = ()  # touch no other item
     duplicates: tuple[tuple[str, str], ...] = ()  # same mesh, same place
-    n_unaudited: int = 0  # pieces beyond those that are audited
-    n_unmeasured: int = 0  # pairs whose boxes meet beyond those that are intersected, at least
+    n_unaudited: int = 0  # pieces beyond the audit's limit
+    n_unmeasured: int = 0  # minimum number of touching pairs beyond the limit of intersections
 
 
 class RepairReport(Record):
-    """Everything that was changed in a house and what was measured in it afterwards."""
+    """All changes to a house, and measurements of the result."""
 
     house_id: str
     was_repaired: bool = False  # it came in repaired: nothing was changed
     removed: tuple[Removed, ...] = ()
     faces: FacesReport = FacesReport()
     structure: StructureReport = StructureReport()
-    mirrors: tuple[str, ...] = ()  # ids of items that were drawn as boards and mirror now
+    mirrors: tuple[str, ...] = ()  # ids of items drawn as boards that are mirrors now
     sources: tuple[SourceRepair, ...] = ()
     fallback_lights: tuple[str, ...] = ()  # ids of the rooms that got one: nothing lit them
     added_lamps: tuple[str, ...] = ()  # ids of rooms with no lamp, or too weak ones
@@ -176,7 +178,7 @@ class RepairReport(Record):
         )
 
     def _repr_html_(self) -> str:
-        """What was wrong with the house and what was done about it, for a notebook."""
+        """Summary of the faults and their repairs, for a notebook."""
         head, *lines = summary_of_report(self).split("\n")
         rows = "".join(f"<li>{html.escape(line.removeprefix('- '))}</li>" for line in lines)
         return f"<div>{html.escape(head)}<ul>{rows}</ul></div>"

@@ -1,4 +1,4 @@
-"""A repair report in plain words: what was wrong with the house; no effects."""
+"""Summary of a repair report as sentences; no effects."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ if TYPE_CHECKING:
 
 
 def summary_of_report(report: RepairReport) -> str:
-    """What was wrong with a house and what was done about it, a sentence per line.
+    """The faults of a house and their repairs, one sentence per line.
 
-    English, for people; names from the source are cut and cleaned of control characters. A program
-    reads the report's fields instead.
+    English, for people; names from the source are shortened and stripped of control characters.
+    Programs read the report's fields instead.
     """
     if report.was_repaired:
         return f"{report.house_id} was repaired before; nothing was changed."
@@ -30,14 +30,12 @@ def summary_of_report(report: RepairReport) -> str:
 
 
 def _lines_of_structure(report: RepairReport) -> Iterator[str]:
-    # Say what was taken out.
     living = [r for r in report.removed if r.reason in ("person", "plant")]
     if living:
         yield f"{_n(len(living), 'person or plant', 'persons and plants')} taken out."
     gone = [r.item_id for r in report.removed if r.reason not in ("person", "plant")]
     if gone:
         yield f"{_n(len(gone), 'wall')} lay wholly inside others or in an opening: {_some(gone)}."
-    # Say what was wrong with single faces.
     faces = report.faces
     if faces.n_degenerate_dropped:
         yield f"{_n(faces.n_degenerate_dropped, 'face')} without area dropped."
@@ -45,7 +43,6 @@ def _lines_of_structure(report: RepairReport) -> Iterator[str]:
         yield f"{_n(faces.n_turned, 'face')} looked against their own normals and were turned."
     if report.mirrors:
         yield f"{_n(len(report.mirrors), 'mirror')} that did not mirror got a mirror's surface."
-    # Say what was done to walls, floors, ceilings and openings.
     s = report.structure
     if s.n_walls_thickened:
         yield f"{_n(s.n_walls_thickened, 'wall')} had no thickness and got one."

@@ -20,10 +20,10 @@ _TEXT_M = 0.25  # height of letters
 def section_svg(before: House, after: House, level_id: str) -> str:
     """Side by side: every wall of before with its outline, and the solid walls of after.
 
-    The cut goes through doors and windows. What is wrong shows before: walls that overlap, miss
-    each other or have no thickness. SVG, plan with x right and z down, one unit a metre.
+    The section goes through doors and windows. Faults are visible before: walls that overlap, have
+    gaps or no thickness. SVG, plan with x right and z down, one unit per metre.
     """
-    # Cut wall by wall before repair, all of the structure at once after it.
+    # Section wall by wall before repair, all of the structure at once after it.
     y = before.level(level_id).elevation + _CUT_M
     parts = [section_of_items([i], y) for i in before.items if i.kind is ItemKind.WALL]
     solid = section_of_items([i for i in after.items if i.kind.is_structure], y)
@@ -94,10 +94,10 @@ def _meet(a: F64, b: F64, y: float) -> F64:
 
 
 def solid_polygons(segments: F64) -> list[shapely.Polygon]:
-    """The regions a closed cut bounds that are solid: an odd number of edges lies to their right.
+    """The solid regions of a closed section: those with an odd number of edges to their right.
 
-    segments: (N, 2, 2), of closed surfaces: a gap of more than 10 micrometres leaves a region
-    unbounded and so away. Cells that touch are not joined.
+    segments: (N, 2, 2), of closed surfaces; a gap of more than 10 micrometres opens its region, which
+    is then dropped. Touching cells are not merged.
     """
     if not len(segments):
         return []

@@ -19,10 +19,10 @@ _SQUARE = 1e-6  # axes of a box whose products differ more from 0 and 1 are no f
 
 
 def without_persons_and_plants(house: House, fields: RepairFields) -> tuple[House, list[Removed]]:
-    """The house without persons and plants, as the recipe says (paper section 3).
+    """Remove persons and plants, as the recipe says (paper section 3).
 
-    Each by a field of its own. The second answer names what went; the kind decides, which the
-    reader of the source set.
+    Each has a recipe field. Also returns the removed items; they are identified by the kind that the
+    reader set.
     """
     kinds = set()
     if fields.remove_persons:
@@ -38,10 +38,9 @@ def without_persons_and_plants(house: House, fields: RepairFields) -> tuple[Hous
 
 
 def with_rooms_closed(house: House, fields: RepairFields) -> House:
-    """The house with ceilings over walled rooms that have none, where the recipe asks for them.
+    """Add ceilings over walled rooms without one, if the recipe asks for it.
 
-    Otherwise the house itself. Ceilings that are added carry a tag, by which
-    `rooms_with_added_ceilings` finds them.
+    Otherwise returns the house itself. Added ceilings have a tag, for `rooms_with_added_ceilings`.
     """
     return with_ceilings(house) if fields.add_ceilings else house
 
@@ -79,10 +78,10 @@ def with_white_walls(house: House, rgb: tuple[float, float, float]) -> tuple[Hou
 
 
 def with_sound_faces(house: House) -> tuple[House, FacesReport]:
-    """Faces without area or with a corner that is no number dropped; winding made to agree.
+    """Drop faces without area or with a NaN corner, and make winding consistent.
 
-    A face that looks against its own shading normals is turned round. Emptied surfaces stay, so
-    that LightPart.emitting keeps its meaning.
+    A face opposite to its own shading normals is flipped. Emptied surfaces are kept, so that
+    LightPart.emitting stays valid.
     """
     n_dropped = n_turned = 0
     items = []

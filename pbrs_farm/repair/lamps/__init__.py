@@ -1,1 +1,1 @@
-"""Bulbs, shades, and a light for rooms that have none; no effects."""
+"""Bulbs, lampshades, and lights for unlit rooms; no effects."""

@@ -1,7 +1,7 @@
-"""Light sources without an emitting part get a bulb: a sphere that touches nothing of its lamp.
+"""Add a bulb, a sphere that does not touch its lamp, to light sources without an emitting part.
 
-No effects. Paper section 3 marks bulbs by hand; where a source gives only a light's position, a
-sphere stands there, of the source's radius where it fits, else smaller, else a little moved.
+No effects. The paper marks bulbs by hand (section 3); if a source gives only a light's position, a
+sphere is added there, with the source's radius if it fits, else smaller, else slightly moved.
 """
 
 from __future__ import annotations
@@ -30,12 +30,11 @@ _N_MOVES = 400  # random places tried
 
 
 def with_bulbs(house: House, fields: RepairFields) -> tuple[House, list[SourceRepair]]:
-    """Every light source of every lamp with an emitting surface, and what was done for each.
+    """Give every light source of every lamp an emitting surface; reports the change for each.
 
-    The surfaces that a source names become emitting; where it names none with faces, a sphere is
-    set that fits in the lamp, smaller or moved if need be. A piece with a light becomes a lamp in
-    kind; items without stay as they are. The materials of emitting surfaces are added at the end,
-    so numbers of the others stay.
+    Surfaces named by a source become emitting; otherwise a sphere that fits in the lamp is added,
+    smaller or moved if necessary. A piece with a light gets the kind lamp; items without a light are
+    unchanged. Materials of emitting surfaces are appended, so that existing indices stay valid.
     """
     materials = _BulbMaterials(house.materials)
     items = []
@@ -49,7 +48,7 @@ def with_bulbs(house: House, fields: RepairFields) -> tuple[House, list[SourceRe
 
 
 class _BulbMaterials:
-    """The house's materials, with bulb materials added as they are asked for."""
+    """The house's materials, with bulb materials added on demand."""
 
     def __init__(self, materials: tuple[Material, ...]) -> None:
         self.all = list(materials)

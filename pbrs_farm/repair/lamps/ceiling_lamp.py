@@ -1,6 +1,6 @@
-"""The lamp that repair hangs in a room: where, and what it looks like; no effects.
+"""Position and shape of the lamp that repair adds to a room; no effects.
 
-`ceiling_lamp` is the one place that says what an added lamp is: a ball of light.
+`ceiling_lamp` alone defines an added lamp: a glowing ball.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from pbrs_farm.repair.structure.prisms import polygons_of
 ADDED_LAMP = "added"  # tag of every lamp that repair adds
 _BELOW_CEILING_M = 0.2  # distance of the lamp's centre from the ceiling
 _TALL_M = 0.5  # furniture that comes this near to the ceiling blocks its area for lamps
-_OWN_WALL_M = 0.2  # a room's own walls may stand so far inside its outline
+_OWN_WALL_M = 0.2  # maximum distance of a room's own walls inside its outline, metres
 _HEAD_M = 1.9  # a lamp hangs this high above the floor where the ceiling does
 _RADIUS_M = 0.1
 _POWER = 0.5  # power of a lamp in Sweet Home 3D: its default
@@ -33,10 +33,11 @@ _GRID_M = 0.25  # spacing of the places tried below a sloped ceiling
 def ceiling_lamp(
     house: House, room: Room, material: int, tag: str, flux_lm: float = 0.0
 ) -> Item | None:
-    """A ball below the ceiling, in the middle of the largest part of it that is free.
+    """A ball below the ceiling, in the centre of its largest free part.
 
-    None where nothing is above the room that it could hang from: an attic without a roof. material: index of its bulb material. tag: why it was added; begins the item's id. flux_lm: its
-    luminous flux, kept within what one lamp gives; 0 = that of a lamp of Sweet Home 3D.
+    None if there is nothing above the room to hang it from: an attic without a roof. material: index
+    of its bulb material. tag: reason for adding it; prefix of the item's id. flux_lm: its luminous
+    flux, limited to that of one lamp; 0 = that of a lamp of Sweet Home 3D.
     """
     centre = place_of_lamp(house, room)
     if centre is None:
@@ -70,11 +71,11 @@ def ceiling_lamp(
 
 
 def place_of_lamp(house: House, room: Room) -> F64 | None:
-    """(3,) middle of the largest circle in the room's ceiling that nothing tall takes part of:
-    no cupboard, and no wall that stands inside the room's outline, as of a bathroom drawn in it.
+    """(3,) centre of the largest circle in the room's ceiling clear of tall items: cupboards, and walls
+    inside the room's outline, such as those of a bathroom drawn in it.
 
-    Below the ceiling that is really there; where that is too low for a head or open to the sky,
-    below its highest place. None where all is open.
+    Below the actual ceiling; if that is lower than a person or open to the sky, below its highest
+    point. None if everything above is open.
     """
     # Take what reaches the ceiling out of the room's plan, unless nothing would be left.
     area = plan.polygon_of_room(room.polygon)
@@ -112,7 +113,7 @@ def heights_above(house: House, room: Room, places: F64) -> F64:
 
 
 def _heights_to_hang_from(house: House, room: Room, places: F64) -> F64:
-    """As heights_above; where nothing of the building is above, of roofs that are things."""
+    """Like heights_above; if no part of the building is above, roofs that are items count."""
     heights = heights_above(house, room, places)
     is_open = np.isinf(heights)
     roofs = [s for i in house.items if i.nyu40 in (OTHERSTRUCTURE, CEILING) for s in i.surfaces]
@@ -134,7 +135,7 @@ def _tall_footprint(item: Item, room: Room) -> plan.Shape | None:
 
 
 def _walls_inside(house: House, room: Room, area: plan.Shape) -> list[plan.Shape]:
-    """The plan areas of walls as high as the room that stand farther inside it than its own."""
+    """Plan areas of full-height walls farther inside the room than its own walls."""
     inner = plan.grown(area, -_OWN_WALL_M)
     found = []
     for item in house.items:

@@ -92,7 +92,7 @@ def _with_more_shades(
     """Add to shades the parts that stop most of this source's light, until enough gets out."""
     while True:
         found = light_output_of_source(scene, item, source, shades, fields.shade_transmission)
-        # Stop when enough gets out, or no part stops much of what is left.
+        # Stop once enough light escapes, or no part blocks much of the remainder.
         worst = int(np.argmax(found.blocked)) if len(found.blocked) else -1
         mine = sum(scene.parts[p][0] == item for p in shades)
         if found.ratio >= fields.min_escape or mine >= _MOST_SHADES:
@@ -113,9 +113,9 @@ def _shade_of(material: int, materials: list[Material]) -> int:
 
 
 def _split_off(item: Item, j: int, is_shade: Bools, material: int) -> Item:
-    """The item with those faces of its surface j in the shade's material.
+    """The item with some faces of its surface j in the shade's material.
 
-    A surface that is split keeps its place, its shade comes last: LightPart.emitting still holds.
+    A split surface keeps its index and its shade is appended: LightPart.emitting stays valid.
     """
     surfaces = list(item.surfaces)
     s: Surface = surfaces[j]

@@ -1,8 +1,8 @@
-"""How much of each source's light leaves its lamp, measured with rays; no effects.
+"""Share of each source's light that leaves its lamp, measured with rays; no effects.
 
-All lamps of a house stand side by side in one scene, far apart, so that one ray caster serves
-them all and no lamp meets another's rays. With each stands what is near it of walls, floors and
-ceilings: a cup below a ceiling keeps its light though it is open above.
+All lamps of a house are laid out in one scene, far apart, so that one ray caster measures all of
+them without interference. Nearby walls, floors and ceilings are included: a bowl below a ceiling
+keeps its light although it is open at the top.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _SEE_THROUGH = frozenset({MaterialKind.GLASS, MaterialKind.PANE, MaterialKind.BU
 _SPACING_M = 30.0  # between lamps, so that none meets another's rays
 _REACH_M = 14.0  # a ray that gets this far has left its lamp
 _MAX_LAYERS = 12  # of shade that one ray passes, or bounces off the structure
-# Structure this near the lamp's bounds bounces its light; what is farther off is the room's.
+# Structure within this distance of the lamp's bounds reflects its light, metres.
 _AT_LAMP_M = 0.05
 _NEAR_M = 0.5  # a bulb that meets structure from behind within this distance is inside it
 _BOUNCE = 0.7  # reflectance of structure: a light paint
@@ -38,7 +38,7 @@ class LampScene:
     house: House
     occluder: Occluder | None  # None where no lamp has a face that stops light
     parts: tuple[Part, ...]
-    part_of_face: I64  # (F,) index into parts, of each face; _STRUCTURE = of none
+    part_of_face: I64  # (F,) part index of each face; _STRUCTURE for walls, floors and ceilings
     normals: F64  # (F, 3) unit
     offset_of: dict[int, F64]  # item -> (3,) translation of that lamp
     bounds_of: dict[int, F64]  # item -> (2, 3) bounds of that lamp in the scene
@@ -47,18 +47,17 @@ class LampScene:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LightOutput:
-    """How much of a source's light leaves its lamp."""
+    """Share of a source's light that leaves its lamp."""
 
     ratio: float  # light output ratio, 0..1
     blocked: F64  # (n_parts,) share of the light that each part stops
 
 
 def lamp_scene_of_house(house: House, occluder_from: Callable[[House], Occluder]) -> LampScene:
-    """Lay out the house's lamps, glass and bulbs left out, and build their ray caster.
+    """Lay out the house's lamps, without glass and bulbs, and build their ray caster.
 
-    Lamps stand apart in a grid, so that one caster measures all of them and none lights another;
-    structure near a lamp comes with it. The caster is None where no opaque face is in it or near
-    it.
+    Lamps are spaced in a grid, so that one caster measures all of them and none lights another;
+    structure near a lamp is included. The caster is None if there are no opaque faces.
     """
     lamps = [k for k, item in enumerate(house.items) if item.lights]
     side = max(int(np.ceil(np.sqrt(len(lamps)))), 1)
@@ -125,7 +124,7 @@ def light_output_of_source(
     """
     rng = np.random.default_rng([item, source])
     origins, directions = _rays_of_source(scene, item, source, rng)
-    # The last row of both stands for the structure, which is _STRUCTURE = -1.
+    # The last row of both is the structure, whose index is _STRUCTURE = -1.
     blocked = np.zeros(len(scene.parts) + 1)
     is_shade = np.zeros(len(scene.parts) + 1, np.bool_)
     is_shade[list(shades)] = True
@@ -170,7 +169,7 @@ def light_output_of_source(
 def _rays_of_source(
     scene: LampScene, item: int, source: int, rng: np.random.Generator
 ) -> tuple[F64, F64]:
-    """Rays from a source's bulb where it stands in the scene."""
+    """Rays from a source's bulb at its position in the scene."""
     lamp = scene.house.items[item]
     emitting = [lamp.surfaces[k] for k in lamp.lights[source].emitting]
     origins, directions = diffuse_rays(emitting, N_RAYS, rng)

@@ -1,4 +1,4 @@
-"""What lights each room, and a ceiling light where nothing does or no lamp is; no effects."""
+"""Lights of each room, and ceiling lights for rooms that need one; no effects."""
 
 from __future__ import annotations
 
@@ -30,19 +30,18 @@ class GivenLights:
     """Ids of the rooms that got a ceiling light."""
 
     fallback: tuple[str, ...]  # nothing lit them
-    added: tuple[str, ...]  # they had daylight and no lamp, or lamps that are too weak
+    added: tuple[str, ...]  # rooms with daylight but no lamp, or with lamps that are too weak
 
 
 def with_room_lighting(
     house: House, *, fallback: bool, in_every_room: bool = False, lamp_lx: float = 0.0
 ) -> tuple[House, GivenLights]:
-    """Room.lit_by of every room, and a ceiling light in each that lacks one.
+    """Set Room.lit_by of every room, and add ceiling lights where needed.
 
-    fallback: in each room that has a floor, a ceiling and no light. in_every_room: in each that
-    people live in and that has no lamp of its own, whatever daylight it has. No light hangs from the
-    sky: a room with nothing above gets none. lamp_lx: what an
-    added light aims at on the floor; a room whose own lamps have little of the flux for that gets
-    one for the rest. 0: all lights are alike, and a room with any lamp gets none.
+    fallback: to each room with a floor, a ceiling and no light. in_every_room: to each living area
+    without a lamp, regardless of daylight. Rooms open to the sky get none. lamp_lx: target
+    illuminance of an added light on the floor; a room whose lamps have little of the required flux
+    gets one for the rest. 0: all added lights are alike, and a room with any lamp gets none.
     """
     rooms, lights = [], []
     given: dict[str, list[str]] = {FALLBACK: [], ADDED_LAMP: []}

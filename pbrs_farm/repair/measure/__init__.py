@@ -1,1 +1,1 @@
-"""What a house is like: closed rooms, light leaks, furniture that overlaps; no effects."""
+"""Measurements of a house: closed rooms, light leaks, overlapping furniture; no effects."""

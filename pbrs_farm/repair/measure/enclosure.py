@@ -1,6 +1,6 @@
-"""Which rooms are closed, which open into each other, and why the others are open; no effects.
+"""Which rooms are closed, which are connected, and why others are open; no effects.
 
-A room is closed when full-height walls, or rooms it opens into, bound its polygon, and it has a
+A room is closed if full-height walls, or rooms that it opens into, bound its polygon, and it has a
 floor and a ceiling of its own or those of the space it opens into (stairwell, hall).
 """
 
@@ -103,7 +103,7 @@ def _open_sides_of_room(
 ) -> tuple[list[int], str]:
     """Rooms that room i opens into through its edge, and why the edge is open, or ""."""
     room = rooms[i]
-    # Find the samples of the edge behind which no wall of full height stands.
+    # Find samples of the edge without a full-height wall behind.
     points, outward = edge_samples(areas[i])
     floor = np.full(len(points), room.floor_y)
     ceiling = _ceiling_at(points, room, covers)
@@ -142,7 +142,7 @@ def edge_samples(area: plan.Shape) -> tuple[F64, F64]:
         oriented = shapely.orient_polygons(polygon)
         for ring in (oriented.exterior, *oriented.interiors):
             corners = np.asarray(ring.coords)
-            # Sample each side in the middle of equal steps; outside lies to the right.
+            # Sample each side at the centres of equal steps; outside is to the right.
             for a, b in pairwise(corners):
                 length = float(np.linalg.norm(b - a))
                 n = max(round(length / _STEP_M), 1)
@@ -169,7 +169,7 @@ def _ceiling_at(points: F64, room: Room, covers: Sequence[Cover]) -> F64:
 
 
 def _walled(points: F64, low: F64, high: F64, walls: Sequence[Wall]) -> Bools:
-    """Whether walls stand at each point from low to high, gaps up to GAP_M aside."""
+    """True if walls cover each point from low to high, within GAP_M sideways."""
     reached = low + 2 * GAP_M  # a wall may begin a little above the floor
     spans = []
     around: plan.Shape = shapely.MultiPoint(points).envelope
@@ -213,10 +213,10 @@ def _open_above_or_below(
 def bare_area(
     room: Room, rooms: Sequence[Room], covers: Sequence[Cover], *, above: bool
 ) -> plan.Shape:
-    """Plan area of room with neither a cover above (or below) it nor a room of the next storey.
+    """Plan area of a room with neither a cover nor another storey's room above (or below).
 
-    covers: floors and ceilings of the house. A part that a room of the next storey lies over counts
-    as covered, since its floor closes it. Small gaps at the edge of that room are forgiven.
+    covers: floors and ceilings of the house. A part below a room of the next storey counts as
+    covered, since that room's floor closes it. Small gaps at that room's edge are ignored.
     """
     bare = plan.without(plan.polygon_of_room(room.polygon), *_covers_of(room, covers, above=above))
     beyond = [rooms[j].polygon for j in _storey_next(room, rooms, above=above)]

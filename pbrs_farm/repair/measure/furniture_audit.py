@@ -1,4 +1,4 @@
-"""Furniture that shares volume, touches nothing, or stands twice in one place; no effects."""
+"""Furniture that overlaps, floats, or is duplicated in place; no effects."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from pbrs_farm.repair.structure.booleans import TagTable, common, unite
 from pbrs_farm.repair.structure.closed_shells import closed_shells
 
 _TOUCH_M = 0.02  # boxes nearer than this touch
-_SAME_M = 0.001  # boxes that differ by less stand in one place
+_SAME_M = 0.001  # maximum difference between boxes at the same place, metres
 _MIN_VOLUME_M3 = 1e-4  # a decilitre
 _MIN_SHARE = 0.01  # of the smaller piece
 _MAX_FACES = 60_000  # beyond it the boolean takes too long
@@ -24,12 +24,12 @@ _MAX_PAIRS = 4_000  # of pieces whose boxes meet, intersected; a home has some h
 
 
 def furniture_audit(house: House) -> FurnitureAudit:
-    """What is doubtful about where the furniture stands; nothing is changed.
+    """Report implausible furniture positions; nothing is changed.
 
-    Overlaps are exact for the closed shells of each piece; open meshes have no volume and do not
-    count, nor do pieces of more than 60,000 triangles. Floating: its bounding box, grown by 2 cm,
-    meets no other item's. Of more than 2,000 pieces the first are audited, of more than 4,000 pairs
-    that meet the first are intersected; what is left out is counted.
+    Overlaps are exact for the closed shells of each piece; open meshes have no volume and are
+    skipped, as are pieces of more than 60,000 triangles. Floating: its bounding box, grown by 2 cm,
+    touches no other item's. At most 2,000 pieces are audited and 4,000 touching pairs intersected; the
+    remainder is counted.
     """
     everything = [i for i in house.items if _is_furniture(i)]
     pieces = everything[:_MAX_PIECES]
@@ -62,7 +62,7 @@ def _find_overlaps(
 ) -> Iterator[Overlap]:
     solids: dict[int, Manifold | None] = {}
     for i, j in pairs:
-        # They share no more than their boxes do: a cup on a table is told by these.
+        # Bound the overlap by the boxes' first, which settles a cup on a table.
         shared = np.minimum(boxes[i, 1], boxes[j, 1]) - np.maximum(boxes[i, 0], boxes[j, 0])
         if np.prod(shared) <= _MIN_VOLUME_M3:
             continue

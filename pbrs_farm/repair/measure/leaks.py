@@ -90,10 +90,10 @@ def leaks_of_house(
 
 
 def plugged_shell(house: House, plugs: Sequence[Surface]) -> House:
-    """The house's structure alone, its openings filled.
+    """The house's structure alone, with its openings filled.
 
-    plugs: solids of the openings, as the cutting gives them. The ground is left out, so it does not
-    stand in for a floor. For measuring, never for rendering.
+    plugs: solids of the openings, from the cutting. The ground is excluded, so that it does not
+    replace a floor. For measurements, not for rendering.
     """
     items = [i for i in house.items if i.kind.is_structure and i.kind is not ItemKind.GROUND]
     plug = Item("plugs", "plugs", ItemKind.WALL, house.levels[0].id, tuple(plugs))

@@ -45,15 +45,15 @@ def interiors_of_room(
     surfaces: Sequence[PlanarSurface],
     solid: Sequence[Cover] = (),
 ) -> list[RoomInterior]:
-    """Between the walls, above the floor, a part below each plane of the ceiling.
+    """Volumes between the walls and above the floor, one below each plane of the ceiling.
 
     uprights: walls and baseboards of all storeys; surfaces: floors and ceilings without thickness, solid:
-    the inner faces of those that have one, a roof's among them. Empty where walls leave nothing of the
-    room. Where no ceiling lies above, the room's nominal height counts.
+    the inner faces of those with thickness, including a roof's. Empty if walls cover the whole room.
+    Without a ceiling above, the room's nominal height is used.
     """
     outline = plan.polygon_of_room(room.polygon)
     near = [
-        # Take the walls that stand at the height of this room, in it or beside it.
+        # Take the walls at the height of this room, in it or beside it.
         w
         for w in plan.near_to(outline, uprights, lambda w: w.footprint, _BESIDE_M)
         if w.bottom_y < room.ceiling_y - 0.1 and w.high_y > room.floor_y + 0.01
@@ -105,7 +105,7 @@ def _hung(area: Shape, room: Room, covers: Sequence[Cover]) -> list[tuple[Shape,
 
 
 def _where_above(a: Plane, b: Plane, *, or_equal: bool) -> Shape:
-    """The half of the plan in which plane a lies above plane b: all of it or none where they are parallel."""
+    """Half of the plan where plane a is above plane b: everything or nothing for parallel planes."""
     normal, offset = np.array([a.a - b.a, a.b - b.b]), a.c - b.c
     steep = float(np.linalg.norm(normal))
     if steep < 1e-9:

@@ -58,9 +58,9 @@ class _Cover(NamedTuple):
 
 
 def with_ceilings(house: House) -> House:
-    """The house with a ceiling over what is open of every walled room without one.
+    """Add a ceiling over the open area of every walled room without one.
 
-    The new items have the tag ADDED_CEILING and the rooms has_ceiling: done twice, nothing is added.
+    New items have the tag ADDED_CEILING and the rooms has_ceiling, so a second call adds nothing.
     """
     if all(room.has_ceiling for room in house.rooms):
         return house
@@ -69,7 +69,7 @@ def with_ceilings(house: House) -> House:
     ]
     made: list[Item] = []
     closed: dict[str, Room] = {}
-    # From the top storey down: what is under a ceiling that was just added is not open to the sky.
+    # From the top storey down: a ceiling just added also covers rooms below it.
     for room in sorted(house.rooms, key=lambda r: -r.floor_y):
         found = None if room.has_ceiling or is_outdoors(room) else _closed(room, house, covers)
         if found is None:
@@ -150,7 +150,7 @@ def _bare(
     *,
     is_below: bool,
 ) -> plan.Shape:
-    """What of a room has no ceiling of its own, nor one that a void leads up to, nor stairs."""
+    """The part of a room without a ceiling of its own or one at the top of a void, and without stairs."""
     above = [c for c in covers if c.low_y > room.floor_y + MIN_WALL_HEIGHT_M / 2]
     own = [c.area for c in above if c.is_ceiling and c.low_y < level_y + MAX_STOREY_GAP_M]
     floors = plan.union(
@@ -202,7 +202,7 @@ class _WallTops:
             corners = corners_of_surfaces(item.surfaces)
             edges = corners[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2, 3)
             ends = edges[:, :, [0, 2]]
-            # Keep what is near the room and reaches high enough.
+            # Keep walls that are near the room and high enough.
             near = (ends.max(1) > low).all(1) & (ends.min(1) < high).all(1)
             edges = edges[near & (edges[:, :, 1].max(1) > room.floor_y + MIN_WALL_HEIGHT_M)]
             order = np.argsort(-edges[:, :, 1].max(1), kind="stable")[:_MOST_EDGES]
@@ -222,7 +222,7 @@ class _WallTops:
 
 
 def _nearest_tops(points: Points2, edges: F64) -> tuple[F64, F64]:
-    """How far each point is from a wall's edges in plan, and the highest of those nearest there."""
+    """Distance from each point to the walls' edges in plan, and the highest of the nearest there."""
     away, tops = np.empty(len(points)), np.empty(len(points))
     a, d = edges[:, 0], edges[:, 1] - edges[:, 0]
     length2 = np.maximum((d[:, [0, 2]] ** 2).sum(1), 1e-18)

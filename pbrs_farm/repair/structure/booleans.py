@@ -28,7 +28,7 @@ _NUMBER_OF_PROPERTIES = 8  # x y z, u v, nx ny nz
 
 @dataclass(frozen=True, slots=True)
 class Tag:
-    """What a face is part of: carried through every boolean, so that results go back to their items."""
+    """Origin of a face: preserved by every boolean, so that results can be assigned to their items."""
 
     item: int  # index into House.items
     surface: str  # name, one of its item's
@@ -47,10 +47,9 @@ class Patch:
 
 
 class TagTable:
-    """Which original id of manifold3d stands for which tag; grows as solids are made.
+    """Maps original ids of manifold3d to tags; grows as solids are made.
 
-    One table serves one repair: solids of two tables must not meet in a boolean, since ids
-    are looked up in one.
+    One table per repair: solids of two tables cannot be combined, since ids are looked up in one.
     """
 
     def __init__(self) -> None:
@@ -81,7 +80,7 @@ def solid_from_patches(patches: Sequence[Patch], table: TagTable) -> Manifold | 
     patches = [p for p in patches if len(p.faces)]
     if not patches:
         return None
-    # Weld equal corners alone first: a larger weld may close a gap that is meant.
+    # Weld equal corners only at first: a larger weld may close an intended gap.
     for weld_m in (0.0, WELD_M):
         solid = _manifold_of(patches, table, weld_m)
         if solid is not None:
@@ -91,7 +90,7 @@ def solid_from_patches(patches: Sequence[Patch], table: TagTable) -> Manifold | 
 
 def _manifold_of(patches: Sequence[Patch], table: TagTable, weld_m: float) -> Manifold | None:
     vertices, faces, merge_from, merge_to = _welded(patches, weld_m)
-    # Never hand over what is open: manifold3d's own test may crash on it.
+    # Never pass an open mesh: manifold3d's own test may crash on it.
     place = np.arange(len(vertices))
     place[merge_from] = merge_to
     if not edges_are_paired(place[faces]):
@@ -100,7 +99,7 @@ def _manifold_of(patches: Sequence[Patch], table: TagTable, weld_m: float) -> Ma
     if signed_volume(vertices[faces, :3], vertices[:, :3].mean(0)) < 0:
         faces = faces[:, [0, 2, 1]]
         vertices = vertices * np.array([1.0] * 5 + [-1.0] * 3)  # x y z u v kept, normals turned
-    # Hand each patch over as a run of its own, with a new original id.
+    # Pass each patch as a separate run with a new original id.
     mesh = manifold3d.Mesh64(
         np.ascontiguousarray(vertices),
         np.ascontiguousarray(faces, np.uint64),
@@ -110,7 +109,7 @@ def _manifold_of(patches: Sequence[Patch], table: TagTable, weld_m: float) -> Ma
         run_original_id=table.reserve([p.tag for p in patches]),
     )
     solid = Manifold(mesh)
-    # Take only what is closed and has a volume.
+    # Accept only closed solids with a volume.
     if solid.status() != manifold3d.Error.NoError or solid.is_empty() or solid.volume() <= 0:
         return None
     return solid
@@ -131,7 +130,7 @@ class _Welded(NamedTuple):
 
     vertices: F64  # (V, 8) x y z u v, normal
     faces: I64  # (F, 3)
-    merge_from: NDArray[np.uint64]  # vertices that are one with
+    merge_from: NDArray[np.uint64]  # vertices merged into
     merge_to: NDArray[np.uint64]  # these
 
 
@@ -163,7 +162,7 @@ def unite(solids: Iterable[Manifold]) -> Manifold:
 
 
 def subtract(solid: Manifold, cutters: Sequence[Manifold]) -> Manifold:
-    """solid without what lies in any of the cutters.
+    """Subtract all cutters from solid.
 
     The faces of the hole carry the cutters' ids. Cutters may overlap.
     """
@@ -173,7 +172,7 @@ def subtract(solid: Manifold, cutters: Sequence[Manifold]) -> Manifold:
 
 
 def common(a: Manifold, b: Manifold) -> Manifold:
-    """What lies in both solids."""
+    """Intersection of two solids."""
     return a ^ b
 
 
@@ -193,7 +192,7 @@ def overlap_of_bounds(a: F64, b: F64) -> F64:
 def patches_from_solid(solid: Manifold, table: TagTable) -> list[Patch]:
     """The solid's surface by tag, in order of item and surface; positions are float32 values.
 
-    Slivers are left out. Each patch has vertices of its own; the uv are what booleans interpolated.
+    Slivers are dropped. Each patch has separate vertices; uv are interpolated by the booleans.
     """
     mesh = solid.to_mesh64()
     vertices = np.asarray(mesh.vert_properties, np.float64)

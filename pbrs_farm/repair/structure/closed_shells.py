@@ -33,15 +33,17 @@ from pbrs_farm.repair.structure.slivers import MIN_AREA_M2
 
 _FLAT_M = 1e-3  # how far corners may lie off the plane of a planar wall
 _LEAST_FACES = 4  # of a closed solid
-_THICKER_THAN_WALLS_M = 0.4  # what is thinner and looks inward is a wall wound the wrong way
+_THICKER_THAN_WALLS_M = (
+    0.4  # thinner shells that face inward are walls with inverted winding, metres
+)
 ClosedShell = tuple[Manifold, list[Patch]]  # the solid, and the patches it was made of
 
 
 def patch_from_surface(surface: Surface, item: int) -> Patch:
-    """The surface in double precision, tagged with its item; metric uv where it has none.
+    """The surface in double precision, tagged with its item; metric uv if it has none.
 
-    item: number of the item in the house. Normals that are missing are 0, which
-    `surface_from_patch` leaves out again.
+    item: index of the item in the house. Missing normals are 0, which `surface_from_patch` drops
+    again.
     """
     positions = surface.positions.astype(np.float64)
     uvs = surface.uvs.astype(np.float64) if surface.uvs is not None else positions[:, [0, 2]]
@@ -90,9 +92,9 @@ class FlatPatch:
 
 
 def shells_from_item(item: Item, index: int, table: TagTable) -> list[ClosedShell] | None:
-    """The item as closed solids, one per connected shell; None if any part of it is none.
+    """The item as closed solids, one per connected shell; None if any part is not solid.
 
-    A part that is open is none, nor is one that shows a room from inside: it bounds no block.
+    Open parts are not solid, nor is the inside of a room, which bounds no block.
     """
     patches = [patch_from_surface(s, index) for s in item.surfaces if len(s.faces)]
     if not patches:
@@ -116,16 +118,16 @@ def _shows_a_room(patches: Sequence[Patch]) -> bool:
 
 
 def closed_shells(item: Item, table: TagTable) -> list[Manifold]:
-    """Those connected parts of the item that are closed solids.
+    """The connected parts of the item that are closed solids.
 
-    Closed means that manifold3d takes it for a solid: every edge has two faces that run against
-    each other. Sheets, leaves and open boxes are not among the answers.
+    Closed means accepted by manifold3d: every edge has two faces with opposite direction. Sheets,
+    leaves and open boxes are skipped.
     """
     patches = [patch_from_surface(s, 0) for s in item.surfaces if len(s.faces)]
     if not patches:
         return []
     parts = _split(patches, components(patches))
-    # A solid has four faces at least: leaves and sheets are none.
+    # A solid has at least four faces; skip leaves and sheets.
     large = [part for part in parts if sum(len(p.faces) for p in part) >= _LEAST_FACES]
     solids = (solid_from_patches(part, table) for part in large)
     return [s for s in solids if s is not None]
@@ -154,7 +156,7 @@ def components(patches: Sequence[Patch]) -> list[I64]:
 def _split(patches: Sequence[Patch], labels: Sequence[I64]) -> list[list[Patch]]:
     """The parts of the patches that each shell is made of, with the vertices they use."""
     every = np.unique(np.concatenate(labels))
-    # Keep the patches of a single shell as they are.
+    # Keep the patches of a single shell unchanged.
     if len(every) == 1:
         return [list(patches)]
     shells: list[list[Patch]] = [[] for _ in every]
@@ -180,10 +182,10 @@ def _part(patch: Patch, faces: I64) -> Patch:
 
 
 def flat_patch(item: Item, index: int) -> FlatPatch | None:
-    """The item as one flat patch of its first surface's tag; None if it lies in no one plane.
+    """The item as one flat patch of its first surface's tag; None if it is not planar.
 
-    index: of the item in the house. A patch that is folded, or has a back as well as a front, is
-    none: its normals cancel out.
+    index: of the item in the house. A folded patch, or one with a front and a back, is not planar: its
+    normals cancel out.
     """
     patches = [patch_from_surface(s, index) for s in item.surfaces if len(s.faces)]
     if not patches:

@@ -1,4 +1,4 @@
-"""Openings cut through both faces of the walls they stand in, and the plugs that fill them.
+"""Cut openings through both faces of their walls, and make the plugs that fill them.
 
 No effects.
 """
@@ -40,7 +40,7 @@ class WallPart:
 
 
 def thresholds(house: House, walls: Sequence[Wall]) -> plan.Shape:
-    """Plan area of the openings that reach down to the foot of the wall they stand in.
+    """Plan area of the openings that reach down to the foot of their wall.
 
     Doors, and windows down to the floor. Openings that begin higher do not count.
     """
@@ -49,7 +49,7 @@ def thresholds(house: House, walls: Sequence[Wall]) -> plan.Shape:
         cutter = opening.cutter
         area = plan.polygon_of_triangles(cutter.positions.astype(float), cutter.faces)
         low = float(cutter.positions[:, 1].min())
-        # Keep what lies over walls whose foot is as low as the opening.
+        # Keep the area over walls whose foot is as low as the opening.
         feet = [w.footprint for w in walls if abs(w.bottom_y - low) < GAP_M]
         areas.append(plan.common(area, plan.union(feet)))
     return plan.union(areas)
@@ -58,10 +58,10 @@ def thresholds(house: House, walls: Sequence[Wall]) -> plan.Shape:
 def cut_openings(
     openings: Sequence[Opening], parts: Sequence[WallPart], table: TagTable
 ) -> tuple[list[Manifold], dict[str, tuple[Surface, ...]], list[str]]:
-    """Each part less the openings that touch it; plugs by opening id; ids of those that cut nothing.
+    """Each part minus its openings; plugs by opening id; ids of openings that cut nothing.
 
-    A plug has the thickness of the walls it stands in. Where the source has cut the walls already,
-    the opening's cutter is its plug, and only joints are cut.
+    A plug is as thick as its walls. If the source has cut the walls already, the opening's cutter is
+    its plug, and only joints are cut.
     """
     cutters_of: list[list[Manifold]] = [[] for _ in parts]
     plugs: dict[str, tuple[Surface, ...]] = {}

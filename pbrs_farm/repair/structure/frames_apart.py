@@ -1,8 +1,8 @@
-"""Things moved half a millimetre out of the faces of walls and of one another; no effects.
+"""Move coplanar faces of items half a millimetre apart from walls and from each other; no effects.
 
-A frame as thick as its wall lies in the wall's own faces, and so does a picture drawn on it: a ray
-meets either of the two there, and no label is the only right one. Where parts of a piece, or pieces
-that touch, share a face and are of two materials, the picture glitters.
+A frame as thick as its wall has faces in the wall's own planes, as has a flat picture on it: a ray
+hits either of the two, and labels are ambiguous. Coplanar faces of two materials, in one piece or
+in touching pieces, flicker.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from pbrs_farm.core.house import House, Item, ItemKind, Surface, corners_of_surf
 from pbrs_farm.core.mesh import area_vectors, unit_normals
 
 MOVED_M = 5e-4
-"""How far a thing is moved out of the face it lies in."""
+"""Distance that an item is moved out of a coplanar face, metres."""
 
 _FACED = (ItemKind.WALL, ItemKind.FLOOR, ItemKind.CEILING)
 _COINCIDE_M = 1e-4  # faces nearer than this are one to a ray
@@ -28,7 +28,7 @@ _PARALLEL = 0.9999  # cosine
 _TURN = 0.015  # between unit normals whose cosine is that
 _LEAST_AREA_M2 = 1e-5  # that two faces must share
 _SEEN_M2 = 1e-3  # that parts must share: less is a few pixels from near
-_LEAST_FACE_M2 = 1e-4  # of a face: smaller ones are of what is round
+_LEAST_FACE_M2 = 1e-4  # minimum face area; smaller faces belong to round shapes
 _ROUNDS = 3  # parts that lie in one plane by threes are moved by steps
 
 
@@ -39,10 +39,10 @@ class _Faces:
 
 
 def with_frames_apart(house: House) -> tuple[House, int]:
-    """The house with the corners of such things moved out of the wall, and how many pieces were.
+    """Move corners of items out of coplanar walls; also returns the number of moved pieces.
 
-    A thing is moved where a face of it shares area with a face of a wall, a floor or a ceiling that
-    looks the same way. Where another face of it or of a wall lies within reach, it stays.
+    An item is moved if a face of it overlaps a face of a wall, floor or ceiling with the same
+    direction, unless another face of either is within reach.
     """
     walls = [i for i in house.items if i.kind in _FACED and i.n_faces]
     bounds = np.array([w.bounds for w in walls]).reshape(-1, 2, 3)
@@ -59,10 +59,10 @@ def with_frames_apart(house: House) -> tuple[House, int]:
 
 
 def with_parts_apart(house: House) -> tuple[House, int]:
-    """The house with parts of things moved out of others' faces, and how many parts were.
+    """Move parts of items out of coplanar faces of others; also returns the number of moved parts.
 
-    A part is what a thing has of one material. Of two that share area in one plane and look one way
-    the later is moved, unless another face lies within reach.
+    A part is the surface of one material. Of two overlapping coplanar faces with the same direction
+    the later is moved, unless another face is within reach.
     """
     moved = set[tuple[int, int]]()
     for _ in range(_ROUNDS):
@@ -220,7 +220,7 @@ def _of_plane(faces: _Faces, normal: F64, offset: float) -> F64:
 
 
 def _is_met(around: _Faces, own: _Faces, normal: F64, offset: float) -> bool:
-    """Whether a parallel face lies so near before the plane that a moved frame would meet it."""
+    """True if a parallel face is so close in front of the plane that a moved frame would touch it."""
     for faces in (around, own):
         ahead = (faces.corners @ normal - offset).mean(1)
         parallel = np.abs(faces.normals @ normal) > _PARALLEL

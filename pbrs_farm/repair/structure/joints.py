@@ -50,7 +50,7 @@ def joints_between_walls(
 
 
 def _joint(a: Wall, b: Wall, rooms: plan.Shape, table: TagTable) -> list[Manifold]:
-    # Fill what lies near both walls, drawn back behind their faces.
+    # Fill the area near both walls, set back behind their faces.
     both = plan.union([a.footprint, b.footprint])
     near = plan.common(plan.grown(a.footprint, GAP_M), plan.grown(b.footprint, GAP_M))
     if a.thickened and b.thickened:
@@ -85,7 +85,7 @@ def _bridge(a: Wall, b: Wall, rooms: plan.Shape) -> plan.Shape:
 
 
 def _hull_of_ends(a: plan.Shape, b: plan.Shape) -> plan.Shape:
-    # Take the convex hull of what lies near the other one.
+    # Take the convex hull of the parts near the other wall.
     ends = [plan.common(x, plan.grown(y, 1.5 * GAP_M)) for x, y in ((a, b), (b, a))]
     return shapely.convex_hull(plan.union(ends))
 
@@ -155,7 +155,7 @@ def joints_with_surface(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Foot:
-    """Where a wall stands on a floor or under a ceiling, drawn back behind its faces."""
+    """Contact area of a wall with a floor or ceiling, set back behind its faces."""
 
     wall: Wall
     area: shapely.Polygon

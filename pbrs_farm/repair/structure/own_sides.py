@@ -1,9 +1,9 @@
-"""Walls drawn back where they reach into another room, so that each room sees its own; no effects.
+"""Trim walls that extend into another room, so that each room sees its own walls; no effects.
 
-Where every room brings walls of its own (SUNCG), the walls of two neighbours fill one slab and
-their sides lie in one plane. A wall is cut there by the volume of the other room, but its rim
-alone: along the wall, wherever some of its thickness is left. What stands in the other room
-with all its thickness is a partition that one outline was drawn around, and stays.
+If every room has separate walls (SUNCG), the walls of two neighbours overlap and their sides are
+coplanar. The wall is cut by the volume of the other room, but only at its rim: along the wall,
+wherever some of its thickness remains. A wall completely inside the other room is a partition
+that one outline was drawn around, and stays.
 """
 
 from __future__ import annotations
@@ -24,16 +24,16 @@ from pbrs_farm.repair.structure.walls import Wall
 
 _COINCIDE_M = 0.001  # walls nearer than this to a room lie in one plane with its own
 _LEAST_LEFT_M = 0.01  # thickness that must be left behind a rim
-_LEAST_LEFT_SHARE = 0.25  # of the wall's thickness, where that is less
+_LEAST_LEFT_SHARE = 0.25  # of the wall's thickness, if that is less
 _OVERLAP_M2 = 1e-3  # outlines that share less lie side by side
 
 
 def with_own_sides_visible(
     walls: Sequence[Wall], rooms: Sequence[Room], table: TagTable
 ) -> list[Wall]:
-    """The walls with their rims cut by other rooms; solid and footprint are what is left.
+    """The walls with their rims cut by other rooms, with the remaining solid and footprint.
 
-    Walls that belong to no room stay as they are.
+    Walls without a room are unchanged.
     """
     areas = {r.id: plan.polygon_of_room(r.polygon) for r in rooms}
     found = []

@@ -24,12 +24,11 @@ GRID_M = 1e-6
 
 
 def polygon_of_triangles(positions: F64, faces: NDArray[np.integer]) -> Shape:
-    """The plan area (a polygon, several or none) that triangles cover, seen from above.
+    """Plan area (one polygon, several or none) covered by triangles, seen from above.
 
-    positions: (V, 3) metres; faces: (F, 3). Triangles that look down count as those that look up.
-    An empty shape where all stand upright.
+    positions: (V, 3) metres; faces: (F, 3). Both orientations count. Empty if all are vertical.
     """
-    # Leave out triangles that stand upright: they cover no plan.
+    # Drop vertical triangles, which have no plan area.
     corners = positions[:, [0, 2]][faces]
     u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     turned = np.abs(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]) > 1e-9
@@ -47,8 +46,7 @@ def polygon_of_room(outline: Points2) -> Shape:
 def on_grid(shape: Shape) -> Shape:
     """shape with coordinates rounded to GRID_M, valid.
 
-    Lines and points that rounding leaves are dropped. What is left may be a polygon, several, or
-    empty.
+    Degenerate lines and points are dropped. The result may be one polygon, several, or empty.
     """
     return _areal(shapely.set_precision(shape, GRID_M))
 
@@ -109,10 +107,10 @@ def without(shape: Shape, *others: Shape) -> Shape:
 def near_to(
     shape: Shape, things: Sequence[T], area: Callable[[T], Shape], within_m: float
 ) -> list[T]:
-    """The things whose plan area comes within within_m of shape, in order.
+    """The elements whose plan area is within within_m of shape, in order.
 
-    area: plan area of a thing. Touching counts; distances are exact, not those of boxes. One pass
-    over all things.
+    area: plan area of an element. Touching counts; distances are exact, not those of boxes. One pass
+    over all elements.
     """
     areas = np.array([area(x) for x in things], object)
     if not len(areas):

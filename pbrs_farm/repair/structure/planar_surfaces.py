@@ -1,4 +1,4 @@
-"""Planar floors and ceilings as read: where each lies in plan, its plane, its texture; no effects."""
+"""Planar floors and ceilings as read: plan area, plane and texture of each; no effects."""
 
 from __future__ import annotations
 
@@ -39,18 +39,18 @@ _UP = 0.05  # y of the normal of a face that is not upright, at least
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlanarSurface:
-    """The faces of a planar floor or ceiling that lie in one plane, as an area and that plane.
+    """The coplanar faces of a planar floor or ceiling, as an area and that plane.
 
-    Thickened to a slab by slabs.py. What is solid already never becomes one.
+    Thickened to a slab by slabs.py. Solid floors and ceilings are never planar surfaces.
     """
 
     item: int  # index into House.items
     room_id: str | None
     is_ceiling: bool
-    area: plan.Shape  # what it covers, seen from above
+    area: plan.Shape  # covered area, seen from above
     plane: Plane
     uv: UvMap | None  # of the whole; None: metres in plan, save where uv_parts are
-    uv_parts: tuple[UvPart, ...]  # where its texture lies in several ways
+    uv_parts: tuple[UvPart, ...]  # parts with different texture mappings
     material: int
     name: str  # of the surface it comes from
 
@@ -79,7 +79,7 @@ class FloorsAndCeilings:
 
     planar: list[PlanarSurface]
     solid: dict[int, list[Manifold]]  # item -> its closed shells
-    left: dict[int, str]  # item -> why it is left as it is
+    left: dict[int, str]  # item -> reason why it is unchanged
     covers: list[Cover]  # inner faces of the solid ones
 
 

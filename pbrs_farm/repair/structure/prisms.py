@@ -25,7 +25,7 @@ FACE_M = 0.02
 """Thickness of the layer with the visible face, where a solid is a layer before a base."""
 BASE_BEHIND_M = 0.01
 """The base begins this far behind the face, inside that layer."""
-_MOST_UV_PARTS = 200  # a solid each, over which the texture lies in a way of its own
+_MOST_UV_PARTS = 200  # maximum parts with different texture mappings, one solid each
 # Half the width of what parts rings; the next where one is too small.
 _CRUMBS_M = (1e-5, 1e-4, 1e-3)
 
@@ -56,10 +56,10 @@ def level_plane(y: float) -> Plane:
 
 
 def plane_of_points(points: F64) -> Plane | None:
-    """The plane through points (N, 3), exactly level where they are; None if they are on none.
+    """The plane through points (N, 3), exactly horizontal if they are; None if not coplanar.
 
-    points: at least three, metres. "On" means within _ON_PLANE_M. A plane that stands upright has
-    no height over the plan: None.
+    points: at least three, metres. Tolerance _ON_PLANE_M. A vertical plane has no height over the
+    plan: None.
     """
     # Answer exactly for a level surface: least squares would tilt it.
     low, high = float(points[:, 1].min()), float(points[:, 1].max())
@@ -95,10 +95,10 @@ class UvPart:
 
 
 def uv_parts(positions: F64, faces: NDArray[np.integer], uvs: F64) -> tuple[UvPart, ...]:
-    """The parts of a flat surface on which one affine map lays its texture; none where they are too many.
+    """Parts of a flat surface with one affine texture mapping each; empty if there are too many.
 
-    positions: (V, 3) whose x and z count, faces: (F, 3), uvs: (V, 2). A picture that ends or is mirrored
-    within a surface lies another way in each part.
+    positions: (V, 3) of which x and z are used, faces: (F, 3), uvs: (V, 2). A picture that ends or is
+    mirrored within a surface has another mapping in each part.
     """
     parts: list[UvPart] = []
     left = faces

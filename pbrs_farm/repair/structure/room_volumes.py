@@ -64,7 +64,7 @@ def _height_spans(surfaces: Sequence[PlanarSurface]) -> F64:
 
 
 def _bounding(room: Room, surfaces: Sequence[PlanarSurface], spans: F64) -> list[PlanarSurface]:
-    # Count what lies at the room's own height: slabs.visible_areas settles it in plan.
+    # Count surfaces at the room's own height: slabs.visible_areas decides in plan.
     is_ceiling = np.array([s.is_ceiling for s in surfaces], np.bool_)
     nominal = np.where(is_ceiling, room.ceiling_y, room.floor_y)[:, None]
     is_level = np.abs(spans - nominal).max(1, initial=0.0) < SAME_HEIGHT_M

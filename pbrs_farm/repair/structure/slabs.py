@@ -87,9 +87,9 @@ def visible_areas(
     for i, surface in enumerate(surfaces):
         near = plan.near_to(surface.area, range(len(surfaces)), lambda j: surfaces[j].area, 1.0)
         same = [j for j in near if j != i and _same_height(surface, surfaces[j])]
-        # Show the own area, save where a later surface lies.
+        # Show the surface's own area, except under a later surface.
         mine = plan.without(surface.area, *(surfaces[j].area for j in same if j > i))
-        # Show the ring under the walls, save where an earlier footprint lies.
+        # Show the ring under the walls, except under an earlier footprint.
         ring = plan.without(footprints[i], surface.area, *(surfaces[j].area for j in same))
         ring = plan.without(ring, *(footprints[j] for j in same if j < i))
         own.append(plan.union([mine, ring]))
@@ -136,7 +136,7 @@ def _parts_by_uv(surface: PlanarSurface, area: plan.Shape) -> list[tuple[plan.Sh
     """The parts of an area of its slab, each with the map that lays the texture on it."""
     if not surface.uv_parts:
         return [(area, surface.uv)]
-    # What lies beyond the surface, under walls, goes on as its first part does.
+    # The area outside the surface, under walls, continues its first part.
     beyond = plan.without(area, *(part.area for part in surface.uv_parts))
     within = [(plan.common(area, part.area), part.uv) for part in surface.uv_parts]
     return [(beyond, surface.uv_parts[0].uv), *within]

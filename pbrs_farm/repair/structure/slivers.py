@@ -17,7 +17,7 @@ from pbrs_farm.core.mesh import face_areas, numbered_points
 
 MIN_AREA_M2 = 1e-12  # a triangle of less is a sliver: float32 holds no smaller one
 _MERGE_M = 4e-6  # a few steps of float32 ten metres from the origin
-_THIN_M = 1e-8  # height of a face that is nearly a sliver
+_THIN_M = 1e-8  # height of a near-sliver
 _MAX_ROUNDS = 8  # splitting may leave new slivers
 
 
@@ -97,7 +97,7 @@ class _Mesh:
             self._leave(f)
             return
         corners = np.array([self._vertices[v][:3] for v in self._faces[f]])
-        # Find the longest edge c a and the vertex b that lies on it.
+        # Find the longest edge c a and the vertex b on it.
         longest = int(np.linalg.norm(corners - np.roll(corners, -1, 0), axis=1).argmax())
         a, c, b = (self._faces[f][(longest + k) % 3] for k in range(3))
         # Split the face on the other side of that edge at b.

@@ -1,7 +1,7 @@
-"""Stairwells that no room covers, and the floor or ceiling they lack; no effects.
+"""Stairwells outside of rooms, and their missing floors or ceilings; no effects.
 
-People draw rooms around a stairwell. Where stairs stand between rooms and walls without a room
-of their own, the sky would look in from below the stairs or from above them.
+People draw rooms around a stairwell. If stairs are between rooms and walls without a room of
+their own, the sky would be visible below or above them.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _NEIGHBOUR_M = 0.6  # a floor farther away is not carried on
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stairwells:
-    """Stairwells as rooms, and the floors and ceilings that were missing there."""
+    """Stairwells as rooms, with their added floors and ceilings."""
 
     wells: tuple[Room, ...]  # ids "well_<level>_<k>"
     surfaces: tuple[PlanarSurface, ...]
@@ -34,10 +34,10 @@ class Stairwells:
 def stairwells_of_house(
     house: House, walls: Sequence[Wall], surfaces: Sequence[PlanarSurface], covers: Sequence[Cover]
 ) -> Stairwells:
-    """Every hole among a level's rooms and walls in which stairs stand or arrive.
+    """Every hole among a level's rooms and walls in which stairs begin or end.
 
-    Its missing floor or ceiling continues the nearest one of its level. A hole without stairs (a
-    courtyard, a shaft) stays as it is.
+    A missing floor or ceiling continues the nearest one of its level. A hole without stairs (a
+    courtyard, a shaft) is unchanged.
     """
     wells = [
         Room(
@@ -55,7 +55,7 @@ def stairwells_of_house(
     added = []
     for well in wells:
         for above in (False, True):
-            # Carry on the nearest floor or ceiling where the stairwell has none.
+            # Extend the nearest floor or ceiling where the stairwell has none.
             bare = bare_area(well, rooms, covers, above=above)
             if bare.area > _MIN_AREA_M2:
                 added += _continued(bare, well, surfaces, is_ceiling=above)
@@ -68,12 +68,12 @@ def _holes(
     rooms = [r for r in house.rooms if r.level_id == level_id]
     floor_y = min(r.floor_y for r in rooms)
     ceiling_y = max(r.ceiling_y for r in rooms)
-    # Unite rooms and walls that stand at this level.
+    # Merge the rooms and walls of this level.
     feet = [w.footprint for w in walls if w.bottom_y < ceiling_y - 0.1 and w.high_y > floor_y + 0.1]
     areas = [plan.polygon_of_room(r.polygon) for r in rooms]
     whole = plan.closed(plan.union([*areas, *feet]), 2 * GAP_M)
     stairs = [
-        # Take the boxes of stairs that stand or arrive here.
+        # Boxes of stairs that begin or end here.
         shapely.box(low[0], low[2], high[0], high[2])
         for low, high in (i.bounds for i in house.items if i.kind is ItemKind.STAIRS)
         if low[1] < ceiling_y and high[1] > floor_y - 0.2

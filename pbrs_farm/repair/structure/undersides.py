@@ -1,4 +1,4 @@
-"""The underside of a floor that is seen from below; no effects."""
+"""Undersides of floors visible from below; no effects."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from pbrs_farm.repair.structure.added_ceilings import (
     cover_of_surfaces,
 )
 
-_STEP_M: Final = 0.2  # spacing of the places of a floor that are looked at from below
+_STEP_M: Final = 0.2  # spacing of floor samples for visibility from below, metres
 _MOST_PLACES: Final = 2000  # of one floor: of a larger one they lie farther apart
 _LEAST_PLACES: Final = 3  # seen: fewer are the seam between a ceiling and a wall
 _APART_M: Final = 0.002  # a ceiling in the plane of an underside does not hide it
@@ -30,7 +30,7 @@ UNDERSIDE: Final = "underside"
 
 
 class _Stand(NamedTuple):
-    """What one stands on below a floor: a room's floor or the ground outside."""
+    """A standpoint below a floor: a room's floor or the ground outside."""
 
     area: plan.Shape
     y: float
@@ -38,10 +38,10 @@ class _Stand(NamedTuple):
 
 
 def with_undersides(house: House) -> House:
-    """The house with what looks down of floors that are seen from below as items of their own.
+    """Split off the undersides of floors that are visible from below, as ceiling items.
 
-    What one sees above oneself is ceiling. A floor is seen from below where no ceiling and no
-    other floor lies between it and a room or the ground outside. The new items come last.
+    A floor is visible from below if neither a ceiling nor another floor is between it and a room or
+    the ground outside. The new items are appended.
     """
     floors = [i for i in house.items if i.kind is ItemKind.FLOOR and i.n_faces]
     lowest = min((room.floor_y for room in house.rooms), default=np.inf)
@@ -78,9 +78,9 @@ def with_undersides(house: House) -> House:
 
 
 def _seen_from(item: Item, stands: Sequence[_Stand], above: F64) -> _Stand | None:
-    """Where one stands below a floor and sees most of it overhead; None where it is hidden.
+    """A standpoint that sees most of a floor overhead; None if it is hidden.
 
-    above: triangles of all floors and ceilings, its own among them.
+    above: triangles of all floors and ceilings, including its own.
     """
     corners = corners_of_surfaces(item.surfaces)
     under = corners[unit_normals(corners)[:, 1] < MAX_UNDERSIDE_NORMAL_Y]

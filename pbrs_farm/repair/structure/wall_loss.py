@@ -1,7 +1,7 @@
-"""How much of every wall, floor and ceiling is there before and after repair; no effects.
+"""Area of every wall, floor and ceiling before and after repair; no effects.
 
-A wall is measured from the side, along its thickness, and its openings are cut out of it before
-it is measured first: what is lost was cut away by repair. Floors and ceilings count from above.
+A wall is measured from the side, along its thickness, with its openings already cut out: the
+difference is the area that repair cut away. Floors and ceilings are measured from above.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ def side_areas(
 ) -> tuple[SideArea, ...]:
     """Square metres of every structure item before and after.
 
-    walls: before anything was cut. cut: drawn back from other rooms; left: and their openings cut,
-    in the same order. surfaces: item index -> new surfaces; other items stay as they are.
+    walls: before any cut. cut: trimmed by other rooms; left: with their openings cut too, in the same
+    order. surfaces: item index -> new surfaces; other items are unchanged.
     """
     before, after = [0.0] * len(house.items), [0.0] * len(house.items)
     for wall, own, rest in zip(walls, cut, left, strict=True):
@@ -83,7 +83,7 @@ def _cut_openings_of_wall(openings: Sequence[Opening], wall: Wall, table: TagTab
 def _seen_from_the_side(solid: Manifold, footprint: plan.Shape) -> float:
     if solid.is_empty() or footprint.is_empty:
         return 0.0
-    # Turn the wall so that its thickness lies along z, and look along z.
+    # Turn the wall so that its thickness is along z, and project along z.
     along, across = along_and_across(footprint)
     turned = np.zeros((3, 4))
     turned[0, [0, 2]], turned[1, 1], turned[2, [0, 2]] = along, 1.0, across

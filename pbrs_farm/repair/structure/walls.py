@@ -44,17 +44,17 @@ ADDED_SURFACES = frozenset({REVEAL, "joint", "hidden", "back", "rim"})
 _BESIDE_M = 0.05  # a point so far beside a gable's slope is under it
 
 BASEBOARD = "baseboard"
-"""Tag of wall items that are baseboards."""
+"""Tag of baseboards among wall items."""
 
 
 def with_metric_uv(patch: Patch) -> Patch:
-    """The patch with uv in metres if repair added it; as it is if it came from the source.
+    """The patch with uv in metres if repair added it; unchanged if it is from the source.
 
-    v is the height on upright faces, world z on the others; u runs across it in the face's plane.
+    v is the height on vertical faces, world z on others; u is perpendicular to it in the face's plane.
     """
     if patch.tag.surface not in ADDED_SURFACES:
         return patch
-    # Span each face's plane by u across and v up (or along z where it lies flat).
+    # Span each face's plane by u across and v up (or along z if horizontal).
     corners = patch.positions[patch.faces]
     normals = unit_normals(corners)
     up = np.where(np.abs(normals[:, 1:2]) < 0.7, [[0.0, 1.0, 0.0]], [[0.0, 0.0, 1.0]])
@@ -62,7 +62,7 @@ def with_metric_uv(patch: Patch) -> Patch:
     u = u / np.maximum(np.linalg.norm(u, axis=1, keepdims=True), 1e-12)
     v = np.cross(normals, u)
     uvs = np.stack([np.einsum("fki,fi->fk", corners, axis) for axis in (u, v)], -1)
-    # Give each face vertices of its own: neighbours have other axes.
+    # Give each face separate vertices: neighbours have other axes.
     n = len(patch.faces)
     return replace(
         patch,
@@ -111,7 +111,7 @@ class Wall:
 def walls_from_house(
     house: House, table: TagTable, rooms: plan.Shape, thickness_m: float
 ) -> tuple[list[Wall], dict[int, str]]:
-    """A Wall for every closed shell of every wall item, and item index -> why it is left as it is.
+    """A Wall for every closed shell of every wall item, and item index -> reason why it is unchanged.
 
     rooms: plan area of all rooms; planar walls are thickened away from it.
     """
@@ -124,7 +124,7 @@ def walls_from_house(
         if shells is not None:
             walls += [_wall_of_solid(item, index, solid, patches) for solid, patches in shells]
             continue
-        # Thicken what is planar, and leave the rest.
+        # Thicken planar items, and leave the others.
         thick = _thickened(item, index, table, rooms, thickness_m)
         if thick is None:
             left[index] = "its surfaces bound no closed solid and lie in no one plane"
@@ -213,9 +213,9 @@ def _thickened(
 def _with_texture_in_parts(
     patch: Patch, normal: F64, thickness_m: float, table: TagTable
 ) -> Manifold | None:
-    """The flat patch as a solid whose texture lies another way in each part of its face; None: one way.
+    """A solid from a flat patch with several texture mappings; None if there is only one.
 
-    A layer a part, before a base that they overlap, as slabs have it: no seam goes through.
+    A layer per part, in front of an overlapping base, as in slabs: no seam goes through.
     """
     local, _axes = _in_frame_of_wall(patch, normal)
     if affine_uv_map(local, patch.uvs)[1] <= MAX_UV_OFF:
@@ -232,9 +232,9 @@ def _with_texture_in_parts(
 
 
 def extrude(patch: Patch, normal: F64, thickness_m: float) -> list[Patch] | None:
-    """The flat patch as a solid: its own face kept, the opposite one thickness_m behind it.
+    """The flat patch as a solid: its own face, and an opposite one thickness_m behind it.
 
-    normal: (3,) unit, out of the face that is kept. uv is carried on by its affine map.
+    normal: (3,) unit, outward from the given face. uv continues by its affine map.
     """
     local, _axes = _in_frame_of_wall(patch, normal)
     # Carry the texture on by the affine map that fits it.

@@ -50,10 +50,10 @@ class Structure:
 
 
 def repaired_structure(house: House, thickness_m: float) -> Structure:
-    """Thicken what is planar, join, cut, united. Faces keep item, surface name, material and uv.
+    """Thicken planar parts, join, cut and unite. Faces keep item, surface name, material and uv.
 
-    thickness_m: of slabs, and of walls without one. The house is not changed: `with_structure` puts
-    the answer in. What cannot be made solid stays as read and is named in the report.
+    thickness_m: of slabs, and of walls without one. The house is not changed: `with_structure` inserts
+    the result. Items that cannot be made solid are unchanged and named in the report.
     """
     # Read walls, floors and ceilings; give stairwells without a room the covers they lack.
     table, rooms = TagTable(), plan.union(plan.polygon_of_room(r.polygon) for r in house.rooms)
@@ -94,7 +94,7 @@ def repaired_structure(house: House, thickness_m: float) -> Structure:
             "walls_lost": lost_walls(areas),
         }
     )
-    standing = [w for w in wholes if not w.is_board]  # what is left of the walls closes rooms
+    standing = [w for w in wholes if not w.is_board]  # the remaining walls close rooms
     return Structure(
         {i: surfaces.get(i, ()) for i in sorted(touched)},
         plugs,
@@ -173,7 +173,7 @@ def with_structure(house: House, structure: Structure) -> tuple[House, list[Remo
     removed = []
     for index, item in enumerate(house.items):
         surfaces = structure.surfaces.get(index, item.surfaces)
-        # Take a wall out that lies wholly inside others.
+        # Remove walls that are completely inside others.
         if index in structure.surfaces and not surfaces:
             removed.append(Removed(item_id=item.id, name=item.name, reason="nothing left of it"))
         else:
