@@ -1,4 +1,4 @@
-"""Texture coordinates for meshes without any: each face by the side of its own axes it looks to; no effects.
+"""Texture coordinates for meshes without any, by box projection in the item's axes; no effects.
 
 Each connected board has its grain along its longest side.
 """
@@ -63,9 +63,9 @@ def box_mapped(
 
 
 def area_of_look(item: Item, surface: Surface) -> float:
-    """m2 of what looks like a surface of an item: of a thing that opens, all of one material.
+    """Area in m2 that determines a surface's finish: for an item with joints, all of one material.
 
-    Its doors and drawers are surfaces apart, and small ones must not look other than large ones.
+    Doors and drawers are separate surfaces, and small ones must not look different from large ones.
     """
     alike = (
         [s for s in item.surfaces if s.material == surface.material] if item.joints else [surface]

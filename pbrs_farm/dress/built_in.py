@@ -1,6 +1,6 @@
-"""Doors, windows, stairs, railings, radiators, appliances and steps of one home in its scheme.
+"""Apply the home's finish scheme to doors, windows, stairs, railings, radiators and appliances.
 
-What has a picture of its own, and glass, stay. Effects: changes the house.
+Textured parts and glass are unchanged. Effects: changes the house.
 """
 
 from __future__ import annotations
@@ -31,7 +31,9 @@ from pbrs_farm.dress.surface_finishes import (
 from pbrs_farm.home.names import RADIATORS, words_of_item
 
 PASS: Final = "joinery"  # in reports and random streams
-_SMALL_M: Final = 0.25  # handles and hinges; what is larger belongs to the frame or the leaf
+_SMALL_M: Final = (
+    0.25  # maximum size of handles and hinges; larger parts belong to the frame or the leaf
+)
 _FRAME: Final = 0.97  # of the width: what reaches so far is the frame
 _SLENDER_M: Final = 0.13  # rails, balusters and pipes: their second longest side
 _FRONT_SHARE: Final = 0.3  # of an appliance's faces: a part that has more is its body
@@ -46,7 +48,7 @@ def finish_built_in_parts(
 ) -> None:
     """Give doors, windows, stairs, railings and fitted appliances the finishes of the home's scheme.
 
-    share: of the kinds of things (all doors, all windows, ...) that are changed.
+    share: of the item kinds (all doors, all windows, ...) that are changed.
     """
     scheme = finish_scheme(house, style)
     kinds = {
@@ -75,7 +77,7 @@ def finish_built_in_parts(
 
 
 def _kind_in_scheme(item: Item) -> str:
-    """Which of the scheme's kinds of things it is, "" for none."""
+    """The item's kind in the scheme, "" for none."""
     words = words_of_item(item)
     if item.kind is ItemKind.WINDOW:
         return "window"
@@ -119,7 +121,7 @@ def _finish_by_scheme(house: MutableHouse, item: Item, kind: str, scheme: Finish
 
 
 def _finish_of_railing(item: Item, scheme: FinishScheme) -> Finish:
-    # Rails and balusters are thin two ways; what is not is built of stone.
+    # Rails and balusters are thin in two directions; other parts are built of stone.
     if float(np.sort(item.oriented_box.half * 2)[1]) > _SLENDER_M:
         return scheme.stone
     return scheme.pipe if "pipe" in item.name.casefold() else scheme.railing
@@ -129,7 +131,7 @@ def _finish_opening(
     house: MutableHouse, item: Item, scheme: FinishScheme, leaf: Finish, frame: Finish
 ) -> Item:
     """A door or window by its connected surfaces: what spans its width is frame, small ones are fittings."""
-    # What lights is named by the number of its surface, which parting would change.
+    # Lights refer to surfaces by index, which a split would change.
     if any(light.emitting for light in item.lights) or not has_plain(house, item):
         return item
     box = item.oriented_box

@@ -1,4 +1,4 @@
-"""Hangs a lamp from a room's ceiling: over the dining table, else in the middle of what is free. Effects: changes the house."""
+"""Hang a lamp from a room's ceiling: above the dining table, else in the centre of the free area. Effects: changes the house."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ def _least_side(room: RoomSpace) -> float:
 
 
 def _factor(shape: Shape, height_m: float) -> float | None:
-    """How much smaller the shape must be to be no taller than height_m; None = too much."""
+    """Scale at which the shape is at most height_m tall; None if that is too small."""
     tall = float(shape.bounds[1, 1])
     factor = min(1.0, height_m / tall)
     return factor if factor > 0.6 else None

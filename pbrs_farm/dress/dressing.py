@@ -1,7 +1,7 @@
-"""The stage: a House that looks lived in, from a House, a Catalogue and a seed; no effects.
+"""The dressing stage: make a House look lived in, from a Catalogue and a seed; no effects.
 
-The passes follow one another as people furnish: surfaces, furniture and what it is made of, lamps,
-large textiles, what hangs on walls, and last what lies about. The gates take out what stands wrong.
+The passes are in the order in which people furnish: surfaces, furniture and its materials, lamps,
+large textiles, wall items, and last the small items. The gates remove misplaced items.
 """
 
 from __future__ import annotations
@@ -57,22 +57,22 @@ _THINGS: Final[tuple[tuple[str, DressingPass], ...]] = (
     ("clutter", add_clutter),
     ("parts", weave_soft_things),
 )
-"""The same of what is done when it is known which furniture stays."""
+"""Passes that run once the furniture is final."""
 
 
 def dress(
     house: House, catalogue: Catalogue, fields: DressFields, seed: int
 ) -> tuple[House, DressReport]:
-    """The house dressed by a seed, and what was added, changed, refused and measured.
+    """Dress a house by a seed; also reports additions, changes, refusals and measurements.
 
-    house: as read, not repaired: its walls are still as they were drawn. catalogue: where models come
-    from; what it lacks is generated, so EMPTY serves. fields: shares 0..1 of each pass, 0 leaves it
-    out. Equal arguments give equal bits. Raises BadRecipe for an unknown style.
+    house: as read, not repaired: its walls are still as drawn. catalogue: source of models; missing
+    ones are generated, so EMPTY works. fields: shares 0..1 of each pass, 0 disables it. Deterministic
+    to the bit. Raises BadRecipe for an unknown style.
 
         dressed, report = dress(house, EMPTY, DressFields(), seed=1)
 
-    A house that is repaired afterwards needs dressed_house and refit_after_repair: repair may take
-    away the wall that a picture hangs on.
+    A house that is repaired afterwards needs dressed_house and refit_after_repair: repair may remove
+    the wall behind a picture.
     """
     made = dressed_house(house, catalogue, fields, seed)
     return made.house, made.report
@@ -83,7 +83,7 @@ class Dressed(NamedTuple):
 
     house: House
     report: DressReport
-    pieces: Mapping[str, Piece]  # that were put into it, by id
+    pieces: Mapping[str, Piece]  # added pieces, by id
     n_source: int  # of its items were there before
 
 
@@ -91,7 +91,7 @@ def dressed_house(
     house: House, catalogue: Catalogue, fields: DressFields, seed: int,
     on_progress: Callable[[float], None] = lambda _share: None,
 ) -> Dressed:  # fmt: skip
-    """As dress, with what refit_after_repair needs. on_progress: called with the share of the passes that are done."""
+    """Like dress, with the data for refit_after_repair. on_progress: called with the finished share of the passes."""
     bank = PaintedBank(catalogue.painted_folder)
     with closing(MutableHouse(house, seed, fields.mess, bank, fields.own_share)) as mutable:
         return Dressed(
@@ -100,10 +100,10 @@ def dressed_house(
 
 
 def refit_after_repair(repaired: House, dressed: Dressed, catalogue: Catalogue) -> Dressed:
-    """The dressed house with what repair parted from its wall moved to the wall that is left, or taken out.
+    """Move items that repair separated from their wall to the remaining wall, or remove them.
 
-    repaired: `dressed.house` after repair. Returns `dressed` itself where everything that was added is
-    held in the repaired house as well; else repair the returned house again.
+    repaired: `dressed.house` after repair. Returns `dressed` itself if everything added is still
+    supported in the repaired house; else repair the returned house again.
     """
     house, report = refit_to_walls(
         dressed.house, dressed.n_source, repaired, dressed.report, dressed.pieces
@@ -124,7 +124,7 @@ def _dressed(
     style = style_for(house.rng("style"), fields.style)
     pieces = {p.id: p for p in catalogue.pieces}
     gates: tuple[Gate, ...] = ()
-    # Put back what stands wrong before things are laid on it, then look at everything.
+    # Correct misplaced furniture before adding items on top, then check everything.
     n_done = 0
     for several in (_FURNITURE, _THINGS):
         for field, dressing_pass in several:
@@ -149,7 +149,7 @@ def _dressed(
 
 
 def _merge_gates(before: tuple[Gate, ...], after: tuple[Gate, ...]) -> tuple[Gate, ...]:
-    """The gates as they are now, with what was taken out for them before."""
+    """The current gates, with the items that were removed for them before."""
     taken = {gate.name: gate.n_taken_out for gate in before}
     return tuple(
         gate.model_copy(update={"n_taken_out": gate.n_taken_out + taken.get(gate.name, 0)})
@@ -184,7 +184,7 @@ def _report_of_dressing(
 
 
 def _count_added(items: Iterable[Item], pieces: Mapping[str, Piece]) -> dict[str, int]:
-    """What was added and stands there now, whatever was tried, by part and group."""
+    """Added items that are present in the end, by part and group."""
     found = Counter(f"{pass_that_added(item)}: {group_of(item, pieces)}" for item in items)
     return dict(sorted(found.items()))
 

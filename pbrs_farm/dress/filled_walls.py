@@ -1,4 +1,4 @@
-"""What fills a free wall of a room from side to side: wardrobes, shelves, show cases. Effects: changes the house."""
+"""Furniture that fills a free wall from side to side: wardrobes, shelves, show cases. Effects: changes the house."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from pbrs_farm.dress.space.wall_faces import CELL_M, FAR_M
 from pbrs_farm.dress.walls.hanging import next_id
 from pbrs_farm.home.room_use import RoomKind
 
-_SIDE_M: Final = 0.012  # distance to what is beside it
+_SIDE_M: Final = 0.012  # distance to the neighbours, metres
 _LIFT_M: Final = 0.0001  # above the floor, so that no faces coincide
 _UNDER_CEILING_M: Final = 0.02
 _HIGHEST_M: Final = 2.7

@@ -1,7 +1,7 @@
-"""One scheme of finishes a home: what its doors, windows, stairs and fitted things are painted with or made of. No effects.
+"""Finish scheme of a home: paints and materials of its doors, windows, stairs and fittings. No effects.
 
-The shares are suggestions of ours for European homes: half of the trim is some white, a third wood.
-Colours are sRGB-encoded, 0..1.
+The shares are this project's estimates for European homes: half of the trim is some white, a third
+wood. Colours are sRGB-encoded, 0..1.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class FinishScheme:
 def finish_scheme(house: MutableHouse, style: Style) -> FinishScheme:
     """The home's scheme of finishes, drawn by the house's seed and the style.
 
-    It draws from a stream of its own, so that every pass that asks gets the same.
+    It has its own random stream, so that every pass gets the same.
     """
     rng = house.rng("joinery")
     trim = _trim_finish(rng, style)

@@ -1,8 +1,8 @@
-"""The pass `parts`: wood, cloth, leather and metals on furniture that has plain colours.
+"""The pass `parts`: wood, cloth, leather and metals for furniture with plain colours.
 
-Wood keeps near the part's own colour and takes the grain of the home's wood; cloth and leather
+Wood keeps a colour near the part's own and takes the grain of the home's wood; cloth and leather
 take colours of the style; metals have measured colours. White lacquer, glass, mirrors, bulbs,
-screens and what has a picture already stay. Effects: those of textures.families.
+screens and textured parts are unchanged. Effects: those of textures.families.
 """
 
 from __future__ import annotations
@@ -41,8 +41,8 @@ from pbrs_farm.dress.style import COLOURS, METALS, WOODS, Rgb, Style, Wood
 from pbrs_farm.furnishings.textures.families import SEEDS, Pattern, pattern_material, photographed
 
 PASS: Final = "parts"
-_LEAST_BOARD_M2: Final = 0.05  # smaller parts of no known kind stay as they are: knobs, feet
-_UPWARD: Final = 0.7  # cosine: what one sits or lies on
+_LEAST_BOARD_M2: Final = 0.05  # smaller parts of unknown kind are unchanged: knobs, feet
+_UPWARD: Final = 0.7  # minimum cosine of faces to sit or lie on
 _LEATHER_SHARE: Final = 0.25  # share of sofas and armchairs
 _MAX_SATURATION, _MAX_VALUE = 0.5, 0.72  # of painted furniture, as people buy it
 _PAINT_STAYS: Final = 0.15  # chance that furniture in a colour that wood never has stays painted
@@ -69,7 +69,7 @@ def finish_furniture(house: MutableHouse, catalogue: Catalogue, style: Style, sh
     groups = {p.id: p.group for p in catalogue.pieces}
     n_source = len(house.source.items)
     for index, item in enumerate(house.items):
-        # Of what was added only models of the catalogue have plain parts.
+        # Among added items only models of the catalogue have plain parts.
         is_finished = index >= n_source and item.source_class not in groups
         if item.kind.is_structure or not item.n_faces or is_finished:
             continue
@@ -87,7 +87,7 @@ def finish_furniture(house: MutableHouse, catalogue: Catalogue, style: Style, sh
 def _kinds_of_surfaces(house: MutableHouse, item: Item, group: str) -> list[PartKind]:
     kinds = [kind_of_part(house.materials[s.material], item, group) for s in item.surfaces]
     materials = [house.materials[s.material] for s in item.surfaces]
-    # One sits or lies on the soft part, whatever it is called.
+    # The part to sit or lie on is soft, whatever its name.
     if is_upholstered(item, group):
         areas = [
             0.0 if kind_by_name(m.name) in (PartKind.WOOD, PartKind.METAL) else _upward_area(s)
@@ -114,7 +114,7 @@ def _kinds_of_surfaces(house: MutableHouse, item: Item, group: str) -> list[Part
                 kinds[k] = PartKind.WOOD
             elif is_bed(item) and is_vivid(material.diffuse):
                 kinds[k] = PartKind.SOFT
-    # What is left of furniture is painted; beds and sofas have linen there.
+    # Remaining parts of furniture are painted; those of beds and sofas are linen.
     for k, material in enumerate(materials):
         is_free = kinds[k] is PartKind.OTHER and kind_by_name(material.name) is None
         if is_free and not is_upholstered(item, group) and is_lacquered(item, material, group):
@@ -170,7 +170,7 @@ def _finish_wood(
     # The stronger a brown, the less of it is of wood.
     strength = (max(own) - min(own)) * max(own)
     weight = 1.0 if is_vivid(own) else float(rng.uniform(0.25, 0.85)) ** (1 - 0.8 * strength)
-    # What is dark stays dark: mix in the logarithm.
+    # Mix in the logarithm, so that dark colours stay dark.
     wanted = np.exp((1 - weight) * np.log(mine) + weight * np.log(mean))
     if is_dark(own):
         wanted = mean * float(mine @ LUMINANCE + 0.02) / float(mean @ LUMINANCE)

@@ -25,10 +25,10 @@ Scale = tuple[float, float, float]  # along a piece's width, height, depth
 
 
 def scale_of(piece: Piece, place: OldPlace) -> Scale | None:
-    """The scale at which a piece fills the old footprint; None where it does not fit.
+    """Scale at which a piece fills the old footprint; None if it does not fit.
 
-    Each side is 75 to 100 % of the old one, the height within 15 %. What is made of boards may be
-    up to STRETCH longer along one axis than along another, all else keeps its proportions.
+    Each side is 75 to 100 % of the old one, the height within 15 %. Pieces made of boards may be
+    stretched by up to STRETCH along one axis; all others keep their proportions.
     """
     width, depth, height = piece.size
     old_width, old_depth, old_height = place.size
@@ -53,10 +53,10 @@ def scale_of(piece: Piece, place: OldPlace) -> Scale | None:
 def own_or_all(
     pieces: Sequence[Piece], own: frozenset[str], share: float, rng: np.random.Generator
 ) -> Sequence[Piece]:
-    """The user's own of some pieces with probability share, else all of them.
+    """Only the user's own pieces with probability share, else all of them.
 
-    own: Catalogue.own. Where none is the user's own nothing is drawn, so that choices without a
-    library of one's own stay as they are.
+    own: Catalogue.own. Without any own piece no random number is drawn, so that results without a
+    user library do not change.
     """
     mine = [piece for piece in pieces if piece.id in own]
     return mine if mine and rng.random() < share else pieces
@@ -77,8 +77,8 @@ def common_scale(piece: Piece, places: Sequence[OldPlace]) -> Scale | None:
 
 
 def is_lit_alike(piece_has_lights: bool, items: Sequence[Item]) -> bool:
-    """Whether a piece can carry the lights of the items it would replace.
+    """True if a piece can carry the lights of the items that it would replace.
 
-    A lamp with a light needs a piece with a light source; for things without light any piece will do.
+    A lamp with a light needs a piece with a light source; other items accept any piece.
     """
     return piece_has_lights or not any(item.lights for item in items)

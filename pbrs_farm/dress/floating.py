@@ -1,8 +1,8 @@
-"""Generated things that hang in the air of a home's rooms, for training geometry; no effects.
+"""Generated items in the air of a home's rooms, for training geometry; no effects.
 
-WMGStereo measured that networks learn depth best from rooms as people have them in which things hang
-at any place and turn beside. Nothing holds these and they touch nothing; they are labelled as what
-they are, and tagged FLOATING.
+WMGStereo measured that networks learn depth best from realistic rooms with additional floating
+items at random poses. These have no support and touch nothing; they are labelled with their class
+and tagged FLOATING.
 """
 
 from __future__ import annotations
@@ -34,19 +34,20 @@ from pbrs_farm.geometry.moving import moved_item
 from pbrs_farm.home.room_use import MIN_LIVED_IN_M2, is_outdoors
 
 FEW: Final = "floating-few"
-"""Kind of the note about a room that had no place for as many things as were asked for."""
+"""Kind of the note about a room with fewer floating items than requested."""
 
 _LEAST_M, _MOST_M = 0.15, 1.0  # the longest side of what hangs in the air
-_SMALL_SHARE: Final = 0.7  # of the draws that are for a small thing, others for furniture
-_GIVEN_UP: Final = 12  # things in a row that find no place
+_SMALL_SHARE: Final = 0.7  # share of small items; the rest is furniture
+_GIVEN_UP: Final = 12  # consecutive items without a place before a room is given up
 _LEFT_OUT: Final = (MaterialKind.MIRROR, MaterialKind.BULB, MaterialKind.SHADE)
 
 
 def with_floating_things(house: House, share: float, seed: int) -> House:
-    """The house with things in the air of each room, until they hide about a share of what one sees.
+    """Add floating items to each room until they hide about a share of the view.
 
-    share: 0 to below 1 of the picture in an empty room, mean over places and directions; furniture
-    hides some of them. Rooms outdoors and closets below 2 m2 stay. Equal arguments give equal bits.
+    share: 0 to below 1 of the picture in an empty room, averaged over positions and directions;
+    furniture hides some of them. Rooms outdoors and closets below 2 m2 are skipped. Deterministic to
+    the bit.
     """
     air = FreeAir(house.items)
     with closing(MutableHouse(house, seed)) as mutable:
@@ -82,7 +83,7 @@ def _fill(house: MutableHouse, air: FreeAir, room: Room, share: float) -> None:
 
 
 def _drawn(rng: np.random.Generator) -> Model:
-    """A small thing or a piece of furniture, each kind as likely as any other of its sort."""
+    """A small item or a piece of furniture; all kinds of a sort are equally likely."""
     while True:
         if rng.random() < _SMALL_SHARE:
             style = style_for(rng)
@@ -99,7 +100,7 @@ def _drawn(rng: np.random.Generator) -> Model:
 
 @cache
 def _furniture() -> dict[str, list[Piece]]:
-    """Group -> generated pieces of furniture that stand, give no light and are no larger than _MOST_M."""
+    """Group -> generated floor furniture without lights, no larger than _MOST_M."""
     found: dict[str, list[Piece]] = {}
     for piece in family_pieces():
         if (

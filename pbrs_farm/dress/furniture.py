@@ -1,7 +1,7 @@
-"""The pass `furniture`: what people add along free walls, room by room; no effects.
+"""The pass `furniture`: add pieces along free walls, room by room; no effects.
 
-A thing stands with its back at a wall where nothing is before it, closes no way, blocks no door,
-and leaves most of the floor and a good part of the wall free.
+A piece is placed with its back to a wall that is free, blocks no way and no door, and leaves most
+of the floor and a good part of the wall free.
 """
 
 from __future__ import annotations
@@ -35,31 +35,31 @@ from pbrs_farm.home.room_use import RoomKind, is_cooked_in
 Range = tuple[float, float]
 PASS = "furniture"
 _LEAST_M2 = 3.0  # smaller rooms get nothing
-_SIDE_M = 0.03  # distance to what stands beside it
+_SIDE_M = 0.03  # distance to the neighbours, metres
 _LIFT_M = 0.0001  # above the floor, so that no faces coincide
 _FREE_BEFORE_M = 1.19  # free depth before a wall is measured up to this
-_TRIES = 8  # places of one thing
+_TRIES = 8  # attempts to place one piece
 _MOST_FACES = 12_000  # models of the catalogue with more are left out
-_FROM_CATALOGUE = 0.35  # chance that a thing is of the catalogue, where it can be generated, too
-_ALIKE, _BESIDE_ALIKE = 0.7, 0.8  # how much less a room wants of what it has
+_FROM_CATALOGUE = 0.35  # chance to use the catalogue for a piece that can also be generated
+_ALIKE, _BESIDE_ALIKE = 0.7, 0.8  # weight factors for kinds that the room already contains
 _FROM_KITCHEN_M = 1.0  # least distance of bookcases from worktops, cookers and fridges
 _BESIDE_M = 0.15  # greatest gap between a bed and its nightstand
 _END_LIKED = 0.5  # an end of a free stretch, where all its other places together count 1
-_FILLED = ("full", "filled")  # models whose names have these words hold things of their own
+_FILLED = ("full", "filled")  # models with these words in their names have contents already
 _LOOKS = 3  # different looks of the furniture added to one home
 
 
 class WantedKind(Record):
-    """One kind of furniture that stands at a wall."""
+    """A kind of wall furniture, and the conditions for adding it."""
 
     model: str
     width: Range
     height: Range
     depth: Range
     before_m: float = 0.55  # free floor in front of it
-    alike: tuple[Nyu40, ...] = ()  # a room that has one wants less of it
+    alike: tuple[Nyu40, ...] = ()  # classes that make this kind less likely in a room
     groups: tuple[str, ...] = ()  # of the catalogue
-    beside: Nyu40 | None = None  # it stands beside a thing of that class
+    beside: Nyu40 | None = None  # placed next to an item of that class
 
 
 class _Furniture(Record):
@@ -119,7 +119,7 @@ def _stand_at_wall(
     house: MutableHouse, catalogue: Catalogue, floor: RoomFloor, name: str, look: BoardLook,
     rng: np.random.Generator,
 ) -> None:  # fmt: skip
-    """Put a thing of that kind where it fits; narrower ones are tried."""
+    """Add a piece of that kind where it fits, trying narrower ones too."""
     kind = KINDS[name]
     width, height, depth = (
         float(rng.uniform(*side)) for side in (kind.width, kind.height, kind.depth)
@@ -152,7 +152,7 @@ def _generated(
 def _from_catalogue(
     catalogue: Catalogue, kind: WantedKind, width: float, own: int, own_share: float
 ) -> Model | None:
-    """A model of about that width; None where there is none."""
+    """A model of about that width; None if there is none."""
     fit = [
         p
         for p in catalogue.of(*kind.groups)
@@ -175,7 +175,7 @@ def _from_catalogue(
 def _find_spot(
     house: MutableHouse, floor: RoomFloor, kind: WantedKind, made: Model, rng: np.random.Generator
 ) -> FloorSpot | None:
-    """A place for the thing, drawn from those that are free; None where there is none."""
+    """A random free place for the piece; None if there is none."""
     low, high = made[1].bounds
     w, h, d = (float(v) for v in high - low)
     if floor.is_too_full(w * d):
@@ -218,7 +218,7 @@ def _liked(starts: F64) -> list[tuple[float, float]]:
 def _is_beside(
     house: MutableHouse, floor: RoomFloor, nyu40: int, face_number: int, s: float, width: float
 ) -> bool:
-    """Whether a place at a wall is right beside a thing of the class that stands at that wall."""
+    """True if a place at a wall is right next to an item of the class at that wall."""
     face = floor.faces[face_number]
     for number in floor.room.items:
         if house.items[number].nyu40 != nyu40:
@@ -281,7 +281,7 @@ def _chair_before(
     at = spot.face.point(spot.s + float(rng.normal(0, 0.06)), y + _LIFT_M, out)
     body = shapely.Point(at[0], at[2]).buffer(float(high[2]) + 0.04)
     x0, z0, x1, z1 = body.bounds
-    # It stands where the desk's own front is: ask as if the desk had none.
+    # The chair is in front of the desk: ignore the desk's own front.
     own = floor.fronts.pop()
     is_free = floor.allows(body, shapely.Polygon()) and floor.space.is_free(
         np.array([x0, y + 0.03, z0]), np.array([x1, y + 1.0, z1])

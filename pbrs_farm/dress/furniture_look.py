@@ -1,4 +1,4 @@
-"""What added furniture is made of: wood of the home, white or painted boards. Effects: adds materials to the house."""
+"""Materials of added furniture: wood of the home, white or painted boards. Effects: adds materials to the house."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class BoardLook:
 def look_of(
     house: MutableHouse, catalogue: Catalogue, style: Style, rng: np.random.Generator
 ) -> BoardLook:
-    """What the added furniture of a room is made of."""
+    """Materials of the furniture added to a room."""
     pattern = photographed(house, catalogue, grain_pattern(house, style.wood))
     grain = pattern_material(house, pattern)
     wood = house.materials[grain.number]

@@ -23,9 +23,7 @@ from pbrs_farm.home.room_use import RoomKind
 
 _BY_SOFA, _BY_BED = 0.75, 0.75  # chances
 _FLOOR_LM, _TABLE_LM = 900.0, 400.0
-_STANDING_FROM_WALL_M = (
-    0.6  # of a floor lamp's edge, at most: no lamp stands in the middle of a room
-)
+_STANDING_FROM_WALL_M = 0.6  # maximum distance of a floor lamp from the room's edge, metres
 _WEAK_LX = 20  # rooms with less light get one more lamp
 _LEAST_M2 = 0.8
 _FLUX_LM = (500.0, 9000.0)  # least and greatest flux of an added lamp
@@ -62,7 +60,7 @@ def stand_by_sofas(
 def stand_by_beds(
     house: MutableHouse, catalogue: Catalogue, style: Style, room_id: str, rng: np.random.Generator
 ) -> None:
-    """The same lamp on every nightstand of the room that is free."""
+    """Put the same lamp on every free nightstand of the room."""
     space = house_space(house)
     room = space.room(room_id)
     stands = [n for n in room.items if house.items[n].nyu40 == NIGHT_STAND]
@@ -85,7 +83,7 @@ def stand_by_beds(
 def _draw_lamp(
     house: MutableHouse, catalogue: Catalogue, group: str, rng: np.random.Generator
 ) -> tuple[Piece, Shape] | None:
-    """A lamp of the catalogue that shines and is not too large to stand; None = make one."""
+    """A catalogue lamp with a light, of a size for furniture; None = generate one."""
     fit = [p for p in catalogue.of(group) if p.size[2] < (0.55 if group == "table_lamp" else 1.95)]
     if not fit or rng.random() < 0.15:
         return None
@@ -112,7 +110,7 @@ def _stands_on_floor(space: HouseSpace, room: RoomSpace, number: int) -> bool:
 
 
 def _ends(space: HouseSpace, room: RoomSpace, number: int, radius: float) -> list[F64]:
-    """Places beyond the two ends of a thing's longer side, near its back and near its middle."""
+    """Positions past the ends of an item's longer side, near its back and near its centre."""
     low, high = space.bounds[number]
     middle, half = ((low + high) / 2)[[0, 2]], ((high - low) / 2)[[0, 2]]
     long = int(np.argmax(half))
@@ -123,7 +121,7 @@ def _ends(space: HouseSpace, room: RoomSpace, number: int, radius: float) -> lis
             offset[long] = sign * (half[long] + radius + 0.06)
             offset[1 - long] = across * half[1 - long]
             found.append(middle + offset)
-    # Corners are where lamps stand: nearest to the room's edge first, none far from it.
+    # Floor lamps belong in corners: nearest to the room's edge first, none far from it.
     edge = room.area.boundary
     away = [float(shapely.distance(shapely.Point(p), edge)) for p in found]
     order = sorted(range(len(found)), key=lambda k: away[k])
@@ -157,7 +155,7 @@ def _ways_are_open(house: MutableHouse, room_id: str) -> bool:
 def _spot_on_top(
     house: MutableHouse, space: HouseSpace, number: int, place: F64, shape: Shape
 ) -> F64 | None:
-    """(3,) where the shape stands on the thing's flat and free top; None where it cannot."""
+    """(3,) position for the shape on the item's flat and free top; None if there is none."""
     low, high = shape.bounds
     radius = float(np.abs([low[[0, 2]], high[[0, 2]]]).max())
     foot = [s.positions for s in shape.surfaces]
@@ -172,14 +170,14 @@ def _spot_on_top(
     if not np.isfinite(heights).all() or np.ptp(heights) > 0.001:
         return None
     y = float(heights.max())
-    # Nothing else stands there.
+    # The place must be free of other items.
     a = np.array([place[0] - radius, y + 0.004, place[1] - radius])
     b = np.array([place[0] + radius, y + float(high[1]) + 0.02, place[1] + radius])
     return np.array([place[0], y, place[1]]) if space.is_free(a, b) else None
 
 
 def add_lamps(house: MutableHouse, catalogue: Catalogue, style: Style, share: float) -> None:
-    """Hang a lamp in rooms without one or with too little light; stand some by sofas and beds.
+    """Hang a lamp in rooms without one or with too little light; add table lamps by sofas and beds.
 
     share: of such rooms, 0..1.
     """

@@ -107,9 +107,9 @@ def _lamp_of(
 
 
 def with_flux(shape: Shape, flux_lm: float) -> Shape:
-    """The shape with its lights giving that luminous flux (lm) together, in equal shares.
+    """Scale the shape's lights to a total luminous flux (lm), in equal shares.
 
-    A shape without lights is returned as it is.
+    A shape without lights is unchanged.
     """
     n = max(len(shape.lights), 1)
     lights = tuple(

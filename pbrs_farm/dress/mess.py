@@ -1,6 +1,6 @@
-"""The pass `mess`: chairs as people leave them, pictures a degree askew; no effects.
+"""The pass `mess`: displaced chairs, pictures a degree askew; no effects.
 
-What lies about is untidy by the same share: beds, clothes, tables, shoes, books (clutter/).
+Small items use the same share for their disorder: beds, clothes, tables, shoes, books (clutter/).
 """
 
 from __future__ import annotations
@@ -32,13 +32,13 @@ _LEFT_M: Final = (0.12, 0.45)  # range of how far a chair is pulled out by someo
 _LEFT_TURN: Final = np.radians(28)
 _TRIES: Final = 3
 _ASKEW: Final = np.radians(1.6)
-_HUNG_M: Final = 0.2  # smaller pictures stand on furniture
+_HUNG_M: Final = 0.2  # smaller pictures are on furniture, metres
 
 
 def move_chairs(house: MutableHouse, _catalogue: Catalogue, _style: Style, share: float) -> None:
-    """Move chairs at tables and desks as people do who get up: most a little, some far.
+    """Displace chairs at tables and desks as people do when they get up: most slightly, some far.
 
-    share: 0..1, of chairs that somebody has just left. No chair goes before a door or into a thing.
+    share: 0..1, of chairs that were just left. No chair blocks a door or overlaps an item.
     """
     space = house_space(house)
     around = Neighbours(house.items)
@@ -54,7 +54,7 @@ def move_chairs(house: MutableHouse, _catalogue: Catalogue, _style: Style, share
 
 
 def tilt_pictures(house: MutableHouse, _catalogue: Catalogue, _style: Style, share: float) -> None:
-    """Turn pictures that were hung by a degree or so about their middle."""
+    """Rotate hung pictures by about a degree around their centre."""
     for index in range(len(house.source.items), len(house.items)):
         item = house.items[index]
         if item.nyu40 != PICTURE or item.box is None or item.box.half[:2].min() < _HUNG_M / 2:
@@ -79,7 +79,7 @@ def _door_zone(room: RoomSpace) -> BaseGeometry:
 
 
 def _table_of(house: MutableHouse, space: HouseSpace, index: int, tables: list[int]) -> int | None:
-    """The table that a chair stands at; None for what is no chair or stands alone."""
+    """The table of a chair; None for other items and for chairs without a table."""
     item, (low, high) = house.items[index], space.bounds[index]
     size = high - low
     if item.nyu40 != CHAIR or max(size[0], size[2]) > _WIDEST_M or size[1] > _TALLEST_M:

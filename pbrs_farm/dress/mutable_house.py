@@ -1,4 +1,4 @@
-"""A house while it is dressed: what was added, changed and refused; state: the house itself.
+"""A house during dressing, with counts of additions, changes and refusals; state: the house itself.
 
 Effects: a thread paints materials.
 """
@@ -24,11 +24,11 @@ CHANGED_TAG = "changed:"  # tag of a changed item of the source, followed by the
 
 
 class MutableHouse:
-    """A house that passes of dressing change: items are added and changed, materials drawn.
+    """A house that dressing passes change: items are added and changed, materials drawn.
 
-    Items of the source keep their order and their numbers; what is added comes after them. A pass
-    draws from `rng` with words of its own, so that it disturbs no other, and counts what it refused
-    and why. Use it in `contextlib.closing`: a thread paints its textures meanwhile.
+    Items of the source keep their order and indices; additions are appended. A pass draws from `rng`
+    with its own words, so that passes are independent, and counts its refusals by reason. Use it in
+    `contextlib.closing`: a thread paints textures in the background.
 
         with closing(MutableHouse(house, seed=1)) as mutable:
             item = mutable.placed(piece, shape, at, 0.0, item_id="dress-mine-0", room_id="0_0", level_id="0")
@@ -50,8 +50,8 @@ class MutableHouse:
         self.materials = PaintedMaterials(house.materials, house.textures)
         self.bank = bank or PaintedBank(None)  # what surfaces are painted with
         self.notes: list[Note] = []
-        self.done: Counter[str] = Counter()  # what was added or changed, by pass and group
-        self.refused: Counter[str] = Counter()  # tries that were given up, by `<pass>: <reason>`
+        self.done: Counter[str] = Counter()  # additions and changes, by pass and group
+        self.refused: Counter[str] = Counter()  # abandoned attempts, by `<pass>: <reason>`
         self.used: dict[str, Piece] = {}  # pieces of the catalogue in the house, by id
         self.kept: dict[str, object] = {}  # what passes compute from the items and use again
 
@@ -65,7 +65,7 @@ class MutableHouse:
         return self.materials.textures()
 
     def rng(self, *words: str | int) -> np.random.Generator:
-        """A random stream of its own for each (house, seed, words): passes do not disturb one another.
+        """An independent random stream for each (house, seed, words).
 
         Equal words give the same stream from its start at each call.
         """
@@ -84,13 +84,13 @@ class MutableHouse:
         item_id: str, room_id: str | None, level_id: str, scale: F64 | float = 1.0,
         tags: tuple[str, ...] = (),
     ) -> Item:  # fmt: skip
-        """The piece as an item of this house; `add` puts it there.
+        """The piece as an item of this house, to be passed to `add`.
 
-        at: (3,) world metres of the shape's origin, which for pieces of the catalogue is the middle of
-        the base (of what hangs on a wall, of its back). turn_rad: about +y; 0 looks to +z. scale: along
-        the piece's own axes, (3,) or one for all. item_id must be new in the house; ids
-        `dress-<pass>-<n>` tell the report which pass added it. The shape's materials and textures
-        come into the house, too. Nothing is checked for room: gates do that at the end.
+        at: (3,) world metres of the shape's origin: for pieces of the catalogue the centre of the base (of
+        the back for wall items). turn_rad: about +y; 0 faces +z. scale: along the piece's own axes, (3,) or
+        one for all. item_id must be new in the house; ids `dress-<pass>-<n>` name the pass in the report.
+        The shape's materials and textures are added to the house. Free space is not checked: gates do that
+        at the end.
         """
         turn, factor = rotation_y(turn_rad), np.broadcast_to(np.asarray(scale, np.float64), 3)
 
@@ -134,7 +134,7 @@ class MutableHouse:
         )
         materials = tuple(self.materials[m] for m in used)
         named = {name for m in materials for name in m.texture_ids}
-        # Openings name no material that is drawn: their cutters are never rendered.
+        # Openings have no visible material: their cutters are never rendered.
         openings = tuple(
             replace(o, cutter=replace(o.cutter, material=0)) for o in self.source.openings
         )

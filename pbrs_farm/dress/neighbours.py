@@ -1,6 +1,6 @@
-"""The items round a thing: where its surface reaches into theirs, what stands on it, and what holds it.
+"""The items around an item: overlaps, contents, support.
 
-State: bounds, triangles and cubes of the items that were asked for are kept.
+State: a cache of bounds, triangles and cubes.
 """
 
 from __future__ import annotations
@@ -60,10 +60,10 @@ class Neighbours:
         return [int(k) for k in np.flatnonzero(meets) if not self.items[int(k)].kind.is_structure]
 
     def n_shared(self, item: Item, without: Collection[int]) -> int:
-        """In how many 2 cm cubes an item's surface lies together with other items' surfaces.
+        """Number of 2 cm cubes that an item's surface shares with other items' surfaces.
 
-        The item need not be in the house yet. without: places of items left out, such as its own. Compare it
-        with what the old item shared: things that touch share some cubes.
+        The item need not be in the house. without: indices of items to ignore, such as its own. Compare
+        with the old item's number: touching items share some cubes.
         """
         low, high = item.bounds
         own = _cubes(self.triangles(item))
@@ -89,8 +89,10 @@ def _cubes(corners: F64, box: F64 | None = None) -> Cubes:
 
 
 _ROUNDING_M: Final = 1e-3  # rounding of bounds
-_CONTACT_M: Final = 0.015  # greatest gap or overlap between a thing and what it stands on
-_LOW_PART_M: Final = 0.05  # vertices this near to a thing's bottom may touch what it stands on
+_CONTACT_M: Final = 0.015  # maximum gap or overlap between an item and its support, metres
+_LOW_PART_M: Final = (
+    0.05  # maximum height of vertices above an item's base that may touch its support, metres
+)
 _FLAT_M: Final = 0.06  # rugs and mats lie under everything
 _LEFT_ALONE: Final = frozenset(
     {ItemKind.DOOR, ItemKind.WINDOW, ItemKind.STAIRS}
@@ -98,9 +100,9 @@ _LEFT_ALONE: Final = frozenset(
 
 
 def things_on(around: Neighbours, index: int) -> tuple[list[int], list[int]]:
-    """(what stands on an item, what stands in it or under it), by place; index: the item's.
+    """(contents on top of an item, items inside or under it), as indices; index: the item's.
 
-    Structure, doors and windows, and what lies flat below it, are neither.
+    Structure, doors and windows, and flat items below it, are excluded.
     """
     bounds = around.bounds()
     (low, high), corners = bounds[index], around.triangles(around.items[index])
@@ -126,28 +128,28 @@ def _stands_on(item: Item, corners: F64, top_y: float) -> bool:
     return bool(np.isfinite(height).any() and abs(float(gap.min())) <= _CONTACT_M)
 
 
-_STANDS_M: Final = 0.03  # a thing this near above the floor stands on it
+_STANDS_M: Final = 0.03  # maximum height of a floor item's base above the floor, metres
 ALIKE_HELD: Final[Mapping[Place, frozenset[Place]]] = {
     Place.FLOOR: frozenset({Place.FLOOR, Place.KITCHEN, Place.SURFACE}),
     Place.SURFACE: frozenset({Place.FLOOR, Place.SURFACE}),
     Place.WALL: frozenset({Place.WALL}),
     Place.CEILING: frozenset({Place.CEILING}),
 }
-"""By what holds a thing, the places of the models that may be held so."""
+"""Compatible places of models, by the support of the item that they replace."""
 
 
 def held_by(house: MutableHouse, around: Neighbours, index: int, group: str) -> Place:
-    """What holds items[index]: the floor, another piece (SURFACE), a wall or the ceiling.
+    """Support of items[index]: the floor, another piece (SURFACE), a wall or the ceiling.
 
-    group: of the catalogue; ceiling lamps hang whatever stands below. What nothing holds from below is
-    taken to hang on a wall.
+    group: of the catalogue; ceiling lamps hang whatever is below. Items without support from below are
+    assumed to hang on a wall.
     """
     if HELD.get(group) is HeldBy.TOP:
         return Place.CEILING
     item, low_y = around.items[index], float(around.bounds()[index, 0, 1])
     if height_above_floor(house, item, low_y) <= _STANDS_M:
         return Place.FLOOR
-    # What stands on a piece, a step or a platform does not hang.
+    # Items on a piece, a step or a platform do not hang.
     (low, high), all_bounds = around.bounds()[index], around.bounds()
     below = boxes_meeting(all_bounds[:, 0], all_bounds[:, 1], low - _CONTACT_M, high)
     others = [around.items[int(k)] for k in np.flatnonzero(below) if k != index]
@@ -171,9 +173,9 @@ def height_above_floor(house: MutableHouse, item: Item, low_y: float) -> float:
 
 
 def lowest_points(item: Item) -> F64:
-    """(N, 3) vertices within 5 cm of the item's bottom: what can touch what it stands on.
+    """(N, 3) vertices within 5 cm of the item's base, which can touch the support.
 
-    About 600 at most, evenly left out.
+    About 600 at most, evenly subsampled.
     """
     points = np.concatenate([s.positions for s in item.surfaces]).astype(np.float64)
     points = points[points[:, 1] <= points[:, 1].min() + _LOW_PART_M]
@@ -181,9 +183,9 @@ def lowest_points(item: Item) -> F64:
 
 
 def drop_onto(item: Item, corners: F64) -> float | None:
-    """How far (m, upwards) an item goes to stand on triangles (F, 3, 3) seen from above.
+    """Vertical offset (m, upwards) that puts an item on triangles (F, 3, 3) seen from above.
 
-    None where less than most of its foot would find something to stand on.
+    None if most of its foot would be unsupported.
     """
     points = lowest_points(item)
     height = highest_below(points[:, [0, 2]], corners)

@@ -1,4 +1,4 @@
-"""Where a piece of furniture of the source stands, which way it faces, what it is; no effects."""
+"""Place, orientation and kind of a piece of furniture of the source; no effects."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import Item
 from pbrs_farm.core.mesh import triangle_bounds
 
-_UPRIGHT: Final = 0.999  # cosine to the vertical of what is not tilted
+_UPRIGHT: Final = 0.999  # minimum cosine to the vertical of an upright item
 _HIGH_PART: Final = 0.25  # top share of a seat's height in which its back is looked for
-# Least offset of the top from the middle, as a share of the depth, that tells where the back is.
+# Minimum offset of the top from the centre that identifies the back, as a share of the depth.
 _CLEAR: Final = 0.12
 _BOARD_M: Final = 0.04  # a thicker one is no skirting board
 _APART_M: Final = 0.0005
 _OFF_WALL_M: Final = 0.03
-_HIGH_TABLE_M: Final = 0.62  # one eats or works at what is higher
+_HIGH_TABLE_M: Final = 0.62  # minimum height of a table for eating or working, metres
 _BACKED: Final = frozenset({"chair", "office_chair", "armchair", "sofa", "bed"})
 
 
 class HeldBy(Enum):
-    """What of a piece keeps its place when it gets another model: its back, its middle or its top.
+    """The part of a piece that stays fixed when its model is replaced: back, centre or top.
 
-    Both BACK and CENTRE keep the bottom's height.
+    Both BACK and CENTRE keep the base's height.
     """
 
     BACK = "back"
@@ -39,7 +39,7 @@ class HeldBy(Enum):
     TOP = "top"
 
 
-# What may be swapped. Doors, windows and what kitchens are built of stay.
+# Replaceable groups. Doors, windows and kitchen units are not replaced.
 HELD: Final[Mapping[str, HeldBy]] = {
     **dict.fromkeys(
         ("sofa", "armchair", "bed", "desk", "nightstand", "tv_stand", "bookcase", "shelves",
@@ -58,7 +58,7 @@ HELD: Final[Mapping[str, HeldBy]] = {
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OldPlace:
-    """An item as it stands: its box about its own axes, front towards +z."""
+    """Place of an item: its box about its own axes, front towards +z."""
 
     turn_rad: float  # about +y
     low: F64  # (3,) in the turned frame, metres
@@ -87,9 +87,9 @@ class OldPlace:
 
 
 def old_place(item: Item, group: str) -> OldPlace | None:
-    """Where an item stands; None where it is tilted or its front is not known.
+    """Place of an item; None if it is tilted or its front is unknown.
 
-    The front is its box's third axis; of seats and beds the back rest says which way it looks.
+    The front is its box's third axis; for seats and beds the back rest gives the direction.
     """
     if item.box is None or item.box.axes[1, 1] < _UPRIGHT or not item.n_faces:
         return None
@@ -109,7 +109,7 @@ def old_place(item: Item, group: str) -> OldPlace | None:
 
 
 def before_boards(place: OldPlace, boards: Sequence[F64]) -> OldPlace:
-    """The place drawn in so far that its back stands before skirting boards, which homes draw into it.
+    """The place made shallower, so that its back is in front of skirting boards that homes draw into it.
 
     boards: (N, 3) points of each in the world.
     """
@@ -151,7 +151,7 @@ def _boxed(points: F64, turn_rad: float) -> OldPlace:
 
 
 def _back_of(local: F64, place: OldPlace) -> str:
-    # Where the highest part lies against the middle, if clearly to one side.
+    # Side of the highest part relative to the centre, if clearly off centre.
     low, high = place.low, place.high
     top = local[local[:, 1] > high[1] - _HIGH_PART * (high[1] - low[1])]
     off = ((top.min(0) + top.max(0)) / 2 - (low + high) / 2) / np.maximum(high - low, 1e-6)

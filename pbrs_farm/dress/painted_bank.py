@@ -1,6 +1,6 @@
-"""Painted materials kept on disk, for all homes and processes: painting one takes a hundred times as long.
+"""A disk cache of painted materials, for all homes and processes: painting takes a hundred times as long.
 
-Effects: reads and writes its folder. What is kept is what would be painted, so no home depends on it.
+Effects: reads and writes its folder. A hit equals a fresh painting, so results do not depend on it.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.house import Material, Texture
 from pbrs_farm.dress.painted_materials import Painted, Painting
 
-MOST_BYTES: Final = 2_000_000_000  # of a bank: what was painted first goes first
+MOST_BYTES: Final = 2_000_000_000  # maximum size; the oldest entries are removed first
 _MAKERS: Final = ("numpy", "OpenImageIO")  # the packages whose versions may change a pixel
-_LOOK_EVERY: Final = 32  # one of so many that are added looks how large the bank is
+_LOOK_EVERY: Final = 32  # the size is checked once per this many additions
 
 
 @dataclass(frozen=True, slots=True)
 class _Described:
-    # What of a painted material is no picture.
+    # Fields of a painted material that are not pictures.
     material: Material
     mean_rgb: tuple[float, float, float]
     textures: tuple[tuple[str, str, str, int], ...]  # id, name, media type, bytes
@@ -57,10 +57,10 @@ class PaintedBank:
         self._known: dict[str, Painting] = {}
 
     def painted(self, key: str, paint: Callable[[], Painted]) -> Painted:
-        """What is kept under a key, else what `paint` gives, which is then kept.
+        """The cached material of a key; on a miss `paint` is called and its result stored.
 
-        key: all that the pixels follow from beside the code. A file that is damaged is painted anew; a
-        folder that cannot be written costs time alone.
+        key: everything that determines the pixels, besides the code. A damaged file is painted again; if
+        the folder is not writable, results are correct but slow.
         """
         # Two threads that ask for one wait for each other, and for nothing else.
         with self._lock:
@@ -112,7 +112,7 @@ def _packed(painted: Painted) -> bytes:
 
 
 def _unpacked(data: bytes) -> Painted:
-    """ValueError for what is no whole file of _packed."""
+    """Inverse of _packed; ValueError for any other data."""
     digest, _, content = data.partition(b"\n")
     if hashlib.sha256(content).hexdigest().encode() != digest:
         raise ValueError("damaged")

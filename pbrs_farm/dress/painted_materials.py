@@ -1,6 +1,6 @@
-"""The materials and textures of a house that is being dressed, some of them painted meanwhile.
+"""Materials and textures of a house during dressing, some of them painted in the background.
 
-Effects: a thread paints; each house has its own, until close().
+Effects: a thread paints; each house has one, until close().
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from pbrs_farm.core.house import Material, Texture
 
 
 class Painted(NamedTuple):
-    """A material that was painted."""
+    """A painted material."""
 
     material: Material
     textures: tuple[Texture, ...]  # those that the material names
@@ -23,7 +23,7 @@ class Painted(NamedTuple):
 
 
 class Painting:
-    """Something that is painted once, by whoever comes first: the thread, or who needs it."""
+    """A task that is painted once, by the thread or by its first user."""
 
     def __init__(self, paint: Callable[[], Painted]) -> None:
         self._paint = paint
@@ -31,7 +31,7 @@ class Painting:
         self._painted: Painted | None = None
 
     def painted(self) -> Painted:
-        """What was painted, painted now or waited for where it is not ready. Raises its error."""
+        """The result, painted now or waited for if it is not ready. Raises the task's error."""
         with self._lock:
             if self._painted is None:
                 self._painted = self._paint()
@@ -60,15 +60,15 @@ class PaintedMaterials(Sequence[Material]):
         made = self._all[number]
         if not isinstance(made, Painting):
             return made
-        # From now on an equal one that is added has this number.
+        # Equal materials added later get this index.
         material = made.painted().material
         self._number.setdefault(material, number % len(self._all))
         return material
 
     def add(self, material: Material, textures: Iterable[Texture]) -> int:
-        """The number of a material; textures: those that it names.
+        """Index of a material, the same for equal ones, including finished painted ones.
 
-        The same for equal ones, painted ones that were read included.
+        textures: those of the material.
         """
         self._textures += ((t.id, t) for t in textures)
         if material not in self._number:
@@ -85,12 +85,12 @@ class PaintedMaterials(Sequence[Material]):
         return len(self._all) - 1, painting
 
     def close(self) -> None:
-        """End the thread after what it paints now; nothing is painted beside any more."""
+        """Stop the thread after its current task."""
         if "_thread" in self.__dict__:
             self._thread.shutdown(wait=False, cancel_futures=True)
 
     def textures(self) -> dict[str, Texture]:
-        """All textures by id, in the order in which they came; waits for what is not painted yet."""
+        """All textures by id, in the order of addition; waits for unfinished ones."""
         found: dict[str, Texture] = {}
         for row in self._textures:
             if isinstance(row, Painting):

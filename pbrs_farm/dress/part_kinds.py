@@ -1,4 +1,4 @@
-"""What a part of a piece of furniture is made of, by its class, its material's name and colour; no effects."""
+"""Material kind of a furniture part, by its class, its material's name and colour; no effects."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from pbrs_farm.dress.style import METALS, Metal, Rgb
 
 
 class PartKind(StrEnum):
-    """What a part is made of, as far as dressing changes it."""
+    """Material kinds that dressing distinguishes."""
 
     WOOD = "wood"
     SOFT = "soft"  # cloth or leather
     METAL = "metal"
     LACQUER = "lacquer"  # keeps its colour and gets a sheen
-    OTHER = "other"  # stays as it is
+    OTHER = "other"  # unchanged by dressing
 
 
 class _Classes(Record):
@@ -60,10 +60,10 @@ _KINDS: Final = (ItemKind.OBJECT, ItemKind.LAMP, ItemKind.DOOR)
 
 
 def kind_of_part(material: Material, item: Item, group: str) -> PartKind:
-    """What a material of an item is made of. group: the catalogue's, "" where it is not known.
+    """Material kind of an item's material. group: the catalogue's, "" if unknown.
 
-    Glass, mirrors, bulbs, pictures and screens are OTHER; so is all wood and cloth of things that
-    are never made of it.
+    Glass, mirrors, bulbs, pictures and screens are OTHER; so are wood and cloth of items that are
+    never made of them.
     """
     if material.kind is not MaterialKind.OPAQUE or item.kind not in _KINDS:
         return PartKind.OTHER
@@ -84,7 +84,7 @@ def kind_of_part(material: Material, item: Item, group: str) -> PartKind:
 
 
 def kind_by_name(name: str) -> PartKind | None:
-    """What whole words of a material's name say, or None."""
+    """Kind by whole words of a material's name, or None."""
     parted = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name)
     words = set(re.findall(r"[a-z]+", parted.lower()))
     for kind, known in _FILE.words.items():
@@ -131,7 +131,7 @@ def _is_large(item: Item) -> bool:
 
 
 def is_loud(colour: Rgb) -> bool:
-    """Whether it is a colour of screens, such as few large things in homes have."""
+    """True for saturated screen colours, which are rare on large items in homes."""
     _, saturation, value = colorsys.rgb_to_hsv(*colour)
     is_of_wood = is_brown(colour) and value < _BRIGHT
     return saturation > 0.6 and value > 0.35 and not is_of_wood

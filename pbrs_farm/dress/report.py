@@ -1,4 +1,4 @@
-"""What dressing added, changed and refused, and what its gates found: dress.json. No effects."""
+"""Additions, changes, refusals and gate results of dressing: dress.json. No effects."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pbrs_farm.core.shown_text import MAX_MESSAGE, shown
 
 
 class Credit(Record):
-    """A model or picture of a library that stands in the house, and on which terms."""
+    """A library model or picture used in the house, with its licence."""
 
     id: str  # in the catalogue
     name: str
@@ -25,9 +25,9 @@ class Gate(Record):
     """A rule that a dressed house must keep, and what came of it."""
 
     name: str  # "penetration", "support", "doors", "windows", "path", "fronts", "must_haves"
-    n_checked: int  # pairs, things or doors that were measured
-    n_taken_out: int  # things that broke it and were taken out, or put back as they were
-    n_left: int  # that break it in the house as it is now
+    n_checked: int  # pairs, items or doors that were measured
+    n_taken_out: int  # violating items that were removed or restored
+    n_left: int  # violations that remain in the final house
 
 
 class DressReport(Record):
@@ -38,15 +38,13 @@ class DressReport(Record):
     style: str = ""
     added: dict[str, int] = Field(
         default_factory=dict
-    )  # `<part>: <group>` -> things that stand in the house now
-    changed: dict[str, int] = Field(
-        default_factory=dict
-    )  # part -> things of the source that it changed
+    )  # `<part>: <group>` -> items in the final house
+    changed: dict[str, int] = Field(default_factory=dict)  # part -> changed items of the source
     refused: dict[str, int] = Field(
         default_factory=dict
-    )  # `<part>: <reason>` -> tries that were given up
+    )  # `<part>: <reason>` -> abandoned attempts
     gates: tuple[Gate, ...] = ()
-    moved_after_repair: int = 0  # things hung on the wall that repair left
+    moved_after_repair: int = 0  # items moved to the wall that repair kept
     credits: tuple[Credit, ...] = ()
     notes: tuple[str, ...] = ()
 
@@ -57,7 +55,7 @@ class DressReport(Record):
 
 
 def summary_of_dressing(report: DressReport) -> str:
-    """What was added to a house, changed in it and refused, a sentence per line."""
+    """The additions, changes and refusals in a house, one sentence per line."""
     return "\n".join(
         [f"{report.house_id}:", *(f"- {shown(line, MAX_MESSAGE)}" for line in _sentences(report))]
     )
@@ -113,5 +111,5 @@ def _by_part(counts: dict[str, int]) -> dict[str, list[tuple[str, int]]]:
 
 
 def is_owed(credit: Credit) -> bool:
-    """Whether a credit must be given: all but what is in the public domain or our own."""
+    """True if attribution is required: for all but public-domain content and this project's own."""
     return bool(credit.licence) and not credit.licence.upper().startswith(("CC0", "PUBLIC"))

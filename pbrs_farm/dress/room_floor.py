@@ -1,4 +1,4 @@
-"""A room's floor and walls while furniture is put there; state: what was put."""
+"""A room's floor and walls while furniture is added; state: the furniture added so far."""
 
 from __future__ import annotations
 
@@ -31,23 +31,23 @@ _FRENCH_M = 0.4  # a window whose sill is lower is walked through
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FloorSpot:
-    """A place at a wall for a thing, with the plan area it takes and the one before it.
+    """A place for a piece at a wall, with its plan area and the area in front of it.
 
-    From spot_at; RoomFloor says whether it is allowed.
+    From spot_at; RoomFloor checks whether it is allowed.
     """
 
     face: WallFace
-    s: float  # of the thing's middle, along the face
-    depth: float  # of the thing, metres
+    s: float  # of the piece's centre, along the face
+    depth: float  # of the piece, metres
     body: BaseGeometry  # the plan area it takes
     front: BaseGeometry  # and the floor before it
 
 
 def spot_at(face: WallFace, s: float, width: float, depth: float, before_m: float) -> FloorSpot:
-    """The place of a thing with its back at a wall face.
+    """The place of a piece with its back at a wall face.
 
-    s: metres along the face, of the thing's middle. width, depth: of the thing. before_m: free floor that
-    it needs in front of it. Its back keeps OUT_M from the wall, for the skirting board.
+    s: metres along the face, of the piece's centre. width, depth: of the piece. before_m: required
+    free floor in front. Its back keeps OUT_M from the wall, for the skirting board.
     """
 
     def area(z0: float, z1: float) -> BaseGeometry:
@@ -60,7 +60,7 @@ def spot_at(face: WallFace, s: float, width: float, depth: float, before_m: floa
 
 @dataclass(slots=True)
 class RoomFloor:
-    """What is left of a room's floor and walls while furniture is put there; state: what was put.
+    """The free part of a room's floor and walls; state: the furniture added so far.
 
     floor = RoomFloor.of(house, house_space(house), room)
     spot = spot_at(room.faces[0], 1.2, 0.8, 0.4, before_m=0.6)
@@ -73,18 +73,16 @@ class RoomFloor:
     faces: Sequence[WallFace]
     bitmap: FloorBitmap
     free: BaseGeometry  # its floor without walls
-    kept: (
-        BaseGeometry  # what doors and drawers sweep, and where one stands before doors and windows
-    )
+    kept: BaseGeometry  # areas swept by doors and drawers, and standing areas at doors and windows
     has_ways: bool  # one way joins its doors
     walkable: int  # cells of its largest way, before anything was put
-    wall_m: float  # length of wall that furniture may still stand at
-    bodies: list[BaseGeometry] = field(default_factory=list)  # of what was put
+    wall_m: float  # remaining length of wall for furniture
+    bodies: list[BaseGeometry] = field(default_factory=list)  # of the added furniture
     fronts: list[BaseGeometry] = field(default_factory=list)  # the floor before it
 
     @classmethod
     def of(cls, house: MutableHouse, space: HouseSpace, room: RoomSpace) -> RoomFloor | None:
-        """The room as it is now; None where it has no floor or no walls.
+        """The room in its current state; None without a floor or walls.
 
         space: of the same state of the house.
         """
@@ -102,7 +100,7 @@ class RoomFloor:
         zones += [flights.under, flights.before]
         here = [house.items[n] for n in room.items]
         zones.append(floor_swept(here, room.room.floor_y))
-        # Count the wall before which one could stand something.
+        # Measure the wall length with free floor in front.
         faces = Hanging(house, room, "furniture").faces
         low, high = room.room.floor_y + LOWER_M, room.room.floor_y + 0.9
         free_m = sum(len(face.starts(WALL_CELL_M, low, high, 0.5)) for face in faces) * WALL_CELL_M
@@ -113,9 +111,9 @@ class RoomFloor:
         )  # fmt: skip
 
     def allows(self, body: BaseGeometry, front: BaseGeometry) -> bool:
-        """Whether a thing may stand there: on free floor, off doors, and every way stays open.
+        """True if a piece may be placed: on free floor, clear of doors, with every way kept open.
 
-        body, front: plan areas (x, z) of the thing and of the floor that it needs before it.
+        body, front: plan areas (x, z) of the piece and of the floor that it needs in front.
         """
         is_there = shapely.contains(self.free, body) and not shapely.intersects(self.kept, body)
         if not is_there or any(shapely.intersects(body, area) for area in self.fronts):
@@ -128,7 +126,7 @@ class RoomFloor:
         return self._keeps_ways(self._cells(body))
 
     def take(self, body: BaseGeometry, front: BaseGeometry) -> None:
-        """Count a thing as standing there; allows is not asked again.
+        """Occupy the place of a piece; not checked again.
 
         body, front: as of allows.
         """

@@ -1,8 +1,8 @@
-"""The part of dressing that weaves: cushions, covers, throws and generated seats get threads or a print.
+"""Weave and print cushions, covers, throws and generated seats.
 
-Generated soft things come in one plain colour each, and so do the cushions of many a library's sofa; bare of
-threads they look like plastic. cloths.toml beside says what each material is woven as. Effects: those of
-textures.families.
+Generated soft items have one plain colour each, as do the cushions of many library sofas; without
+visible threads they look like plastic. cloths.toml beside gives the weave of each material. Effects:
+those of textures.families.
 """
 
 from __future__ import annotations
@@ -112,7 +112,7 @@ def _plain_name(material: Material) -> str:
 
 
 def _own_axes(surface: Surface, item: Item) -> F64:
-    """(3, 3) axes along which a print lies: those of the piece, or of a cushion wherever it leans."""
+    """(3, 3) axes of a print: those of the piece, or of a cushion wherever it leans."""
     if item.box is not None:
         return item.box.axes
     points = surface.positions.astype(np.float64)

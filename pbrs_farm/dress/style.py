@@ -1,7 +1,7 @@
-"""How a home is decorated: tints, wood, metal and cloth that go together; no effects.
+"""Decoration style of a home: matching tints, wood, metal and cloth; no effects.
 
-One style a home, drawn by `style_for`; a fifth of the rooms has another one (`room_style`).
-Colours are sRGB-encoded, 0..1, as `Material.diffuse` is. What there is to draw is in style.toml.
+One style per home, drawn by `style_for`; a fifth of the rooms has another one (`room_style`).
+Colours are sRGB-encoded, 0..1, as `Material.diffuse`. The choices are in style.toml.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ class Style:
     """
 
     name: str
-    palette: Palette  # wall, second wall, accent wall, large, small things
+    palette: Palette  # wall, second wall, accent wall, large items, small items
     wood: Wood
     metal: Metal
     textiles: tuple[Rgb, ...]  # seats, curtains, rugs, beds: from calm to loud
@@ -94,7 +94,7 @@ class Style:
 
 
 class _Taste(Record):
-    # What homes of a style draw from; the first of each is the most usual.
+    # Choices of a style; the first of each is the most common.
     name: str
     palettes: tuple[Palette, ...]
     woods: tuple[str, ...]
@@ -109,7 +109,7 @@ class _Taste(Record):
 
 
 class _WoodsFor(Record):
-    # What is not of the home's own wood.
+    # Materials besides the home's wood.
     trim: tuple[str, ...]
     front_doors: tuple[str, ...]
     stairs: tuple[str, ...]
@@ -117,7 +117,7 @@ class _WoodsFor(Record):
 
 
 class WallCover(Record):
-    """What covers walls beside paint and paper: a row of style.toml."""
+    """A wall covering besides paint and wallpaper: a row of style.toml."""
 
     pattern: str  # of textures/families.py
     walls: Literal[
@@ -125,7 +125,7 @@ class WallCover(Record):
     ]  # of a room: their foot, one wall, one or all of them
     of: Literal["paint", "wood", "brick", "concrete"]
     variants: tuple[str, ...] = ("",)
-    low_m: tuple[float, ...] = ()  # heights of a foot whose variants have none
+    low_m: tuple[float, ...] = ()  # heights of a foot for variants without one
 
 
 class _Styles(Record):
@@ -159,7 +159,7 @@ COVERS: Final[Mapping[str, WallCover]] = _FILE.covers
 COVERED_ROOMS: Final[Mapping[RoomKind, float]] = _FILE.covered_rooms
 _TASTES: Final = _FILE.tastes
 COLOURS: Final = read_toml(Path(__file__).with_name("colours.toml"), dict[str, Colours])
-"""What things are sold in, by name."""
+"""Commercial colours of items, by name."""
 STYLES = tuple(taste.name for taste in _TASTES)
 
 

@@ -1,6 +1,6 @@
-"""Where things can stand: the level tops of furniture and the floors of rooms, and what is free above them.
+"""Supporting surfaces: the horizontal tops of furniture and the floors of rooms, with their free height.
 
-Works on raw meshes: open, thin, wound either way. Nothing is decided by boxes; no effects.
+Works on raw meshes: open, thin, wound either way. Bounding boxes decide nothing; no effects.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ MOST_FREE_M = 3.0  # clearance is capped at this height
 _LEAST_NORMAL_Y = 0.95
 _FLAT_M = 0.0006  # heights of one support differ by less
 _BORDER_M = 0.05  # border of the grid around a support
-_NEAR_M = 0.003  # a face of another thing less than this below a support lies on it
+_NEAR_M = 0.003  # maximum gap between a support and another item's face on it, metres
 _LEVEL_M = (
     0.0002  # furniture's own face counts as the support up to here; a higher one is an obstacle
 )
@@ -41,10 +41,10 @@ _FLOOR_M = 0.004  # a floor's faces are within this of the room's floor_y
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Support:
-    """A flat surface that things can stand on. Its grid's +z points to the side it is used from.
+    """A horizontal surface for items. Its grid's +z points to the side from which it is used.
 
-    One level of a piece of furniture may give several supports: a worktop with a sink in it has two.
-    `dress.worktop.Worktop` says where on a support a thing of a size fits.
+    One level of a piece of furniture may have several supports: a worktop with a sink in it has two.
+    `dress.worktop.Worktop` gives the places for an item of a size.
     """
 
     item: int  # index of the furniture; FLOOR: the room's floor
@@ -53,7 +53,7 @@ class Support:
     above_floor: float  # metres
     grid: PlanGrid
     mask: Bools  # (rows, columns) the support is there and free
-    clear: F64  # (rows, columns) free height above, metres; 0 = something stands there
+    clear: F64  # (rows, columns) free height above, metres; 0 = occupied
     open_sides: tuple[bool, bool, bool, bool]  # right (+x), front (+z), left, back
     is_covered: bool  # a shelf: something is above most of it
 
@@ -69,12 +69,12 @@ FLOOR = -1
 def supports_of_item(
     scene: SceneTriangles, index: int, room: Room, *, border_m: float = _BORDER_M
 ) -> list[Support]:
-    """The level tops and inner shelves of scene.items[index] that lie in the room, from low to high.
+    """The horizontal tops and inner shelves of scene.items[index] inside the room, from low to high.
 
-    A support is level, has LEAST_AREA_M2 in one piece with LEAST_FREE_M above it, and lies between
+    A support is horizontal, has LEAST_AREA_M2 in one piece with LEAST_FREE_M above it, and is between
     4 cm above the floor and 2.35 m. The insides of closed bodies and the bottoms of bowls and sinks
-    are left out. border_m: how far around a support its grid says what is free, too. Empty where
-    nothing of the item is level.
+    are excluded. border_m: width of the border around a support in its grid. Empty if the item has no
+    horizontal surface.
 
         scene = SceneTriangles(house.items)
         heights = [s.height for s in supports_of_item(scene, 3, room)]  # world y, metres
@@ -101,9 +101,9 @@ def supports_of_item(
 def floor_support(
     scene: SceneTriangles, room: Room, *, border_m: float = _BORDER_M
 ) -> Support | None:
-    """What is free of a room's floor, as one support; None where no face lies at its floor_y.
+    """The free part of a room's floor, as one support; None without a face at its floor_y.
 
-    Rugs and whatever else lies on it are obstacles. border_m: as of supports_of_item.
+    Rugs and other items on the floor are obstacles. border_m: as of supports_of_item.
     """
     corners = np.insert(np.asarray(room.polygon, np.float64), 1, room.floor_y, axis=1)
     grid = PlanGrid.around(room.polygon, _turn_of_outline(corners), _FLOOR_CELL_M, border_m)
@@ -172,12 +172,12 @@ class FacesAround:
     solid: Bools  # (rows, columns) inside a wall
 
     def clearance(self, height: float) -> F64:
-        """(rows, columns) metres that are free above height, at most MOST_FREE_M.
+        """(rows, columns) free metres above height, at most MOST_FREE_M.
 
-        The furniture's own faces at that height are the support and no obstacle.
+        The furniture's own faces at that height are the support, not obstacles.
         """
         hits = self.hits
-        # Let every face that rises above the support lower what is free in its cells.
+        # Every face above the support limits the free height of its cells.
         stands = hits.high > height + np.where(self.is_own, _LEVEL_M, -_NEAR_M)
         clear = np.full(self.grid.shape, MOST_FREE_M)
         free = np.maximum(hits.low[stands] - height, 0.0)
@@ -190,7 +190,7 @@ class FacesAround:
 def faces_around(
     scene: SceneTriangles, own: Collection[int], grid: PlanGrid, low_y: float
 ) -> FacesAround:
-    """What stands over a grid from low_y upwards; own: indices of what bears the support itself."""
+    """Faces over a grid from low_y upwards; own: indices of the supporting items."""
     ends = grid.plan_of(np.array([0, grid.shape[1]] * 2), np.repeat([0, grid.shape[0]], 2))
     low = np.array([ends[:, 0].min(), low_y - _NEAR_M, ends[:, 1].min()])
     high = np.array([ends[:, 0].max(), low_y + MOST_FREE_M, ends[:, 1].max()])
@@ -254,7 +254,7 @@ def _supports_of_level(
 
 
 def _find_open_sides(part: Bools, clear: F64) -> tuple[bool, bool, bool, bool]:
-    """Whether nothing stands beyond the part's right, front, left and back edge."""
+    """True for each edge of the part (right, front, left, back) without an obstacle next to it."""
     blocked = clear < LEAST_FREE_M
     sides = []
     for axis, step in ((1, 1), (0, 1), (1, -1), (0, -1)):
@@ -318,7 +318,7 @@ def _front_quarter(support: Support, room: Room, has_front: bool) -> int:
     right, front, left, back = support.open_sides
     is_open = {0: front, 1: right, 2: back, 3: left}
     area = Polygon(room.polygon)
-    # A top that is open all around faces the room; a shelf faces where it is open.
+    # A top that is open on all sides faces the room; a shelf faces its open side.
     if has_front and is_open[0] and _way_to_wall(support, 0, area) > 0.25:
         return 0
     reach = {q: _way_to_wall(support, q, area) for q in is_open}
@@ -335,7 +335,7 @@ def _front_quarter(support: Support, room: Room, has_front: bool) -> int:
 
 
 def _way_to_wall(support: Support, quarter: int, area: Polygon) -> float:
-    # How far one can go from the support's middle beyond its edge before the room ends, metres.
+    # Distance from the support's centre past its edge to the end of the room, metres.
     grid, (rows, columns) = support.grid, np.nonzero(support.mask)
     middle = grid.plan_of(columns.mean() + 0.5, rows.mean() + 0.5)
     ahead = grid.plan_of(np.sin(quarter * np.pi / 2), np.cos(quarter * np.pi / 2)) - grid.origin

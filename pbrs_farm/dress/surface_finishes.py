@@ -17,7 +17,7 @@ from pbrs_farm.furnishings.textures.families import pattern_material
 
 @dataclass(frozen=True, slots=True)
 class Finish:
-    """What a part is painted with or made of: wood if it is given, else metal, else paint.
+    """Paint or material of a part: wood if given, else metal, else paint.
 
     paint: sRGB-encoded, 0..1. roughness: of paint; wood and metal have their own.
     """
@@ -30,15 +30,15 @@ class Finish:
 
 
 FINISHED = "coated"
-"""First word of the names of these materials: the pass `parts` leaves them as they are."""
+"""First word of the names of these materials, which the pass `parts` skips."""
 
 _SHEEN = (0.4, 0.4, 0.4)
 
 
 def with_finish(house: MutableHouse, surface: Surface, finish: Finish, axes: F64) -> Surface:
-    """The surface with a finish; texture coordinates are made anew for wood.
+    """The surface with a finish; wood gets new texture coordinates.
 
-    axes: (3, 3), columns are the thing's own axes, along which the grain of wood runs.
+    axes: (3, 3), columns are the item's own axes, along which the grain of wood runs.
     """
     if finish.wood is None:
         return replace(surface, material=number_of_finish(house, finish))
@@ -48,7 +48,7 @@ def with_finish(house: MutableHouse, surface: Surface, finish: Finish, axes: F64
 
 
 def item_with_finish(house: MutableHouse, item: Item, finish: Finish) -> Item:
-    """The item with the finish on every plain opaque surface; itself where it has none."""
+    """Apply the finish to every plain opaque surface; returns the same item if it has none."""
     if not has_plain(house, item):
         return item
     axes = np.eye(3) if item.box is None else item.box.axes
@@ -62,9 +62,9 @@ def item_with_finish(house: MutableHouse, item: Item, finish: Finish) -> Item:
 
 
 def has_plain(house: MutableHouse, item: Item) -> bool:
-    """Whether a finish would cover any of the item's surfaces.
+    """True if a finish would change any of the item's surfaces.
 
-    Glass, mirrors, bulbs and what has a picture stay as they are.
+    Glass, mirrors, bulbs and textured surfaces are never changed.
     """
     return any(is_plain(house.materials[s.material]) for s in item.surfaces)
 

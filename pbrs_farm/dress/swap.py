@@ -1,7 +1,7 @@
-"""The pass `swap`: furniture gets another model of its group within its old footprint; no effects.
+"""The pass `swap`: replace furniture by other models of its group within the old footprint; no effects.
 
-Sets swap together: what is the same model in one room (chairs round a table, both bedside tables).
-Things on the old piece are set down on the new one.
+Sets are replaced together: equal models in one room (chairs round a table, both bedside tables).
+Contents of the old piece are moved to the top of the new one.
 """
 
 from __future__ import annotations
@@ -47,8 +47,8 @@ from pbrs_farm.home.room_use import is_outdoors
 PASS: Final = "swap"
 # 2 cm cubes that a new piece may share with neighbours beyond what the old one shared.
 FREE_CUBES: Final = 6
-_TRIES: Final = 5  # pieces that are tried for a set
-_MOST_LIFT_M: Final = 0.3  # things on a swapped piece go at most so far up or down
+_TRIES: Final = 5  # pieces to try for a set
+_MOST_LIFT_M: Final = 0.3  # maximum vertical move of a replaced piece's contents, metres
 _ON_FLOOR_M: Final = 0.005  # what the source draws less than this above a floor is set on it
 _ON_WALLS: Final = frozenset({"radiator", "wall_lamp"})
 _NEAR_WALL_M: Final = 0.05
@@ -62,17 +62,17 @@ class _Member:
     index: int
     item: Item
     place: OldPlace
-    on: tuple[int, ...]  # what stands on it
+    on: tuple[int, ...]  # its contents
     held_by: Place
 
 
 def swap_furniture(house: MutableHouse, catalogue: Catalogue, style: Style, share: float) -> None:
-    """Give a share of the source's furniture another model of the catalogue.
+    """Replace a share of the source's furniture by other models of the catalogue.
 
-    Each side of the new one is 75 to 100 % of the old one's, its height within 15 %; its back and
-    its axis stay. Things on it are set down on the new one; where one would find no place, where
-    the new one would reach into its neighbours, or where things stand in it, the old one stays.
-    What stands on a balcony or a terrace stays, too.
+    Each side of the new model is 75 to 100 % of the old one's, its height within 15 %; its back and
+    its axis stay. Contents are moved to the new one; if one has no place there, if the new model would
+    overlap its neighbours, or if items are inside the old one, the old one stays. Furniture on
+    balconies and terraces stays too.
     """
     around = Neighbours(house.items)
     for key, indices in _sets_of_models(house, catalogue).items():
@@ -89,7 +89,7 @@ def swap_furniture(house: MutableHouse, catalogue: Catalogue, style: Style, shar
 def _sets_of_models(house: MutableHouse, catalogue: Catalogue) -> dict[tuple[str, ...], list[int]]:
     # Items of one model in one room, by group, room, level and model.
     by_id = pieces_by_plain_id(catalogue)
-    # Catalogues furnish rooms: an upholstered armchair would stand in the rain.
+    # Catalogues are for indoors: an upholstered armchair would get wet.
     outdoors = {r.id for r in house.source.rooms if is_outdoors(r)}
     found: dict[tuple[str, ...], list[int]] = {}
     for index, item in enumerate(house.items[: len(house.source.items)]):
@@ -170,11 +170,12 @@ def _swap_set(
     if not candidates:
         house.refused[f"{PASS}: no other model fits"] += 1
         return
-    # What opens gives way to what opens alone; libraries' models have one lump for all their fronts.
+    # Replace furniture with joints only by models with joints; most library models have a single
+    # front.
     opens = any(item.joints for item in items)
     if opens:
         candidates = [one for one in candidates if one[0].id.startswith(GENERATED)]
-    # What hangs stays hung, what stands keeps standing.
+    # Keep the kind of support: hung or from below.
     candidates = [
         (piece, scale)
         for piece, scale in candidates
@@ -219,7 +220,7 @@ def _item_at_old_place(
     held, place, item = HELD[group], member.place, member.item
     held = HeldBy.BACK if member.held_by is Place.WALL else held
     low, high = shape.bounds * np.array(scale)
-    # Bring the point that is held to where the old one's was.
+    # Align the fixed point with that of the old piece.
     own = np.array([
         (low[0] + high[0]) / 2,
         high[1] if held is HeldBy.TOP else low[1],
@@ -237,13 +238,13 @@ def _item_at_old_place(
 
 
 def _above_floor_m(house: MutableHouse, item: Item, low_y: float) -> float:
-    """How much a piece stands above its room's floor where that is a few millimetres; else 0."""
+    """Gap of a few millimetres between a piece and its room's floor; else 0."""
     above = height_above_floor(house, item, low_y)
     return above if 0 < above <= _ON_FLOOR_M else 0.0
 
 
 def _lights_like(old: tuple[LightPart, ...], new: tuple[LightPart, ...]) -> tuple[LightPart, ...]:
-    # A lamp keeps its power and its colour; one that was off stays off.
+    # A lamp keeps its power and colour; one that was off stays off.
     if not old:
         return ()
     total = sum(light.share for light in new) or 1.0
@@ -268,7 +269,7 @@ def _fits_between_neighbours(around: Neighbours, members: list[_Member], new: li
 
 
 def _lifts(around: Neighbours, members: list[_Member], new: list[Item]) -> dict[int, float] | None:
-    # How far each thing on the old ones goes up, with what stands on it; None: one finds no place.
+    # Vertical offset of each item on the old ones, with its own contents; None if one has no place.
     lifts: dict[int, float] = {}
     for member, item in zip(members, new, strict=True):
         corners = item_triangles(item)

@@ -1,6 +1,6 @@
-"""What use leaves on smooth furniture: smudges on fronts and tops, the grain of brushed steel.
+"""Traces of use on smooth furniture: smudges on fronts and tops, the grain of brushed steel.
 
-They are maps of roughness and normals; colours stay. Part of `parts`.
+Maps of roughness and normals; colours are unchanged. Part of `parts`.
 Effects: JPEGs are encoded through a temporary file.
 """
 
@@ -28,7 +28,7 @@ PASS: Final = "parts"
 SIZE_M: Final = (0.6, 0.6)  # size of one repeat
 _SHAPE: Final = (512, 512)
 _QUALITY: Final = 90
-_LEAST_M: Final = 0.35  # things whose longest side is shorter show no marks of hands
+_LEAST_M: Final = 0.35  # minimum longest side of an item with smudges, metres
 _LEAST_M2: Final = 0.04
 _SMOOTH: Final = (0.08, 0.5)  # roughness of what shows a smudge
 _COATED: Final = 0.55  # Ks: more is metal
@@ -103,7 +103,7 @@ def _smudges(house: MutableHouse) -> Texture:
 
 
 def _brushed(house: MutableHouse) -> tuple[Texture, Texture]:
-    """(normals, roughness) of steel that was brushed along u."""
+    """(normals, roughness) of steel brushed along u."""
     rng = house.rng(PASS, "brushed")
     lines = noise(rng, _SHAPE, slope=0.4, stretch=(1.0, 60.0), band=(20.0, 1e9))
     rough = np.asarray(0.72 + 0.06 * lines, np.float32) * (smudge_map(rng) / np.float32(_CLEAN))

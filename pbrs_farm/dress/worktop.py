@@ -1,4 +1,4 @@
-"""Where things of a size fit on a support, and what is taken already; state: the free cells."""
+"""Free places of a support for items of a size; state: the free cells."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from shapely.geometry.base import BaseGeometry
 from pbrs_farm.core.arrays import F64, I32, Bools
 from pbrs_farm.dress.supports import LEAST_FREE_M, Support
 
-MARGIN_M = 0.02  # between things
-_HEADROOM_M = 0.01  # free height left above a thing
+MARGIN_M = 0.02  # between items
+_HEADROOM_M = 0.01  # free height left above an item
 LIFT_M = 0.0001  # above the support, so that no faces coincide
 
 
 @dataclass(frozen=True, slots=True)
 class TopSpot:
-    """A place for a thing on a worktop: its first row and column, and how many of each.
+    """A place for an item on a worktop: its first row and column, and how many of each.
 
     From Worktop.spots.
     """
@@ -30,16 +30,16 @@ class TopSpot:
 
 
 class Worktop:
-    """A support and what is still free on it. Rows run from the back to the front.
+    """A support with its free cells. Rows run from the back to the front.
 
-    `spots` lists every place where a thing of a size fits, `take` occupies one:
+    `spots` lists every place for an item of a size, `take` occupies one:
 
         top = Worktop(support)
         rows, columns, n = top.spots((0.3, 0.25, 0.2))  # width, height, depth in metres
         if len(rows):
             spot = TopSpot(int(rows[0]), int(columns[0]), *n)
             top.take(spot)
-            place = top.middle(spot)  # (3,) world, where the middle of its base stands
+            place = top.middle(spot)  # (3,) world, for the centre of its base
     """
 
     def __init__(self, support: Support) -> None:
@@ -62,11 +62,11 @@ class Worktop:
 
     @property
     def height(self) -> float:
-        """World y that things stand at."""
+        """World y of the supporting surface."""
         return self.support.height + LIFT_M
 
     def free_height(self) -> float:
-        """The median free height of what is left, metres; 0 where nothing is."""
+        """Median free height of the free cells, metres; 0 without any."""
         left = self.clear[self.support.mask & (self.clear > 0)]
         return float(np.median(left)) if len(left) else 0.0
 
@@ -80,21 +80,21 @@ class Worktop:
     ) -> tuple[I32, I32, tuple[int, int]]:
         """Rows and columns of the first cells of all places for a (width, height, depth), metres.
 
-        And the number of rows and columns of such a place. The size is along the grid's axes: of a
-        turned thing give `turned_size`. margin_m: to what stands there; inset_m: to the support's
-        edge. Empty arrays where it fits nowhere.
+        Also the number of rows and columns of such a place. The size is along the grid's axes: for a
+        turned item pass `turned_size`. margin_m: distance to other items; inset_m: to the support's
+        edge. Empty arrays if it fits nowhere.
         """
         cell = self.grid.cell_m
         n = (int(np.ceil(size[2] / cell)) + 1, int(np.ceil(size[0] / cell)) + 1)
         margin, inset = round(margin_m / cell), round(inset_m / cell)
-        # The thing must lie on the support, and nothing lower than it stand near.
+        # The item must be completely on the support, with enough height nearby.
         off = _count_in_windows(~self.support.mask, n, inset)
         hit = _count_in_windows(self.clear < size[1] + _HEADROOM_M, n, margin)
         rows, columns = np.nonzero((off == 0) & (hit == 0))
         return rows.astype(np.int32), columns.astype(np.int32), n
 
     def take(self, spot: TopSpot) -> None:
-        """Mark a spot as occupied up to the ceiling: nothing else can stand there.
+        """Mark a spot as occupied up to the ceiling.
 
         spot: of this worktop; whether it is free is not checked.
         """
@@ -102,7 +102,7 @@ class Worktop:
         self.clear[ahead, spot.column : spot.column + spot.n_columns] = 0.0
 
     def is_free(self, at: F64, side_m: float) -> bool:
-        """Whether a square about a plan place (2,) lies on the support and is free; it is taken then."""
+        """True if a square around a plan position (2,) is on the support and free; it is occupied then."""
         column, _y, row = self.grid.local(np.array([at[0], self.support.height, at[1]]))
         n = round(side_m / self.grid.cell_m)
         i, j = int(row) - n // 2, int(column) - n // 2
@@ -115,9 +115,9 @@ class Worktop:
         return True
 
     def free_height_around(self, at: F64, radius_m: float) -> float:
-        """The least free height above the cells within radius_m of a plan place (2,), metres.
+        """Minimum free height above the cells within radius_m of a plan position (2,), metres.
 
-        Cells beside the support count too, as far as its grid's border goes.
+        Cells beside the support count too, up to its grid's border.
         """
         column, _y, row = self.grid.local(np.array([at[0], 0.0, at[1]]))
         rows, columns = np.indices(self.grid.shape)
@@ -126,9 +126,9 @@ class Worktop:
         return float(self.clear[near].min(initial=np.inf))
 
     def keep_free(self, zone: BaseGeometry) -> None:
-        """Let nothing stand over a plan area (x, z), such as where a door swings.
+        """Reserve a plan area (x, z), such as a door's swing.
 
-        zone: may be empty, or lie elsewhere.
+        zone: may be empty, or outside the support.
         """
         plan = self.grid.centres()
         corners = plan[[0, 0, -1, -1], [0, -1, 0, -1]]
@@ -150,7 +150,7 @@ def turned_size(size: F64, turn_rad: float) -> tuple[float, float, float]:
 
 
 def _count_in_windows(bad: Bools, n: tuple[int, int], grown: int) -> I32:
-    # How many bad cells are in each window of n cells, grown by so many on each side.
+    # Count the blocked cells in each window of n cells, enlarged on each side.
     tall, wide = n[0] + 2 * grown, n[1] + 2 * grown
     total = np.zeros((bad.shape[0] + 2 * grown + 1, bad.shape[1] + 2 * grown + 1), np.int32)
     total[1:, 1:] = np.pad(bad, grown).astype(np.int32).cumsum(0).cumsum(1)

@@ -1,4 +1,4 @@
-"""What lies about in a home: things on furniture, books on shelves, cushions, some on the floor."""
+"""Small items of a home: on furniture, on shelves, cushions, some on the floor."""
 
 from pbrs_farm.dress.clutter.clutter import add_clutter
 

@@ -29,7 +29,7 @@ from pbrs_farm.geometry.plan_grid import PlanGrid, top_heights
 from pbrs_farm.geometry.scene_triangles import SceneTriangles
 
 _DOUBLE_M = 1.08  # a mattress at least this wide gets two pillows
-_PILLOW_SUNK = 0.45  # height of a pillow's middle above what it lies on, in half thicknesses
+_PILLOW_SUNK = 0.45  # height of a pillow's centre above its support, in half thicknesses
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -102,7 +102,7 @@ def dress_bed(placing: Placing, scene: SceneTriangles, index: int) -> int:
 
 
 def _narrowed(made: Model, factor: float) -> Model:
-    """The thing with its width scaled."""
+    """The item with its width scaled."""
     piece, shape = made
     scale = np.array([factor, 1.0, 1.0])
     surfaces = tuple(
@@ -116,7 +116,7 @@ def _narrowed(made: Model, factor: float) -> Model:
 
 
 def _drop_on(placing: Placing, scene: SceneTriangles, corners: F64) -> None:
-    """Drop a garment somewhere on cloth that was laid, given by its triangles."""
+    """Drop a garment somewhere on laid cloth, given by its triangles."""
     low, high = corners.min((0, 1)), corners.max((0, 1))
     at = low + (high - low) * placing.rng.uniform(0.3, 0.7, 3)
     drop_clothes(placing, scene, at[[0, 2]], float(high[1]))
@@ -186,7 +186,7 @@ def _has_pillows(bed: Lying) -> bool:
 
 
 def _place_on_bed(bed: Lying, across: float, from_head_m: float, made: Model) -> tuple[F64, float]:
-    # World (x, z) of a thing that lies so far from the head, and its turn.
+    # World (x, z) of an item at a distance from the head, and its rotation.
     depth = made[0].size[1]
     row = bed.rows[0] + (from_head_m + depth / 2) / bed.grid.cell_m
     column = bed.columns[0] + across * (bed.columns[1] - bed.columns[0])
@@ -197,9 +197,9 @@ def lay_down(
     placing: Placing, scene: SceneTriangles, index: int, made: Model, plan: F64, turn_rad: float,
     level: float,
 ) -> bool:  # fmt: skip
-    """Lay a soft thing down at a plan place (2,) on items[index]; False where something is there.
+    """Lay a soft item at a plan position (2,) on items[index]; False if the place is occupied.
 
-    It is pressed flat below: no point of it is lower than what it lies on.
+    Its underside is flattened: no point is below the support.
     """
     piece, shape = made
     turn = rotation_y(turn_rad + float(placing.rng.normal(0, 0.05)))
@@ -208,8 +208,9 @@ def lay_down(
     if others:
         placing.refuse("something lies on the bed or seat")
         return False
-    # What is folded lies flat already; a cushion's middle sinks in, and what would be lower than
-    # the surface is pressed up to it.
+    # Folded items are flat already; a cushion's centre sinks in, and lower points are pressed up to
+    # the
+    # surface.
     sunk = 1.0 if piece.group == "blanket" else _PILLOW_SUNK
     pressed, gap = [], np.inf
     for surface in shape.surfaces:

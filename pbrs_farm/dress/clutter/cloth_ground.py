@@ -1,7 +1,7 @@
-"""What cloth falls on: heights in cells and the upright sides between them; no effects.
+"""Collision geometry for cloth: heights in cells and the vertical sides between them; no effects.
 
-Whatever lies below a height is solid. A point in it leaves by the shorter way, up or to a side, so
-that cloth that hangs beside a bed is not lifted onto it.
+Everything below a height is solid. A point inside leaves by the shorter way, up or sideways, so
+that cloth beside a bed is not lifted onto it.
 """
 
 from __future__ import annotations
@@ -18,22 +18,22 @@ from pbrs_farm.core.arrays import F64, Bools
 from pbrs_farm.geometry.plan_grid import PlanGrid, cells_over
 
 CELL_M: Final = 0.0125  # cell size of the height map that cloth falls on
-TOUCH_M: Final = 0.0004  # gap between the cloth's lower side and what it lies on
-_FAR_M: Final = 0.5  # what is deeper inside than this goes up, whatever is nearer
+TOUCH_M: Final = 0.0004  # gap between the cloth's underside and its support, metres
+_FAR_M: Final = 0.5  # deeper points always move up, metres
 
 Cells = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Ground:
-    """A height map in a frame of its own (x, y up, z), metres, with the sides of its steps.
+    """A height map in its own frame (x, y up, z), metres, with the sides of its steps.
 
-    Build it by `of`: obstacles are wider than they are by grown_m to each side.
+    Create it with `of`: obstacles are widened by grown_m on each side.
     """
 
     grid: PlanGrid  # its axes are the frame's
     heights: F64  # (rows, columns)
-    bare: F64  # the same of obstacles as wide as they are
+    bare: F64  # the same without widening
     corners: F64  # (F, 3, 3) of the world: what cloth falls on
     sides: F64  # (S, 3) points on the upright sides of steps, a cell apart
     outward: F64  # (S, 3) the way out of each
@@ -86,14 +86,14 @@ class Ground:
         return short
 
     def ways_out(self, points: F64, apart_m: float) -> F64:
-        """(3, ...) the shortest moves by which points (3, ...) are that far from what is solid.
+        """(3, ...) shortest moves that bring points (3, ...) to a distance from the solid.
 
-        Nothing where they are already. apart_m: at least 0, metres.
+        Zero for points at that distance already. apart_m: at least 0, metres.
         """
         x, y, z = points
         move = np.zeros_like(points)
         short = self.at(x, z) + apart_m - y
-        # What has sunk in by no more than a cell is nearest to the top.
+        # Points less than a cell deep move to the top.
         is_up = (short > 0) & (short <= apart_m + CELL_M)
         move[1] = np.where(is_up, short, 0.0)
         ask = ~is_up & ((short > 0) | self._is_beside(points, apart_m))
@@ -116,7 +116,7 @@ class Ground:
         nearest = np.where(is_far, 0, nearest)
         out = self.outward[nearest]
         aside = apart_m - ((points - self.sides[nearest]) * out).sum(1)
-        # In the open only a side that is beside the point holds it, not one round a corner.
+        # In the open, only a side next to the point counts, not one round a corner.
         is_round = (short <= 0) & (distance > 2 * apart_m + CELL_M)
         aside = np.where(is_far | is_round, 0.0, np.maximum(aside, 0.0))
         is_up = (short > 0) & (is_far | (short < aside))

@@ -33,7 +33,7 @@ _INSIDE_M: Final = 0.03  # from the mattress's edge, where a duvet does not hang
 _BOARD_M: Final = 0.02  # above the mattress: what rises more at its foot is a board
 _SMALLER: Final = (1.0, 0.8, 0.6)  # sizes that clothes and throws are tried at, by the first
 _TRIES: Final = 4  # places on a seat where a throw is tried, at each size
-_FALLS: Final = 2  # of a throw; then it lies flat
+_FALLS: Final = 2  # attempts to drop a throw; then it is laid flat
 _MOST_RISE_M: Final = 0.1  # clothes fall only where nothing below them is higher than this
 _THREADS_M: Final = {"duvet": 0.065, "throw": 0.05, "clothes": 0.04}
 
@@ -50,7 +50,7 @@ def lay_duvet(
     ground, shift = _ground_under_cloth(
         placing, scene, grid, sides, rows, level, _THREADS_M["duvet"]
     )
-    # It hangs over each side as far as nothing stands beside the bed.
+    # It hangs over each side of the bed that has free space.
     out = float(rng.uniform(0.1, 0.26))
     free = [
         _is_free_beside_bed(ground, shift, side, rows, sign, placing)
@@ -116,10 +116,10 @@ def lay_throw(placing: Placing, scene: SceneTriangles, index: int, more: F64 | N
 def drop_clothes(
     placing: Placing, scene: SceneTriangles, at: F64, level: float, *, napkin: bool = False
 ) -> None:
-    """Let a garment, or a napkin, fall in a heap on what lies below a plan place.
+    """Drop a garment, or a napkin, in a heap at a plan position.
 
-    at: (2,) world (x, z), metres. level: world y of the support there, about. Refused, and counted, where
-    it would hang on what rises beside it. Cloth that fell before in this room is met.
+    at: (2,) world (x, z), metres. level: approximate world y of the support there. Refused, and
+    counted, if it would hang on an obstacle beside it. Collides with cloth dropped before in this room.
     """
     rng, style = placing.rng, placing.style
     near = np.array([[at[0] - 0.3, level, at[1] - 0.3], [at[0] + 0.3, level, at[1] + 0.3]])
@@ -169,7 +169,7 @@ def _ground_under_cloth(
     placing: Placing, scene: SceneTriangles, grid: PlanGrid, sides: tuple[float, float],
     rows: tuple[float, float], level: float, thread_m: float, more: F64 | None = None,
 ) -> tuple[Ground, tuple[float, float]]:  # fmt: skip
-    """What lies under cloth between sides and rows of a grid, and how far the frame is shifted."""
+    """Ground below cloth between sides and rows of a grid, and the shift of its frame."""
     reach = _AROUND_M
     corner = grid.plan_of((sides[0] - reach) / grid.cell_m, (rows[0] - reach) / grid.cell_m)
     n = [int(np.ceil((span[1] - span[0] + 2 * reach) / CELL_M)) for span in (rows, sides)]
@@ -190,7 +190,7 @@ def _is_free_beside_bed(
     ground: Ground, shift: tuple[float, float], side: float, rows: tuple[float, float], sign: int,
     placing: Placing,
 ) -> bool:  # fmt: skip
-    """Whether nothing stands beside the mattress where a duvet would hang."""
+    """True if the space beside the mattress, where a duvet would hang, is free."""
     x = side + shift[0] + sign * np.arange(0.12, 0.3, CELL_M)
     z = np.arange(rows[0], rows[1], CELL_M) + shift[1]
     heights = ground.at(*np.meshgrid(x, z))
@@ -211,7 +211,7 @@ def _has_footboard(
 
 
 def _gap_under_cloth(points: F64, ground: Ground) -> float:
-    """How far cloth (N, 3) hangs over what it fell on, whose edges it was kept off; metres."""
+    """Gap between cloth (N, 3) and its ground, ignoring the clearance at edges; metres."""
     below = highest_below(points[:, [0, 2]], ground.corners, points[:, 1] + _SUNK_M)
     gap = float((points[:, 1] - np.maximum(below, points[:, 1] - 1.0)).min()) - TOUCH_M
     return min(max(gap, 0.0), _MOST_GAP_M)
@@ -220,7 +220,7 @@ def _gap_under_cloth(points: F64, ground: Ground) -> float:
 def _laid_flat(
     placing: Placing, family: str, net: Net, ground: Ground, thick_m: float
 ) -> Net | None:
-    """What found no way to fall, flat; None where that is no way either. Either is counted."""
+    """Cloth that failed to drop, laid flat; None if that fails too. Both are counted."""
     made = lie_flat(net, ground, thick_m)
     placing.refuse(f"{family} found no way to fall, {'left out' if made is None else 'lies flat'}")
     return made
@@ -230,7 +230,7 @@ def _put_cloth(
     placing: Placing, family: str, made: Net, ground: Ground, thick_m: float, material: Material,
     nyu40: int,
 ) -> F64:  # fmt: skip
-    """Put cloth where it lies; its triangles (F, 3, 3)."""
+    """Add dropped cloth to the house; returns its triangles (F, 3, 3)."""
     surface = sheet_of(family, made, ground, thick_m)
     thing = standing_piece(family, [(surface, material)], group="blanket", nyu40=nyu40)
     points = surface.positions.astype(np.float64)

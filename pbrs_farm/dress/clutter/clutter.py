@@ -1,4 +1,4 @@
-"""The pass `clutter`: small things on every room's furniture, shelves, beds, seats and floor. Effects: changes the house."""
+"""The pass `clutter`: small items on every room's furniture, shelves, beds, seats and floor. Effects: changes the house."""
 
 from __future__ import annotations
 
@@ -37,15 +37,15 @@ _THROWN = 0.9  # chance that a sofa has a throw, at mess 1
 _SEAT_M = 0.72  # wide: a chair, wider ones are armchairs
 _ON_SEAT_M = 0.2  # distance of dropped clothes from a seat's back
 _LAID = 0.3  # chance that a dining table is laid
-_ON_TOP_M = 0.1  # a screen's foot at most this far above a piece stands on it
+_ON_TOP_M = 0.1  # maximum gap between a screen's foot and the piece below it, metres
 _SCREENS = ("laptop", "monitor")
 _SCREEN_WORDS = frozenset({"laptop", "computer", "monitor", "screen", "notebook", "pc", "imac"})
 
 
 def add_clutter(house: MutableHouse, catalogue: Catalogue, style: Style, share: float) -> None:
-    """Put small things where they belong, touching what they stand on and nothing else.
+    """Add small items where they belong, each touching only its support.
 
-    Every room draws from a generator of its own. What did not fit is counted, with its reason, in
+    Every room has its own random generator. Items without a place are counted by reason in
     house.refused.
     """
     space = house_space(house)
@@ -63,10 +63,10 @@ def add_clutter(house: MutableHouse, catalogue: Catalogue, style: Style, share: 
 
 
 def house_bias(rng: np.random.Generator) -> float:
-    """How much more or less than usual lies about in a home: ProcTHOR's Beta(3.5, 1.9) on -0.3..0.1, raised.
+    """Tidiness of a home: ProcTHOR's Beta(3.5, 1.9) on -0.3..0.1, raised.
 
-    Between -0.15 and 0.25, added to how full things are. One number a home, so that tidy and untidy
-    homes differ (Deitke et al. 2022, ProcTHOR).
+    Between -0.15 and 0.25, added to fill levels. One number per home, so that tidy and untidy homes
+    differ (Deitke et al. 2022, ProcTHOR).
     """
     return float(rng.beta(3.5, 1.9) * 0.4 - 0.15)
 
@@ -79,7 +79,7 @@ def _door_zone(room: RoomSpace) -> BaseGeometry:
 
 
 def _owners(scene: SceneTriangles, space: HouseSpace) -> dict[int, str]:
-    """The one room that furnishes each item: its own, else the first of those it stands in."""
+    """The room that fills each item: its own, else the first that contains it."""
     owners: dict[int, str] = {}
     for room in space.rooms:
         for index in room.items:
@@ -126,7 +126,7 @@ def _fill_item(
 
 
 def _has_screen(scene: SceneTriangles, room: RoomSpace, index: int) -> bool:
-    """Whether a laptop or a monitor of the home stands on items[index]."""
+    """True if the home has a laptop or monitor on items[index]."""
     low, high = scene.bounds[index]
     for k in room.items:
         middle, foot = scene.bounds[k].mean(0), scene.bounds[k][0, 1]

@@ -21,7 +21,7 @@ from pbrs_farm.geometry.scene_triangles import SceneTriangles
 
 CELL_M = 0.02
 LEAST_AIR_M = 0.6  # least free height above a mattress
-TOUCH_M = 0.0003  # soft things keep this from what they lie on
+TOUCH_M = 0.0003  # gap between soft items and their support, metres
 _SEAT_M = (0.22, 0.62)  # heights of seats above the floor
 _BACK_M = 0.15  # least height of a seat's back above the seat
 _LEAST_DEPTH_M = 0.3  # least depth of a seat
@@ -34,7 +34,7 @@ _SIDE_M = 0.04  # kept from arms
 def around_thing(
     scene: SceneTriangles, index: int, plan: F64, turn: F64, size: F64, level: float
 ) -> tuple[F64, bool]:
-    """Faces of items[index] under a thing (width, depth, height) at plan, and whether others meet it."""
+    """Faces of items[index] below an item (width, depth, height) at plan, and whether it hits others."""
     outline = np.array([[x, 0, z] for x in (-0.5, 0.5) for z in (-0.5, 0.5)]) * [
         size[0],
         1,
@@ -53,11 +53,10 @@ def around_thing(
 
 
 def put_as_it_is(placing: Placing, made: Model, surfaces: list[Surface]) -> None:
-    """Add a thing whose surfaces (in the order of its shape's) stand in the world already.
+    """Add an item whose surfaces (in the order of its shape's) have world coordinates already.
 
-    For cloth and cushions that were bent to where they lie: nothing moves or turns them again.
-    Their normals stay, and their materials are those of the shape. Not checked against other
-    things.
+    For cloth and cushions shaped to their support. Normals are kept, and materials are those of the
+    shape. Collisions are not checked.
     """
     piece, shape = made
     kept = tuple(
@@ -81,10 +80,10 @@ class Seat:
 
 
 def dress_seat(placing: Placing, scene: SceneTriangles, index: int, most: int) -> int:
-    """Lean up to `most` cushions on the back of items[index]; how many.
+    """Lean up to `most` cushions on the back of items[index]; returns their number.
 
-    0, with its reason counted, where no seat with a back is found. Cushions stand at the corners
-    first, then anywhere that is free along the back.
+    Returns 0, with the reason counted, without a seat with a back. Cushions go to the corners first,
+    then to any free place along the back.
     """
     rng = placing.rng
     seat = find_seat(scene, index, placing.room.floor_y)
@@ -114,10 +113,10 @@ def dress_seat(placing: Placing, scene: SceneTriangles, index: int, most: int) -
 
 
 def find_seat(scene: SceneTriangles, index: int, floor_y: float) -> Seat | None:
-    """The seat of items[index] and where its back begins; None where there is none.
+    """The seat of items[index] and the start of its back; None without a seat.
 
-    floor_y in world metres. The back is the side whose border is highest, the box's own back where
-    sides are alike.
+    floor_y in world metres. The back is the side with the highest border, the box's own back if sides
+    are alike.
     """
     corners = scene.of_item(index)
     points = corners.reshape(-1, 3)
@@ -217,7 +216,7 @@ def _settled(points: F64, corners: F64, turn: F64, centre: F64, thick: float) ->
 
 
 def _way_to_back(points: F64, corners: F64, turn: F64, centre: F64, thick: float) -> float | None:
-    """How far the cushion goes along its thickness until it rests on the back."""
+    """Distance along its thickness that the cushion moves to touch the back."""
     # In the cushion's own frame the back is a height field under its upper half.
     own = (corners - centre) @ turn
     upper = points[:, 2] < 0
@@ -229,7 +228,7 @@ def _way_to_back(points: F64, corners: F64, turn: F64, centre: F64, thick: float
 
 
 def _way_to_seat(placed: F64, corners: F64) -> float | None:
-    """How far the cushion falls, or is lifted where negative, to touch the seat."""
+    """Distance that the cushion falls to touch the seat; negative if it is lifted."""
     low = placed[:, 1].min()
     lower = placed[placed[:, 1] < low + 0.06]
     ground = highest_below(lower[:, [0, 2]], corners, low + 0.06)

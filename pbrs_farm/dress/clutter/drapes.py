@@ -1,9 +1,9 @@
-"""Cloth that falls on what lies below it: a net of threads that do not stretch; no effects.
+"""Simulate falling cloth as a net of inextensible threads; no effects.
 
-The net is relaxed by positions (Mueller et al., Position Based Dynamics, 2007): each step lets it
-fall, pulls its threads to their lengths and moves it out of what it met. It falls as a coarse net,
-gets its folds as a fine one, whose threads are then tightened (Provot, Deformation Constraints in a
-Mass-Spring Model, 1995). Equal arguments give equal bits.
+Position-based relaxation (Mueller et al., Position Based Dynamics, 2007): each step applies gravity,
+restores thread lengths and resolves collisions. The cloth falls as a coarse net and gets its folds
+as a fine one, whose threads are then tightened (Provot, Deformation Constraints in a Mass-Spring
+Model, 1995). Deterministic to the bit.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from pbrs_farm.dress.clutter.cloth_ground import TOUCH_M, Ground
 from pbrs_farm.furnishings.textiles.hanging_cloth import solid_sheet
 
 MOST_STRETCH: Final = 1.3  # of the 99th percentile of edges, over their lengths at rest
-_STEPS: Final = 50  # time steps until the cloth lies
+_STEPS: Final = 50  # time steps until the cloth is at rest
 _PULLS: Final = 2  # constraint iterations a step
 _FALL_M: Final = 0.004  # downward velocity that gravity adds in a step, metres a step
 _FASTEST_M: Final = 0.02  # a step: less than the thinnest board that holds cloth, grown
 _AIR: Final = 0.12  # share of velocity lost to drag in a step
-_GRIP: Final = 0.5  # share of a step along what it lies on that cloth does not slide
+_GRIP: Final = 0.5  # share of a step along the support that is lost to friction
 _SHEAR: Final = 0.6  # stiffness of diagonals; 1 in threads
 _PUSH: Final = 0.2  # stiffness of a thread in compression; 1 in tension
 _BEND: Final = 0.25  # stiffness between vertices two threads apart: resists bending
@@ -33,7 +33,7 @@ _SHARPEST: Final = 0.75  # vertices two threads apart come no nearer than this s
 _TIGHT: Final = 1.1  # stretch at which tightening ends
 _TIGHTENED: Final = 32  # iterations of tightening at most
 _STEEPEST: Final = 0.75  # rise of a fold over a thread
-_SMALLER: Final = (1.0, 0.8, 0.6, 0.4)  # shares of a cloth that are tried flat
+_SMALLER: Final = (1.0, 0.8, 0.6, 0.4)  # scales of a cloth to try when laid flat
 _LEVEL_M: Final = 0.005  # heights under flat cloth differ by less
 
 
@@ -68,7 +68,7 @@ class Net:
         ])  # fmt: skip
 
     def deepest_m(self, ground: Ground) -> float:
-        """How deep the deepest vertex, or middle of a thread, lies in the ground; metres."""
+        """Maximum penetration of vertices and thread centres into the ground; metres."""
         at = np.moveaxis(self.points, -1, 0)
         places = (at, (at[:, :-1] + at[:, 1:]) / 2, (at[:, :, :-1] + at[:, :, 1:]) / 2)
         return max(float(ground.depths(p).max()) for p in places)
@@ -118,7 +118,7 @@ def drape(
 
 
 def lie_flat(net: Net, ground: Ground, thick_m: float) -> Net | None:
-    """As much of a level net as lies flat where it is; None where too little does."""
+    """The largest scaled part of a net that can be laid flat in place; None if it is too small."""
     middle = net.points.mean((0, 1))
     for share in _SMALLER:
         points = middle + share * (net.points - middle)
@@ -154,9 +154,9 @@ def _fall(at: F64, thread_m: tuple[float, float], ground: Ground, apart: float) 
 
 
 def _lift_threads(at: F64, ground: Ground, apart: float) -> None:
-    """Move threads out of what lies between their ends, in place; apart: metres from it.
+    """Move threads off obstacles between their ends, in place; apart: clearance, metres.
 
-    Without it the back of a sofa passes between two threads, and edges look out of cloth.
+    Otherwise the back of a sofa would pass between two threads, and edges would stick out of cloth.
     """
     for view in (at, at.swapaxes(1, 2)):
         a, b = view[:, :-1], view[:, 1:]
@@ -167,9 +167,9 @@ def _lift_threads(at: F64, ground: Ground, apart: float) -> None:
 
 
 def _pull(at: F64, thread_m: tuple[float, float], push: float) -> None:
-    """Bring threads and diagonals to their lengths, in place; push: stiffness where they are shorter.
+    """Restore thread and diagonal lengths, in place; push: stiffness if they are too short.
 
-    Pairs that share no vertex are corrected at once.
+    Pairs without common vertices are corrected together.
     """
     for view, length in zip((at, at.swapaxes(1, 2)), thread_m, strict=True):
         for start in (0, 1):
@@ -236,7 +236,7 @@ def _ridges(
 
 
 def _drawn_in(rise: F64, axis: int, thread_m: float) -> F64:
-    """(R, C) where each vertex lies along an axis, in threads, when ridges have taken their part."""
+    """(R, C) coordinate of each vertex along an axis, in threads, after folds have consumed their length."""
     steep = np.clip(np.diff(rise, axis=axis) / thread_m, -_STEEPEST, _STEEPEST)
     run = np.sqrt(1 - steep**2).cumsum(axis)
     run = np.concatenate([np.zeros_like(run.take([0], axis)), run], axis)

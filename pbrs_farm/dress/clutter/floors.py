@@ -1,4 +1,4 @@
-"""Puts things on floors near walls: bins, bags, shoes, baskets, boxes, never in anybody's way. Effects: changes the house."""
+"""Put items on floors near walls: bins, bags, shoes, baskets, boxes, never in the way. Effects: changes the house."""
 
 from __future__ import annotations
 
@@ -31,31 +31,31 @@ from pbrs_farm.geometry.scene_triangles import SceneTriangles
 from pbrs_farm.geometry.swept import floor_swept
 
 _WALK_M = 0.65  # width of the ways that stay open
-_REACH_M = 0.35  # greatest distance from a thing's edge to a wall or furniture
+_REACH_M = 0.35  # maximum distance from an item's edge to a wall or furniture, metres
 _NEAR_WALLS_M = 0.5  # walls farther from the room's outline belong to other rooms
-_AT_WALL_M = 0.12  # greatest distance from a wall of what stands at walls
-_KEPT_M = 0.04  # least distance between things
+_AT_WALL_M = 0.12  # maximum distance from the wall for wall items, metres
+_KEPT_M = 0.04  # minimum distance between items, metres
 _DOOR_M = 1.0  # kept free before doors
 _OPEN_M = 0.6  # kept free before furniture with doors or drawers
 _OPENED = (CABINET, COUNTER, REFRIGERATOR, DRESSER, OTHERFURNITURE)
 _STANDS_M, _LEAST_FRONT_M = 0.15, 0.4  # above the floor, how low and how high it reaches
 _HEAD_M = 1.9
-_RUG_M = 0.03  # lower things may lie anywhere, but carry nothing
+_RUG_M = 0.03  # maximum height of flat items such as rugs, which may be anywhere but carry nothing
 
 
 @dataclass(slots=True)
 class _Floor:
-    # Cells of a room's floor while things are put there.
+    # Grid cells of a room's floor while items are placed.
     room: RoomSpace
     bitmap: FloorBitmap
     grid: PlanGrid  # of the same cells
-    free: Bools  # nothing stands there, no door needs it
-    walkable: Bools  # nothing stands there
+    free: Bools  # unoccupied, and not needed by a door
+    walkable: Bools  # unoccupied
     has_ways: bool  # one way joins the room's doors
 
 
 def fill_floor(placing: Placing, scene: SceneTriangles, space: HouseSpace, room: RoomSpace) -> int:
-    """Put things on the floor of a room; how many."""
+    """Put items on the floor of a room; returns their number."""
     rng = placing.rng
     # Draw what the room usually has before its floor is looked at, which costs more.
     wanted = [
@@ -89,7 +89,7 @@ def _floor_of_room(scene: SceneTriangles, space: HouseSpace, room: RoomSpace) ->
     plan = grid.centres()
     around = faces_around(scene, (), grid, y)
     hits, inside = around.hits, bitmap.inside & ~around.solid
-    # Rugs carry nothing, but one walks over them.
+    # Rugs carry nothing, but are walkable.
     stands = (hits.low < y + _HEAD_M) & (hits.high > y + 0.002)
     blocks = stands & (hits.high > y + _RUG_M)
     low, body = np.zeros(grid.shape, np.bool_), np.zeros(grid.shape, np.bool_)
@@ -112,7 +112,7 @@ def _floor_of_room(scene: SceneTriangles, space: HouseSpace, room: RoomSpace) ->
 
 
 def _before_front(item: Item, floor_y: float) -> BaseGeometry:
-    """Where one stands to open what has doors or drawers: a cupboard, a wardrobe, a cooker."""
+    """Standing area for opening doors or drawers: of a cupboard, a wardrobe, a cooker."""
     low_y, high_y = item.bounds[:, 1]
     is_closed = item.kind is ItemKind.OBJECT and item.nyu40 in _OPENED
     if not is_closed or low_y > floor_y + _STANDS_M or high_y < floor_y + _LEAST_FRONT_M:
@@ -135,7 +135,7 @@ def _put_on_floor(placing: Placing, floor: _Floor, made: Model, *, at_wall: bool
     if not at_wall:
         near &= to_wall <= least + _REACH_M
     else:
-        # Boxes and bins stand at walls; beside a chair they would stand in the middle of a room.
+        # Boxes and bins belong at walls; beside a chair they would be in the middle of a room.
         near &= _distance_to_walls(floor, distance >= least) <= least + _AT_WALL_M
     rows, columns = np.nonzero(near)
     for k in placing.rng.permutation(len(rows))[:12]:
@@ -178,7 +178,7 @@ def _disc(shape: tuple[int, int], row: int, column: int, radius_m: float) -> Boo
 
 
 def _turn_from_wall(to_wall: F64, row: int, column: int) -> float:
-    # Away from what is nearest: up the slope of the distance.
+    # Away from the nearest obstacle: up the gradient of the distance.
     i, j = slice(max(row - 2, 0), row + 3), slice(max(column - 2, 0), column + 3)
     part = to_wall[i, j]
     if min(part.shape) < 2:

@@ -1,4 +1,4 @@
-"""Puts small things into a room, on worktops or at given places. Effects: changes the house."""
+"""Put small items into a room, on worktops or at given positions. Effects: changes the house."""
 
 from __future__ import annotations
 
@@ -27,11 +27,10 @@ _MOST_IN_ROOM = 4
 
 
 def separate_pair(made: Model, rng: np.random.Generator, mess: float) -> Model:
-    """A pair of things that stand side by side, each turned and moved by itself.
+    """Turn and move the halves of a pair, such as shoes along x, independently.
 
-    Parts left and right of the middle move apart as wholes; mess 0 leaves them as they were. The
-    piece's size follows, and normals are dropped, since parts were turned. For shoes and the like
-    whose pair lies along x.
+    Parts left and right of the centre move as wholes; mess 0 leaves them unchanged. The piece's size is
+    updated, and normals are dropped, since parts were turned.
     """
     piece, shape = made
     turns, ahead = rng.normal(0, 0.6 * mess, 2), rng.normal(0, 0.06 * mess, 2)
@@ -67,10 +66,10 @@ def _connected_part_of_vertices(surface: Surface) -> NDArray[np.int64]:
 
 @dataclass(slots=True)
 class Placing:
-    """A room while small things are put into it, and what they are drawn from; state: what was put.
+    """A room while small items are added, and their source; state: the items placed so far.
 
-    `drop` and `drop_near` find a free place on a worktop, `put` takes a place that the caller knows to
-    be free. All draw from `rng`, so their order is part of the result.
+    `drop` and `drop_near` find a free place on a worktop, `put` takes a position known to be free. All
+    draw from `rng`, so their order affects the result.
     """
 
     house: MutableHouse
@@ -79,18 +78,17 @@ class Placing:
     style: Style
     rng: np.random.Generator
     share: float
-    bias: float = 0.0  # of the home: how much more or less than usual lies about
+    bias: float = 0.0  # tidiness offset of the home, added to fill levels
     kind: RoomKind = RoomKind.OTHER  # what the room is for
     taken: Counter[str] = field(default_factory=Counter)  # in this room, by kind
     laid: list[F64] = field(
         default_factory=list
-    )  # triangles of what fell here: cloth lies on cloth
+    )  # triangles of dropped cloth, which later cloth may fall on
 
     def put(self, made: Model, at: F64, turn_rad: float) -> None:
-        """Add the thing with the middle of its base at (3,) world metres, turned about +y; unchecked.
+        """Add the item with its base centred at (3,) world metres, turned about +y.
 
-        Whoever calls has asked whether the place is free: nothing is tested here, and nothing is
-        marked as taken.
+        The caller has checked that the place is free: nothing is tested here, and no cells are marked.
         """
         piece, shape = made
         low, high = shape.bounds
@@ -111,13 +109,13 @@ class Placing:
         ]  # fmt: skip
 
     def refuse(self, reason: str) -> None:
-        """Count a thing that was not put down."""
+        """Count an item that was not placed."""
         self.house.refused[f"{PASS}: {reason}"] += 1
 
     def drop(self, top: Worktop, made: Model, *, faces_anywhere: bool, depth_pull: float) -> bool:
-        """Put the thing where it fits on the worktop; False where it fits nowhere.
+        """Put the item where it fits on the worktop; False if it fits nowhere.
 
-        depth_pull: how strongly it is drawn to the back (> 0) or to the front (< 0), per metre.
+        depth_pull: preference for the back (> 0) or the front (< 0), per metre.
         """
         size = np.asarray(made[0].size)[[0, 2, 1]]
         low, high = made[1].bounds
@@ -141,10 +139,9 @@ class Placing:
         return True
 
     def drop_near(self, top: Worktop, made: Model, at: F64, *, turn_rad: float = 0.0) -> bool:
-        """Put the thing at a plan place (2,), or within 6 cm of it; False where it does not fit.
+        """Put the item at a plan position (2,), or within 6 cm of it; False if it does not fit.
 
-        at holds world x and z. The spot is taken from the worktop where it fits; nothing is counted
-        where it does not.
+        at: world x and z. Occupies the worktop's cells on success; failures are not counted.
         """
         low, high = made[1].bounds
         # Of the free spots take the nearest; n: the rows and columns of cells that it covers.
@@ -163,10 +160,10 @@ class Placing:
 
 
 def take_for_room(placing: Placing, kind: str) -> Model | None:
-    """A thing of that kind; None, with its reason counted, where the room has enough of them.
+    """An item of that kind; None, with the reason counted, if the room has enough of them.
 
-    A thing that is taken counts even if it is then not put down. Draws from the placing's generator
-    only where the room may have one more.
+    An item counts even if it is not placed afterwards. Draws from the placing's generator only if the
+    room may have one more.
     """
     if placing.taken[kind] >= CLUTTER.most_in_room.get(kind, _MOST_IN_ROOM):
         placing.refuse(f"enough of {kind} in the room")

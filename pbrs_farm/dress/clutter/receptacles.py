@@ -1,4 +1,4 @@
-"""What a support is to who lives there, by receptacles.csv, and what lies on it, by shares.csv; no effects."""
+"""Function of a support, by receptacles.csv, and its typical contents, by shares.csv; no effects."""
 
 from __future__ import annotations
 
@@ -76,11 +76,11 @@ def _rules() -> tuple[_ReceptacleRule, ...]:
 
 
 def can_hold(item: Item) -> bool:
-    """Whether things are put on furniture of this kind; seats and beds are for cushions."""
+    """True if small items are put on this kind of furniture; seats and beds only get cushions."""
     if item.kind is not ItemKind.OBJECT or item.nyu40 not in _HOLDERS:
         return False
     low, high = item.bounds
-    # Small things hold nothing, and neither do thin ones as rails and radiators.
+    # Small furniture holds nothing, nor do thin shapes such as rails and radiators.
     return bool(min(high[0] - low[0], high[2] - low[2]) > 0.15 and (high - low).max() > 0.3)
 
 

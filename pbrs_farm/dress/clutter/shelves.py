@@ -30,7 +30,7 @@ class ShelfPlan:
 
 
 def plan_shelves(placing: Placing, kind: RoomKind) -> ShelfPlan:
-    """How the shelves of one bookcase are filled, by the room it stands in."""
+    """Fill plan for the shelves of one bookcase, by its room."""
     rng = placing.rng
     others, books = "decor", float(rng.uniform(0.08, 0.26))
     if kind is RoomKind.KITCHEN or (kind is RoomKind.DINING and rng.random() < 0.4):
@@ -45,10 +45,10 @@ def plan_shelves(placing: Placing, kind: RoomKind) -> ShelfPlan:
 
 
 def fill_shelf(placing: Placing, top: Worktop, plan: ShelfPlan) -> int:
-    """Fill one shelf from left to right; how many things were put there.
+    """Fill one shelf from left to right; returns the number of items.
 
-    Every thing put down takes its cells from the worktop. Gaps are left by chance, so a full shelf
-    is no error and an empty one neither.
+    Every placed item occupies its cells of the worktop. Gaps are random, so full and empty shelves are
+    both valid.
     """
     rng = placing.rng
     n, column = 0, top.columns[0]
@@ -119,9 +119,9 @@ def _put_other(
 def _leftmost(
     placing: Placing, top: Worktop, column: int, row: list[Model], inset_m: float
 ) -> int | None:
-    """Put things that touch side by side as far left as they fit; the next free column, or None.
+    """Put a row of touching items as far left as it fits; the next free column, or None.
 
-    Their fronts stand in one line, inset_m behind the shelf's edge where there is room.
+    Their fronts are aligned, inset_m behind the shelf's edge if there is space.
     """
     sizes = np.array([made[1].bounds[1] - made[1].bounds[0] for made in row])
     width = float(sizes[:, 0].sum() + _TOUCH_M * (len(row) - 1))
@@ -140,7 +140,7 @@ def _leftmost(
 
 
 def _put_row(placing: Placing, top: Worktop, spot: TopSpot, row: list[Model], sizes: F64) -> None:
-    # Line the things up from the spot's left, their fronts on its front.
+    # Line the items up from the left end, aligned at the front.
     cell, turn = top.grid.cell_m, top.grid.turn_rad
     front = (spot.row + spot.n_rows) * cell - 0.5 * cell
     x = spot.column * cell + 0.5 * cell

@@ -1,4 +1,4 @@
-"""Kinds of small things and what a home takes them from: the catalogue's groups, or generators; state: what was taken."""
+"""Sources of a home's small items: the catalogue's groups, or generators; state: items taken so far."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from pbrs_farm.furnishings.things.books import magazines, open_book, stack_of_bo
 from pbrs_farm.furnishings.things.things import THINGS
 from pbrs_farm.home.room_use import RoomKind
 
-# Faces of one small thing of a catalogue, where its kind gives no other limit.
+# Maximum faces of one small catalogue item, unless its kind has another limit.
 _MOST_FACES: Final = 1500
-_MOST_OF_MODEL: Final = 12_000  # faces of all things of one model in a home
+_MOST_OF_MODEL: Final = 12_000  # maximum faces of all items of one model in a home
 _DESIGNS: Final = 1  # models of a kind in one home
-_MOST_TRIES: Final = 2  # models that are loaded to find them
+_MOST_TRIES: Final = 2  # models to load before giving up
 
 
 class ThingKind(Record):
@@ -38,31 +38,30 @@ class ThingKind(Record):
     made_share: float = 0.5  # chance that one is generated, where the catalogue has it, too
 
 
-# Of the generated things, those that a catalogue has, too, or that may face anywhere.
+# Generated items that catalogues have too, or that may face anywhere.
 _KINDS: Final = {
     row.kind: row for row in read_csv(Path(__file__).with_name("kinds.csv"), ThingKind)
 }
 
 
 class Stock:
-    """What a home's small things are taken from: one model of each kind, as people own sets."""
+    """Source of a home's small items: one model of each kind, as people own sets."""
 
     def __init__(self, catalogue: Catalogue, covers: Covers, seed: int) -> None:
         self.covers = covers
         self._catalogue = catalogue
         self._seed = seed
         self._designs: dict[str, list[Model]] = {}
-        self._faces: Counter[str] = Counter()  # of the things taken so far, by piece
+        self._faces: Counter[str] = Counter()  # of the items taken so far, by piece
 
     def take(self, rng: np.random.Generator, kind: str, style: Style) -> Model | None:
-        """A thing of that kind; None where there is none that can be used.
+        """An item of that kind; None if there is no usable one.
 
-        Books and magazines are always generated; other things are taken from the catalogue or
-        generated. A design with many triangles is taken few times a home, since all of them are
-        rendered.
+        Books and magazines are always generated; other items are taken from the catalogue or generated.
+        Designs with many triangles are used few times per home, to limit the scene's size.
         """
         if kind == "book":
-            # One or a pile; now and then one lies open.
+            # One or a pile; occasionally one is open.
             n = int(rng.choice([0, 1, 1, 2, 3, 4, 5]))
             return stack_of_books(rng, self.covers, n) if n else open_book(rng, self.covers)
         if kind == "magazines":
@@ -104,7 +103,7 @@ class Stock:
 
 
 def is_round(kind: str) -> bool:
-    """Whether things of that kind may face anywhere."""
+    """True if items of that kind may face anywhere."""
     return kind in _KINDS and _KINDS[kind].is_round
 
 

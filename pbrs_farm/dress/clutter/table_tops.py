@@ -1,4 +1,4 @@
-"""Puts things on tables, desks, counters and chests, as the table of shares says, the largest first. Effects: changes the house."""
+"""Put items on tables, desks, counters and chests by the table of shares, the largest first. Effects: changes the house."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ _USUAL_M2 = 0.4  # usual area of receptacles that clutter.toml does not name
 
 
 def fill_top(placing: Placing, top: Worktop, receptacle: str, there: Collection[str] = ()) -> int:
-    """Put things on the worktop as the table says; how many were put there.
+    """Put items on the worktop by the table of shares; returns their number.
 
-    there: kinds that the home has there already.
+    there: kinds already on it in the source.
     """
     rng = placing.rng
     factor = min(top.support.area / CLUTTER.usual_m2.get(receptacle, _USUAL_M2), _MOST_FACTOR)
@@ -44,9 +44,9 @@ def fill_top(placing: Placing, top: Worktop, receptacle: str, there: Collection[
 
 
 def set_table(placing: Placing, top: Worktop, chairs: Sequence[F64], scene: SceneTriangles) -> int:
-    """Lay a place before each chair (plan points (2,)): a plate, a glass to its right; how many.
+    """Lay a place for each chair (plan positions (2,)): a plate, a glass to its right; returns their number.
 
-    After a meal things stand where hands left them, and a napkin lies beside a plate.
+    After a meal, items are displaced, and a napkin is beside a plate.
     """
     rng, is_eaten = placing.rng, placing.rng.random() < placing.house.mess
     plate = placing.stock.take(placing.rng, "one_plate", placing.style)
@@ -57,7 +57,7 @@ def set_table(placing: Placing, top: Worktop, chairs: Sequence[F64], scene: Scen
     cells = top.grid.plan_of(columns + 0.5, rows + 0.5)
     middle, n = cells.mean(0), 0
     for chair in chairs:
-        # Go in from the table's edge that is nearest to the chair.
+        # Move inwards from the table's edge nearest to the chair.
         edge = cells[int(np.argmin(((cells - chair) ** 2).sum(1)))]
         inward = middle - edge
         if np.linalg.norm(chair - edge) > _CHAIR_M or np.linalg.norm(inward) < 0.2:
@@ -78,10 +78,9 @@ def set_table(placing: Placing, top: Worktop, chairs: Sequence[F64], scene: Scen
 
 
 def put_all(placing: Placing, top: Worktop, kinds: list[str]) -> int:
-    """Put a thing of each of the kinds on the worktop, the largest first.
+    """Put an item of each kind on the worktop, the largest first.
 
-    Kinds of which the room has enough, and things that no longer fit, are left out and counted with
-    their reason.
+    Kinds of which the room has enough, and items without a place, are left out and counted by reason.
     """
     things: list[tuple[str, Model]] = []
     for kind in kinds:

@@ -1,4 +1,4 @@
-"""What a dressed house must keep, measured on its meshes; what breaks it is taken out again."""
+"""Invariants of a dressed house, measured on meshes; violating items are removed again."""
 
 from pbrs_farm.dress.gates.as_rendered import refit_to_walls
 from pbrs_farm.dress.gates.bodies import piece_id

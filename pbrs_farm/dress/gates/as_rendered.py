@@ -1,7 +1,7 @@
-"""Gates on the house as it is rendered: what lost its wall in repair hangs on the next one, or goes.
+"""Gates after repair: items whose wall was removed move to the next wall, or are removed.
 
-No effects. Repair drops and moves walls: where rooms overlap, where a wall is drawn twice. What was
-hung on such a wall floats before the one that is left, or lies inside of it.
+No effects. Repair drops and moves walls: where rooms overlap, or a wall is duplicated. Items hung on
+such a wall would float in front of the remaining one, or be inside it.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ from pbrs_farm.dress.report import DressReport
 from pbrs_farm.dress.walls.hanging import GAP_M
 from pbrs_farm.geometry.heights import highest_below
 
-_REACH_M: Final = 0.12  # a hung thing is moved at most this far to another wall
-_BACK_M: Final = 0.003  # depth of the layer at a thing's back that counts as touching
+_REACH_M: Final = 0.12  # maximum distance that a hung item is moved to another wall, metres
+_BACK_M: Final = 0.003  # depth of the layer at an item's back that counts as touching, metres
 _MOST_POINTS: Final = 200
 _FLAT_M: Final = 0.0015  # greatest difference among a back's distances to a wall
 _SEES_WALL: Final = 0.95  # share of a back that must have the wall behind it
@@ -38,11 +38,11 @@ _SEES_WALL: Final = 0.95  # share of a back that must have the wall behind it
 def refit_to_walls(
     dressed: House, n_source: int, repaired: House, report: DressReport, pieces: Mapping[str, Piece]
 ) -> tuple[House, DressReport]:
-    """The dressed house without what nothing holds in the repaired one, and its report.
+    """The dressed house without items that have no support in the repaired one, and its report.
 
-    The same objects where everything is held. What hung on a wall that repair moved hangs on the
-    wall that is left, where that is within 12 cm. n_source: items of the house as it was read,
-    before what was added. pieces: of what was added, by id.
+    Returns the same objects if everything is supported. Items hung on a wall that repair moved are
+    moved to the remaining wall, if it is within 12 cm. n_source: number of items before dressing.
+    pieces: of the added items, by id.
     """
     own = {i.id for i in dressed.items[n_source:] if not i.kind.is_structure}
     added = [item for item in repaired.items if item.id in own]
@@ -81,9 +81,9 @@ def refit_to_walls(
 
 
 def _is_held(bodies: Sequence[Body]) -> bool:
-    """Whether what hangs touches what it hangs on, and no wall stands in anything that was added.
+    """True if hung items touch their support, and no wall penetrates an added item.
 
-    What else things stand on, they themselves, repair leaves where it was.
+    Repair moves neither the items nor any other support.
     """
     asked = [k for k, b in enumerate(bodies) if b.is_new and _hangs(b)]
     plumb = Plumb(bodies, asked)
@@ -102,7 +102,7 @@ def _hangs(body: Body) -> bool:
 
 
 def _hung_anew(house: MutableHouse, bodies: Sequence[Body]) -> dict[str, F64]:
-    """By id, how things that hang and are not held were moved to a wall; they are moved in the house."""
+    """Move hung items without support to a wall, in place; returns the offsets by id."""
     walls = [b for b in bodies if b.item.kind is ItemKind.WALL]
     asked = [k for k, b in enumerate(bodies) if b.is_new and _hangs(b)]
     moved: dict[str, F64] = {}
@@ -118,10 +118,10 @@ def _hung_anew(house: MutableHouse, bodies: Sequence[Body]) -> dict[str, F64]:
 
 
 def _to_wall(item: Item, walls: Sequence[Body]) -> F64 | None:
-    """(3,) metres that bring an item's back to the wall behind it; None where there is none."""
+    """(3,) offset in metres that brings an item's back to the wall behind it; None without a wall."""
     assert item.box is not None
     right, front = item.box.axes[:, 0], item.box.axes[:, 2]
-    # Lay the item on its back: what is below it then is the wall.
+    # Lay the item on its back: the wall is then below it.
     turn = np.stack([right, front, np.cross(right, front)])
     low, high = item.bounds
     lows, highs = boxes_of(walls)

@@ -1,4 +1,4 @@
-"""The things of a house as the gates see them: triangles, bounds, connected shells; no effects."""
+"""The items of a house as seen by the gates: triangles, bounds, connected shells; no effects."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Shell:
 
 @dataclass(slots=True, eq=False)
 class Body:
-    """An item: what it is made of, and whether dressing put it there."""
+    """An item with its geometry, and whether dressing added it."""
 
     index: int  # in MutableHouse.items
     item: Item
@@ -46,13 +46,13 @@ class Body:
     low: F64  # (3,)
     high: F64
     is_new: bool  # added, or another mesh than the source's
-    was: Item | None  # what stood there in the source; None for what was added
+    was: Item | None  # the replaced item of the source; None for added items
     piece: Piece | None  # it was made from
     _shells: list[Shell] | None = field(default=None, repr=False)
 
     @property
     def group(self) -> str:
-        """What it is, as the catalogue calls it; "" for an item of the source."""
+        """Catalogue group of the item; "" for an item of the source."""
         return self.piece.group if self.piece else ""
 
     @property
@@ -71,7 +71,7 @@ def bodies_of(
 ) -> list[Body]:
     """A body for each item of the house that has triangles, in order.
 
-    pieces: by id. known: bodies by the id of their item, which are taken as they are.
+    pieces: by id. known: reusable bodies by the id of their item.
     """
     found = []
     n_source = len(house.source.items)
@@ -102,10 +102,10 @@ def piece_id(item: Item) -> str:
 
 
 def has_same_mesh(a: Item, b: Item) -> bool:
-    """Whether two items have the same triangles, whatever they are made of and in which order.
+    """True if two items have the same triangles, whatever their materials and order.
 
-    Equal to the bit: a door that was parted into leaf and frame is equal, one that was moved is
-    not. Normals and texture coordinates are not compared.
+    Equal to the bit: a door split into leaf and frame is equal, a moved one is not. Normals and
+    texture coordinates are not compared.
     """
     if a is b or a.surfaces is b.surfaces:
         return True
@@ -150,7 +150,7 @@ def _shell(vertices: F64, faces: Faces) -> Shell:
     vertices, faces = vertices[used], numbers.reshape(-1, 3)
     low, high = points_bounds(vertices)
     is_closed = edges_are_paired(faces)
-    # Turn a closed shell that is inside out; one without volume is a sheet.
+    # Flip a closed shell that is inside out; one without volume is a sheet.
     if is_closed:
         volume = signed_volume(vertices[faces], low)
         is_closed = abs(volume) > 1e-9

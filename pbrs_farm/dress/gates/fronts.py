@@ -1,4 +1,4 @@
-"""Gate: nothing new stands where doors and drawers of furniture open, measured on meshes; no effects.
+"""Gate: no added item blocks doors and drawers of furniture, measured on meshes; no effects.
 
 The bodies are those of the space, in its order.
 """
@@ -22,11 +22,11 @@ LEAST_OPEN: Final = 0.9  # share of its way that a front must have free
 
 
 def blocked_fronts(_space: HouseSpace, bodies: Sequence[Body]) -> tuple[int, list[Blocked]]:
-    """How many fronts of furniture something new stands near, and the new bodies before them.
+    """Number of furniture fronts near added items, and the added bodies that block them.
 
-    A front is a door or drawer of furniture; doorways and windows have gates of their own. It must
-    have nine tenths of its way free of what is new. Chairs are pushed aside. A new thing whose own
-    front meets what was there before goes itself.
+    A front is a door or drawer of furniture; doorways and windows have separate gates. Nine tenths of
+    its way must be free of added items; chairs can be pushed aside. If a new item's own door hits
+    existing furniture, the new item is removed.
     """
     n, found = 0, []
     scene = SceneTriangles([b.item for b in bodies])
@@ -57,7 +57,7 @@ def blocked_fronts(_space: HouseSpace, bodies: Sequence[Body]) -> tuple[int, lis
 
 
 def _goes(bodies: Sequence[Body], own: int, other: int) -> int:
-    """Which of two goes: what came later of new things."""
+    """The one of two bodies to remove: the later of the added ones."""
     if not bodies[other].is_new:
         return own
     return max(own, other) if bodies[own].is_new and bodies[own].was is None else other

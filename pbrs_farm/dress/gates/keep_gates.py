@@ -1,6 +1,6 @@
-"""Measure a house by its gates, take out what breaks one, and measure again; state: the house is changed.
+"""Measure a house by its gates, remove violating items, and measure again; state: the house is changed.
 
-What was added is taken out; what replaced a thing of the source goes, and that thing comes back.
+Added items are removed; replaced items are restored to those of the source.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from pbrs_farm.dress.report import Gate
 from pbrs_farm.dress.space import HouseSpace, floor_space
 
 _ROUNDS: Final = 12
-_LARGE_M: Final = 0.35  # smaller added things off the floor stand in nobody's way
+_LARGE_M: Final = 0.35  # smaller added items off the floor block no way, metres
 _ON_FLOOR_M: Final = 0.1
 _WAYS: Final = {
     "doors": blocked_doors, "windows": covered_windows, "path": closed_ways, "fronts": blocked_fronts,
@@ -49,7 +49,7 @@ _REASONS: Final = {
 
 @dataclass(slots=True)
 class _Memory:
-    """What was measured of items that have not changed since. Items are held, so ids stay theirs."""
+    """Cached measurements of unchanged items. Items are referenced, so their ids stay unique."""
 
     bodies: dict[int, Body] = field(default_factory=dict)  # by id of the item
     apart: set[tuple[int, int]] = field(default_factory=set)  # ids of items that share nothing
@@ -61,12 +61,12 @@ class _Memory:
 def keep_gates(
     house: MutableHouse, pieces: Mapping[str, Piece], names: Sequence[str] = _NAMES
 ) -> tuple[Gate, ...]:
-    """Take out of the house what breaks a gate, until nothing does; the gates with what they counted.
+    """Remove items from the house until no gate is violated; returns the gates with their counts.
 
-    Only what dressing added or replaced is taken out: added things go, replaced things of the source
-    come back. Each removal may unhold others, so all are measured again, 12 rounds at most. pieces: the
-    catalogue's and generated ones by id, which say how a thing is held. names: of the gates to keep.
-    What an earlier call measured of items that are still the same objects is not measured again.
+    Only additions and replacements of dressing are removed: replaced items of the source are restored.
+    A removal may leave others without support, so all are measured again, in at most 12 rounds.
+    pieces: the catalogue's and generated ones by id, which define the kind of support. names: of the
+    gates to check. Measurements of unchanged items are reused between calls.
     """
     memory = house.kept.get("gates")
     if not isinstance(memory, _Memory):
@@ -100,13 +100,13 @@ def _measure_gates(
     checked["must_haves"], broken["must_haves"] = _changed_class(house)
     if not any(body.is_new for body in bodies):
         return checked, broken
-    # Of two things that share space the one that came later goes.
+    # Of two overlapping items the later one is removed.
     for i, j in near_pairs(bodies):
         checked["penetration"] += 1
         if not _are_apart(bodies[i], bodies[j], memory):
             broken["penetration"].append(bodies[j if bodies[j].is_new else i].index)
     checked["support"], broken["support"] = _unsupported(bodies, memory)
-    # What is free stays free when things are taken out.
+    # Free ways stay free when items are removed.
     ways = {name: gate for name, gate in _WAYS.items() if name in names}
     if any(name not in memory.free for name in ways):
         space, large = _space(house, bodies)
@@ -119,9 +119,9 @@ def _measure_gates(
 
 
 def _space(house: MutableHouse, bodies: list[Body]) -> tuple[HouseSpace, list[Body]]:
-    """The space of the house without small things, and the bodies in it, as numbered there.
+    """The space of the house without small items, and its bodies in the same order.
 
-    What is small and stands on other things is in nobody's way, and there are hundreds.
+    Hundreds of small items on furniture block no way.
     """
     floors = np.array([room.floor_y for room in house.source.rooms] or [0.0])
     large = [
@@ -137,7 +137,7 @@ def _space(house: MutableHouse, bodies: list[Body]) -> tuple[HouseSpace, list[Bo
 
 
 def _bodies(house: MutableHouse, pieces: Mapping[str, Piece], memory: _Memory) -> list[Body]:
-    """The house's bodies, with the shells that were found before."""
+    """The house's bodies, with cached shells."""
     fresh = bodies_of(house, pieces, memory.bodies)
     memory.bodies |= {id(b.item): b for b in fresh}
     return fresh
@@ -153,10 +153,10 @@ def _are_apart(a: Body, b: Body, memory: _Memory) -> bool:
 
 
 def _unsupported(bodies: list[Body], memory: _Memory) -> tuple[int, list[int]]:
-    """How many new bodies there are, and the indices of those that nothing holds."""
+    """Number of added bodies, and indices of those without support."""
     there = {id(b.item) for b in bodies}
     new = [k for k, b in enumerate(bodies) if b.is_new]
-    # Measure what was not, and what has lost all that held it.
+    # Measure new bodies, and those that lost all their supports.
     asked = [k for k in new if not there.intersection(memory.supports.get(id(bodies[k].item), ()))]
     if not asked:
         return len(new), []
@@ -165,7 +165,7 @@ def _unsupported(bodies: list[Body], memory: _Memory) -> tuple[int, list[int]]:
     for number, by in found.items():
         memory.supports[id(bodies[number].item)] = tuple(id(bodies[b].item) for b in by.by)
     bad = [k for k, by in found.items() if not by.is_good]
-    # What has another model than in the source may be held as loosely as it was there.
+    # A replacement may have the same gap to its support as the original.
     return len(new), [
         bodies[k].index
         for k in bad
@@ -175,7 +175,7 @@ def _unsupported(bodies: list[Body], memory: _Memory) -> tuple[int, list[int]]:
 
 
 def _changed_class(house: MutableHouse) -> tuple[int, list[int]]:
-    """How many things of the source there are, and which are no longer of their class."""
+    """Number of items of the source, and those whose class has changed."""
     was = house.source.items
     return len(was), [
         k for k, (a, b) in enumerate(zip(was, house.items, strict=False)) if a.nyu40 != b.nyu40
@@ -196,17 +196,16 @@ def _take_out(house: MutableHouse, out: Mapping[int, str]) -> None:
 
 
 def pass_that_added(item: Item) -> str:
-    """The pass that added an item, read from its id `dress-<pass>-<n>`.
+    """The pass that added an item, from its id `dress-<pass>-<n>`.
 
-    "dress" for an id of another form. Only of items that dressing added: those of the source have
-    ids of their own.
+    "dress" for an id of another form. Only for added items: those of the source have other ids.
     """
     words = item.id.split("-")
     return words[1] if len(words) > 2 and words[0] == "dress" else "dress"
 
 
 def group_of(item: Item, pieces: Mapping[str, Piece]) -> str:
-    """What an added item is, as the catalogue calls it."""
+    """Catalogue group of an added item."""
     name = piece_id(item)
     piece = pieces.get(name)
     return piece.group if piece is not None else name.rpartition("#")[2]

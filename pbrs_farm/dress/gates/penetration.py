@@ -1,7 +1,7 @@
-"""Gate: no two things share more than 1 cm, measured on their meshes; no effects.
+"""Gate: no two items overlap by more than 1 cm, measured on their meshes; no effects.
 
-What two closed shells share is computed as a solid. Of an open one, points on each mesh are looked
-for inside the other. Boxes only say which pairs need no measuring.
+For two closed shells the overlap is computed as a solid. For open meshes, surface samples of each
+are tested against the other. Boxes only exclude pairs.
 """
 
 from __future__ import annotations
@@ -27,11 +27,10 @@ _BEHIND_CURTAINS = (ItemKind.WALL, ItemKind.WINDOW, ItemKind.DOOR)
 
 
 def near_pairs(bodies: Sequence[Body]) -> Iterator[tuple[int, int]]:
-    """Pairs of numbers, ascending, of a new body and any other that boxes cannot tell apart.
+    """Pairs of indices, ascending, of an added body and any other with an overlapping box.
 
-    A pair of two new bodies comes once, and pairs of two old ones never. What may share space
-    (`is_allowed`) and kinds that are not measured are left out. Whether the meshes do meet is still
-    to be asked.
+    Pairs of two added bodies occur once, pairs of two source items never. Allowed overlaps
+    (`is_allowed`) and unmeasured kinds are skipped. Whether the meshes touch is not tested here.
     """
     low, high = boxes_of(bodies)
     measured = np.array([b.item.kind not in _UNMEASURED for b in bodies], bool)
@@ -52,10 +51,9 @@ def _box_depth(low: F64, high: F64, lows: F64, highs: F64) -> F64:
 
 
 def is_allowed(a: Body, b: Body) -> bool:
-    """Whether two things may share space: rugs under legs, curtains against walls and windows.
+    """True if two items may overlap: rugs under legs, curtains against walls and windows.
 
-    A rug only where it is new; curtains and blinds against walls, doors or windows behind them. The
-    order of the two is no matter.
+    Rugs only if added; curtains and blinds only with walls, doors or windows behind them. Symmetric.
     """
     for one, other in ((a, b), (b, a)):
         if one.is_new and one.item.nyu40 == FLOOR_MAT:
@@ -93,7 +91,7 @@ def _depth_of_shells(a: Shell, b: Shell, solids: Solids) -> float:
         depth = max(_deepest(_points_in(a, b), b), _deepest(_points_in(b, a), a))
     if depth > MOST_M:
         return depth
-    # Plates that cross share little, and no point of them lies deep.
+    # Crossing plates have a small overlap without deep points.
     return max(depth, crossing_m(a, b, MOST_M), crossing_m(b, a, MOST_M))
 
 

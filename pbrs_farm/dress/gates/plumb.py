@@ -1,4 +1,4 @@
-"""Which faces lie above and below places of a house, and whose; state: grids that were asked for are kept."""
+"""Faces above and below positions of a house, with their items; state: a cache of grids."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from pbrs_farm.geometry.heights import heights_in
 _CELLS_M: Final = (0.1, 1.0)
 _MANY_CELLS: Final = 400  # a triangle that covers more cells goes into the next coarser grid
 _NEAR_M: Final = 0.5  # faces are looked for this far above and below a body
-_STEEP: Final = 1e-9  # square metres in plan: a triangle with less stands upright
+_STEEP: Final = 1e-9  # maximum plan area of a vertical triangle, square metres
 _EDGE: Final = 1e-6  # tolerance at a triangle's edge, as a share of its extent
 # Margin around a triangle's bounds, as a share of its extent: far above _EDGE and rounding.
 _SPARE: Final = 1e-3
@@ -28,7 +28,7 @@ Ints = NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Hits:
-    """What the upright lines through places meet."""
+    """Intersections of vertical lines with faces."""
 
     place: Ints  # (N,) number of the place
     y: F64  # (N,) where its line meets a face
@@ -36,9 +36,9 @@ class Hits:
 
 
 class Plumb:
-    """Upright lines through all faces of bodies that do not stand upright themselves.
+    """Vertical lines through all faces of bodies that are not vertical.
 
-    asked: numbers of bodies; what lies neither above nor below one of them is left out.
+    asked: indices of bodies; faces neither above nor below one of them are skipped.
     """
 
     def __init__(self, bodies: Sequence[Body], asked: Sequence[int]) -> None:

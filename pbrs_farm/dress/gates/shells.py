@@ -12,14 +12,16 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.mesh import area_vectors, cross_products, triangle_bounds
 from pbrs_farm.dress.gates.bodies import Shell
 
-_STEEP: Final = 0.5  # cosine of edge and normal: an edge that grazes a round thing crosses nothing
-_PAIRS: Final = 1_000_000  # edge-face pairs tested at once: bounds memory
+_STEEP: Final = (
+    0.5  # minimum cosine of edge and normal: an edge that grazes a round shape crosses nothing
+)
+_PAIRS: Final = 1_000_000  # edge-face pairs per batch, to bound memory
 
 
 def crossing_m(a: Shell, b: Shell, least_m: float) -> float:
-    """The most of an edge of a that lies on either side of a face of b, metres; 0 for none.
+    """Largest length of an edge of a on both sides of a face of b, metres; 0 for none.
 
-    Edges shorter than twice least_m are left out.
+    Edges shorter than twice least_m are skipped.
     """
     start, end = _edges_near(a, b, 2 * least_m)
     corners = b.corners
@@ -62,7 +64,7 @@ def _either_side(start: F64, end: F64, corners: F64) -> F64:
     t = ((corners[:, 0] - start) * normal).sum(1) / np.where(steep, slope, 1.0)
     place = start + t[:, None] * along
     inside = steep & (t > 0) & (t < 1)
-    # A place inside lies on the same side of all three edges.
+    # A point inside is on the same side of all three edges.
     for k in range(3):
         edge = corners[:, (k + 1) % 3] - corners[:, k]
         inside &= (cross_products(edge, place - corners[:, k]) * normal).sum(1) >= 0
@@ -70,14 +72,14 @@ def _either_side(start: F64, end: F64, corners: F64) -> F64:
 
 
 _NUDGE: Final = np.array([1.7e-6, 2.9e-6])  # metres: rays pass beside edges that triangles share
-_CHUNK: Final = 2_000_000  # pairs of point and triangle at once
+_CHUNK: Final = 2_000_000  # point-triangle pairs per batch
 
 
 def depths_inside(points: F64, corners: F64) -> F64:
     """(P,) metres from points (P, 3) to the nearest face along the axes, 0 for a point outside.
 
-    corners: (F, 3, 3) one connected mesh. Inside is what is covered from above and on all four
-    sides by an odd number of faces: a body without a bottom counts as full, a bowl as empty.
+    corners: (F, 3, 3) one connected mesh. Inside means covered from above and on all four sides by an
+    odd number of faces: a body without a bottom is full, a bowl is empty.
     """
     inside = np.ones(len(points), bool)
     depth = np.full(len(points), np.inf)

@@ -1,7 +1,7 @@
-"""Gate: nothing floats or sinks by more than 2 mm where it is held; on meshes, no effects.
+"""Gate: no item floats above or sinks into its support by more than 2 mm, on meshes; no effects.
 
-What stands is held where an upright line from its lowest places meets a face; what hangs, where
-its mesh comes nearest to a wall or to what it hangs on; what hangs from the ceiling, at its top.
+Floor and surface items are tested by vertical lines from their lowest points; hung items by the
+point nearest to a wall or other support; ceiling items at their top.
 """
 
 from __future__ import annotations
@@ -22,19 +22,19 @@ from pbrs_farm.geometry.surface_points import item_triangles
 
 MOST_M: Final = 0.002
 _ROUNDING_M: Final = 1e-5  # rounding of single precision
-_RING_M: Final = 0.003  # vertices this near to a thing's lowest point are its foot
-_MOST_PLACES: Final = 12  # foot points tested of one thing
+_RING_M: Final = 0.003  # maximum height of foot vertices above an item's lowest point, metres
+_MOST_PLACES: Final = 12  # foot points to test per item
 _REACH_M: Final = 0.3  # gaps are measured up to this, up or down
 _ALL: Final = 1_000_000
-_PAIRS: Final = 1_000_000  # vertex-face pairs tested at once: bounds memory
+_PAIRS: Final = 1_000_000  # vertex-face pairs per batch, to bound memory
 _SOFT: Final = frozenset({"blanket", "throw", "towel", "pillow", "cushion", "curtain"})
 
 
 @dataclass(frozen=True, slots=True)
 class Held:
-    """How far a thing is from what holds it, and by what it is held."""
+    """Gap between an item and its support, and the supporting bodies."""
 
-    gap_m: float  # 0 = it touches; below 0 = the nearest face lies above its lowest places
+    gap_m: float  # 0 = contact; below 0 = the nearest face is above the item's lowest points
     by: tuple[int, ...] = ()  # numbers of the bodies that it touches
 
     @property
@@ -44,10 +44,10 @@ class Held:
 
 
 def held(bodies: Sequence[Body], numbers: Sequence[int], plumb: Plumb) -> dict[int, Held]:
-    """What holds each of some bodies, by its number: what it stands on, else the wall it hangs on.
+    """Support of each of some bodies, by index: the surface below, else the wall behind.
 
-    numbers: of the bodies asked for. plumb: of all bodies. A body that is held by nothing gets the
-    smallest gap that was found; ask `is_good`.
+    numbers: indices of the bodies. plumb: of all bodies. A body without support gets the smallest gap;
+    test `is_good`.
     """
     low, high = boxes_of(bodies)
     found = _find_what_holds(bodies, numbers, plumb)
@@ -61,10 +61,10 @@ def held(bodies: Sequence[Body], numbers: Sequence[int], plumb: Plumb) -> dict[i
 
 
 def held_as_drawn(bodies: Sequence[Body], number: int, plumb: Plumb) -> Held:
-    """By what the thing of the source was held that a body has replaced, among the same bodies.
+    """Support of the source's item that a body has replaced, among the same bodies.
 
-    Only for a body that has replaced a thing of the source. What a source let float may float as it
-    did: the gate compares with this.
+    Only for replacements. Items that float in the source may float as much afterwards: the gate
+    compares with this.
     """
     body = bodies[number]
     assert body.was is not None
@@ -83,7 +83,7 @@ def _may_stand(body: Body) -> bool:
 
 
 def _may_hang(body: Body) -> bool:
-    # A piece of the source that was replaced may stand or hang.
+    # A replaced piece of the source may be supported from below or hung.
     is_swapped = body.was is not None
     hangs = _place_of_piece(body) in (Place.WALL, Place.OPENING, Place.CEILING, None)
     return is_swapped or hangs or body.group in _SOFT
@@ -92,7 +92,7 @@ def _may_hang(body: Body) -> bool:
 def _find_what_holds(
     bodies: Sequence[Body], numbers: Sequence[int], plumb: Plumb
 ) -> dict[int, Held]:
-    """What each body stands on, or hangs from at its top, where its piece belongs to the ceiling."""
+    """Surface below each body, or above its top if its piece belongs to the ceiling."""
     places = [_places_that_touch(bodies[n]) for n in numbers]
     points = np.concatenate([np.zeros((0, 3)), *places])
     of = np.repeat(np.asarray(numbers, np.int64), [len(p) for p in places])

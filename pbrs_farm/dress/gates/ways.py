@@ -18,8 +18,8 @@ from pbrs_farm.dress.gates.bodies import Body, boxes_of
 from pbrs_farm.dress.space import HouseSpace, Passage, RoomSpace, doors_are_joined, floor_bitmap
 
 MOST_COVERED: Final = 0.2  # share of a window that furniture may cover
-_HEAD_M: Final = 2.0  # what is higher above the floor blocks no door
-_STEP_M: Final = 0.03  # what is lower can be stepped over
+_HEAD_M: Final = 2.0  # higher items block no door, metres above the floor
+_STEP_M: Final = 0.03  # lower items can be stepped over, metres
 _FACE_M: Final = 0.03  # depth before a wall in which sockets and mouldings are no obstacle
 _BESIDE_M: Final = 0.01  # left out of a door's width at either end
 _BEFORE_WINDOW_M: Final = 0.6
@@ -41,10 +41,10 @@ def _is_in_the_way(body: Body) -> bool:
 
 
 def blocked_doors(space: HouseSpace, bodies: Sequence[Body]) -> tuple[int, list[Blocked]]:
-    """How many sides of doors there are, and the new bodies in a swing or within 0.8 m of one.
+    """Number of door sides, and the added bodies in a swing or within 0.8 m of one.
 
-    Windows are not counted, nor sides that lead to no room. Curtains, and what is lower than a step
-    or over one's head, are in nobody's way.
+    Windows and sides that lead to no room do not count. Curtains, and items lower than a step or above
+    head height, block nothing.
     """
     n, found = 0, []
     boxes = boxes_of(bodies)
@@ -91,9 +91,9 @@ def in_front_of(passage: Passage, side: int, points: F64) -> F64:
 
 
 def covered_windows(space: HouseSpace, bodies: Sequence[Body]) -> tuple[int, list[Blocked]]:
-    """How many sides of windows there are, and the new furniture that covers a fifth of one.
+    """Number of window sides, and the added furniture that covers a fifth of one.
 
-    Of several that cover it together, those that cover most, until less than a fifth is.
+    If several cover it together, the largest ones, until less than a fifth is covered.
     """
     n, found = 0, []
     for window in space.passages:
@@ -139,9 +139,10 @@ def _covers(
 
 
 def closed_ways(space: HouseSpace, bodies: Sequence[Body]) -> tuple[int, list[Blocked]]:
-    """How many rooms have two doors, and the new bodies that part them where nothing new would.
+    """Number of rooms with two doors, and the added bodies that block the way between them.
 
-    Bodies are named from the last on, until a way 0.6 m wide joins the doors again.
+    Only rooms with a free way before dressing. Bodies are named from the last one on, until a way
+    0.6 m wide connects the doors again.
     """
     n, found = 0, []
     for room in space.rooms:

@@ -1,4 +1,4 @@
-"""Where things can stand and hang in a home: rooms, free walls, doors, windows, floors; no effects."""
+"""Free space of a home for furniture and wall items: rooms, walls, doors, windows, floors; no effects."""
 
 from pbrs_farm.dress.space.floor_bitmaps import FloorBitmap, doors_are_joined, floor_bitmap
 from pbrs_farm.dress.space.footprints import item_footprint

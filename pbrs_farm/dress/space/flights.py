@@ -1,4 +1,4 @@
-"""Where stairs stand and where one steps on or off them, in the plan of a room; no effects."""
+"""Plan areas of stairs in a room, and of their first and last steps; no effects."""
 
 from __future__ import annotations
 
@@ -25,17 +25,17 @@ _REACH_M: Final = 0.4  # stairs are taken for a room's own so far outside it
 
 @dataclass(frozen=True, slots=True)
 class Flights:
-    """Plan areas of the stairs of a room, empty where there are none."""
+    """Plan areas of the stairs of a room, empty if there are none."""
 
     under: BaseGeometry  # the stairs themselves
     before: BaseGeometry  # where one steps on and off
 
 
 def flights_of(house: MutableHouse, room: Room, area: BaseGeometry) -> Flights:
-    """The stairs of the house that stand in a room or arrive in it. area: the room's plan.
+    """The stairs of the house in a room or ending there. area: the room's plan.
 
-    Two plan areas: the stairs themselves, and what lies before their ends, where one steps on and
-    off. Flights of other storeys that come near in plan are left out. Empty areas without stairs.
+    Two plan areas: the stairs themselves, and the floor in front of their ends. Flights of other
+    storeys nearby in plan are skipped.
     """
     under, before = [], []
     near = area.buffer(_REACH_M)

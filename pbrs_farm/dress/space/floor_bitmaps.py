@@ -1,4 +1,4 @@
-"""A room's floor as a bitmap: where things stand, where one can walk, whether doors are joined."""
+"""A room's floor as a bitmap: occupied cells, walkable ways, connections between doors."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from pbrs_farm.core.arrays import F64, Bools
 from pbrs_farm.core.walkable import CELL_M, HEAD_M, STEP_M, WALK_M, FloorGrid, connected_ways
 from pbrs_farm.dress.space.house_space import HouseSpace, RoomSpace
 
-_DOOR_REACH_M = 0.15  # a way leads to a door if it comes this near to where one stands before it
+_DOOR_REACH_M = 0.15  # maximum distance between a way and the standing area of a door, metres
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -22,8 +22,8 @@ class FloorBitmap:
 
     origin: tuple[float, float]  # x, z of the first cell's corner
     inside: Bools  # (H, W) in the room and in no wall
-    occupied: Bools  # (H, W) inside, and something stands there below a man's head
-    ways: NDArray[np.int32]  # (H, W) number of the connected way one can walk; 0 = none
+    occupied: Bools  # (H, W) inside the room and occupied below head height
+    ways: NDArray[np.int32]  # (H, W) number of the connected walkable way; 0 = none
 
     def cells(self, places: F64) -> NDArray[np.int64]:
         """(N, 2) row and column of plan places (N, 2); may lie outside.
@@ -37,16 +37,16 @@ class FloorBitmap:
 def floor_bitmap(
     space: HouseSpace, room: RoomSpace, *, without: Collection[int] = ()
 ) -> FloorBitmap:
-    """The room's floor in cells of 5 cm: what is inside, what is occupied, which ways are left.
+    """The room's floor in cells of 5 cm: inside, occupied, walkable ways.
 
-    A cell is occupied where a thing has a point between 8 cm and 1.8 m above the floor; ways are where
-    someone 0.6 m wide can walk. without: numbers of items that are not counted.
+    A cell is occupied if an item has a point between 8 cm and 1.8 m above the floor; ways are the cells
+    where someone 0.6 m wide can walk. without: indices of items to ignore.
     """
     x0, z0, x1, z1 = room.area.bounds if not room.area.is_empty else (0.0, 0.0, CELL_M, CELL_M)
     grid = FloorGrid.over(x0, z0, x1, z1)
     xx, zz = grid.middles
     inside = shapely.contains_xy(room.area, xx, zz) & ~shapely.contains_xy(room.walls, xx, zz)
-    # Mark every cell above which a thing has a point between a step and a head.
+    # Mark every cell below an item's point between step and head height.
     occupied = np.zeros(grid.shape, bool)
     low, high = room.room.floor_y + STEP_M, room.room.floor_y + HEAD_M
     for number in room.items:
@@ -61,10 +61,9 @@ def floor_bitmap(
 
 
 def with_body(bitmap: FloorBitmap, body: Bools, width_m: float = WALK_M) -> FloorBitmap:
-    """The floor when a body (H, W) stands there, too; width_m: of the ways that are left.
+    """The floor with an additional body (H, W); width_m: minimum width of ways.
 
-    The bitmap given is not changed. Takes a distance transform, so try many places by the occupied
-    cells first.
+    Returns a new bitmap. Takes a distance transform, so test candidates by the occupied cells first.
     """
     occupied = bitmap.occupied | body
     ways = connected_ways(bitmap.inside & ~occupied, width_m)
@@ -72,16 +71,16 @@ def with_body(bitmap: FloorBitmap, body: Bools, width_m: float = WALK_M) -> Floo
 
 
 def doors_are_joined(bitmap: FloorBitmap, room: RoomSpace) -> bool:
-    """Whether one way leads to every door of the room; True with fewer than two doors.
+    """True if one way connects all doors of the room, or it has fewer than two.
 
-    Ask before and after a thing is put (`with_body`): only a way that was there can be closed.
+    Compare before and after adding a body (`with_body`): only an existing way can be blocked.
     """
     common: set[int] | None = None
     doors = [(d, s) for d in room.doors if (s := d.side_of(room.room.id)) is not None]
     if len(doors) < 2:
         return True
     for door, side in doors:
-        # Look at the ways that pass close to where one stands before the door.
+        # Find the ways near the standing area of the door.
         middle = door.face_point(side) + door.inward(side) * (WALK_M / 2 + _DOOR_REACH_M / 2)
         row, column = bitmap.cells(middle[None, [0, 2]])[0]
         r = int(np.ceil((_DOOR_REACH_M + CELL_M) / CELL_M))
@@ -91,6 +90,3 @@ def doors_are_joined(bitmap: FloorBitmap, room: RoomSpace) -> bool:
         near = {int(way) for way in np.unique(part)} - {0}
         common = near if common is None else common & near
     return bool(common)
-
-
-# Where stairs stand and where one steps on or off them, in the plan of a room.

@@ -12,16 +12,16 @@ from pbrs_farm.core.mesh import clipped_to_box, triangle_bounds
 from pbrs_farm.geometry.surface_points import item_triangles, surface_points
 
 _GRID_M = 1e-4  # plan coordinates are rounded to this
-_THIN_M = 0.004  # half the width given to what stands upright
+_THIN_M = 0.004  # half the width given to vertical faces, metres
 _FAR = 1e6
 _MANY = 300  # triangles
 _SQUARE_M = 0.01
 
 
 def item_footprint(item: Item, low_y: float = -_FAR, high_y: float = _FAR) -> BaseGeometry:
-    """The area that the item's triangles between low_y and high_y cover in plan; may be empty.
+    """Plan area of the item's triangles between low_y and high_y; may be empty.
 
-    Upright faces count as strips 8 mm wide, so that what is open from below has its outline.
+    Vertical faces count as strips 8 mm wide, so that shapes without a bottom have their outline.
     """
     corners = item_triangles(item)
     if low_y > -_FAR or high_y < _FAR:
@@ -43,7 +43,7 @@ def plan_area(corners: F64, *, upright: bool = True) -> BaseGeometry:
     plan = corners[:, :, [0, 2]]
     u, v = plan[:, 1] - plan[:, 0], plan[:, 2] - plan[:, 0]
     twice_area = np.abs(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
-    # Take level triangles as they are, once each.
+    # Add horizontal triangles once each.
     flat = plan[twice_area > 1e-7]
     shapes: list[BaseGeometry] = [shapely.Polygon(triangle) for triangle in flat]
     # Give upright ones a width.

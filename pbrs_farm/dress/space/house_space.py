@@ -1,4 +1,4 @@
-"""The space of a home being dressed: rooms with their walls, doors, windows, things; no effects."""
+"""The space of a home being dressed: rooms with their walls, doors, windows, items; no effects."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ from pbrs_farm.home.room_use import RoomKind, room_kind
 
 _ABOVE_FLOOR_M = 0.5  # structure lower than this above a floor is no ceiling
 _CHEST_M = 1.2  # height above the floor at which walls are cut for their plan
-_INSIDE_SHARE = 0.34  # share of a thing's points inside a room from which it belongs to the room
+_INSIDE_SHARE = 0.34  # minimum share of an item's points inside a room for the item to belong to it
 _STRUCTURE = (ItemKind.WALL, ItemKind.FLOOR, ItemKind.CEILING, ItemKind.GROUND)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RoomSpace:
-    """A room, what is in it and round it, in world metres; numbers are places in MutableHouse.items."""
+    """A room with its contents and surroundings, in world metres; numbers are indices into MutableHouse.items."""
 
     room: Room
     kind: RoomKind
@@ -45,15 +45,14 @@ class RoomSpace:
     faces: tuple[WallFace, ...]
     doors: tuple[Passage, ...]  # and archways
     windows: tuple[Passage, ...]
-    items: tuple[int, ...]  # numbers in MutableHouse.items of what stands or hangs in it
+    items: tuple[int, ...]  # indices into MutableHouse.items of its contents
     walls: BaseGeometry  # plan area of the walls at the height of a man's chest
     above: F64  # (F, 3, 3) triangles of ceilings and of what else is over it
 
     def ceiling_y(self, places: F64) -> F64:
-        """(N,) y of the lowest structure above the floor at plan places (N, 2), else the nominal one.
+        """(N,) y of the lowest structure above the floor at plan positions (N, 2), world metres.
 
-        World metres; places holds world x and z. The nominal height is where no structure lies over
-        a place.
+        The nominal height for positions without structure above.
         """
         return _ceiling(self.above, self.room)(places)
 
@@ -62,17 +61,17 @@ class RoomSpace:
 class HouseSpace:
     """The home's rooms in its order, its doors and windows, and points on every item's surface.
 
-    `points` stand for surfaces: no place of a surface is farther than about 2 cm from one. A value: it
-    does not follow later changes of the house.
+    `points` sample the surfaces: every surface point is within about 2 cm of one. A value: it does not
+    follow later changes of the house.
     """
 
     rooms: tuple[RoomSpace, ...]
     passages: tuple[Passage, ...]
     points: tuple[F64, ...]  # (N, 3) by number of MutableHouse.items; empty for structure
-    bounds: F64  # (I, 2, 3) of those points; NaN where there are none
+    bounds: F64  # (I, 2, 3) of those points; NaN if there are none
 
     def room(self, room_id: str) -> RoomSpace:
-        """The room of that id; KeyError if there is none."""
+        """The room with an id; KeyError for an unknown one."""
         for room in self.rooms:
             if room.room.id == room_id:
                 return room
@@ -94,7 +93,7 @@ class HouseSpace:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _EmptyRoom:
-    # What no dressing moves: the room, and its walls with nothing before them.
+    # Parts that dressing never moves: the room, and its bare walls.
     room: Room
     area: BaseGeometry
     faces: tuple[WallFace, ...]
@@ -104,12 +103,11 @@ class _EmptyRoom:
 
 @dataclass(slots=True)
 class _KeptSpaces:
-    # What stays as long as the items it came from stay the same objects. Items are held with
-    # their points, so ids stay theirs.
+    # Cache, valid while its items are the same objects; they are referenced, so ids stay unique.
     rooms: tuple[_EmptyRoom, ...]
     passages: tuple[Passage, ...]
     items: dict[int, tuple[Item, F64, F64]]  # with points on it and their bounds
-    faces: dict[int, tuple[tuple[int, ...], WallFace]]  # by the empty face, with the things near it
+    faces: dict[int, tuple[tuple[int, ...], WallFace]]  # by the empty face, with the items near it
     space: tuple[tuple[int, ...], HouseSpace] | None = None
     reach: dict[int, F64] = field(default_factory=dict)  # by the empty face: see reach_of
     hidden: dict[tuple[int, int], Hidden | None] = field(default_factory=dict)  # by face and item
@@ -117,11 +115,11 @@ class _KeptSpaces:
 
 
 def house_space(house: MutableHouse) -> HouseSpace:
-    """The rooms of a house as they are now: wall faces, doors, windows, what stands in them.
+    """The current rooms of a house: wall faces, doors, windows, contents.
 
-    Call it again after each change of house.items: it compares items by identity, and computes anew
-    only what concerns those that changed. Never keep its value over a change. Where wall faces are not
-    needed, floor_space costs less.
+    Call it again after each change of house.items: it compares items by identity, and only recomputes
+    the parts of changed items. Never keep its value over a change. Without need for wall faces,
+    floor_space is cheaper.
 
         space = house_space(house)
         room = space.room("0_1")
@@ -141,10 +139,10 @@ def house_space(house: MutableHouse) -> HouseSpace:
 
 
 def floor_space(house: MutableHouse) -> HouseSpace:
-    """As house_space, without the faces of walls: doors, windows, floors and points cost less.
+    """Like house_space, without wall faces, which makes it cheaper.
 
-    For passes that place nothing on walls: `faces` of every room is empty. What is found of items
-    is kept in the house and used again.
+    For passes that place nothing on walls: `faces` of every room is empty. Per-item results are cached
+    in the house.
     """
     kept = house.kept.get("space")
     if not isinstance(kept, _KeptSpaces):
@@ -245,7 +243,7 @@ def _house_space(items: Sequence[Item], kept: _KeptSpaces) -> HouseSpace:
 def _face_behind_things(
     face: WallFace, items: Sequence[Item], points: Sequence[F64], bounds: F64, kept: _KeptSpaces
 ) -> WallFace:
-    """The empty face with what stands or hangs before it now; rugs do not count."""
+    """The empty face limited by items in front of it; rugs are ignored."""
     if id(face) not in kept.reach:
         kept.reach[id(face)] = reach_of(face)
     found = meeting(bounds, kept.reach[id(face)])

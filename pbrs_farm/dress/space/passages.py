@@ -37,7 +37,7 @@ _LEAST_COVERED = 0.3  # least share of the hole's width that walls must cover
 class Passage:
     """A door, an archway or a window, in the middle plane of its wall."""
 
-    id: str  # of the opening, or of the item that has none
+    id: str  # of the opening, or of an item without one
     item_id: str | None
     level_id: str
     is_window: bool
@@ -73,7 +73,7 @@ class Passage:
 
     @property
     def clear_m(self) -> float:
-        """How far before the hole nothing may stand: 0.8 m, or as far as a leaf of a wider door swings."""
+        """Depth in front of the hole to keep free: 0.8 m, or the swing of a wider leaf."""
         return max(BEFORE_DOOR_M, min(self.width, 1.0))
 
     def swing(self, side: int) -> BaseGeometry:
@@ -94,8 +94,8 @@ def passages_of(
 ) -> tuple[Passage, ...]:
     """Every door, archway and window, in the house's order; walls_at: plan area of walls at a height.
 
-    A doorway lies where the walls have their hole, however far a leaf that is drawn open stands out
-    of it. Windows that cut no hole, and doors at no wall, count by their own boxes.
+    A doorway is at the walls' hole, even if its leaf is drawn open. Windows without a hole, and doors
+    outside of walls, are given by their own boxes.
     """
     by_id = {item.id: item for item in items}
     found = [_from_opening(o, rooms, walls_at) for o in openings]
@@ -136,10 +136,10 @@ def _from_opening(
 def _depth_of_walls(
     area: BaseGeometry, walls: BaseGeometry, normal: F64
 ) -> tuple[float, float] | None:
-    """Where the wall that a plan area goes through begins and ends along a normal; None = no wall.
+    """Interval along a normal of the wall that a plan area crosses; None without a wall.
 
-    Of several walls that which fills most of the area's width counts: a leaf that is drawn open
-    touches the wall beside it, too.
+    Of several walls the one that fills most of the area's width wins: an open leaf also touches the
+    wall beside it.
     """
     if area.is_empty:
         return None
@@ -200,9 +200,9 @@ def _from_item(
 
 
 def _doorway(corners: F64, normal: F64, walls: BaseGeometry) -> F64 | None:
-    """(4, 3) the hole of a wall across a normal in which a door stands, by its box's corners (8, 3).
+    """(4, 3) hole of a door in a wall across a normal, from the corners (8, 3) of the door's box.
 
-    A wall that has no hole has it where the box goes through. None where neither is found.
+    In a wall without a hole, the intersection with the box. None without either.
     """
     across = normal[[0, 2]] / np.linalg.norm(normal[[0, 2]])
     along = np.array([across[1], -across[0]])
@@ -238,14 +238,14 @@ def _hole_between(
     gaps: dict[tuple[int, int], list[int]] = {}
     for row in range(len(tt)):
         for first, end in _runs_of_true(~solid[row], 0):
-            # It lies between two jambs, and the box reaches into it.
+            # The gap is between two jambs, and the box overlaps it.
             is_closed = first > 0 and end < len(ss)
             is_met = ss[first] < s[1] and ss[end - 1] > s[0]
             if is_closed and is_met and _DOORWAY_M[0] <= (end - first) * _CELL_M <= _DOORWAY_M[1]:
                 gaps.setdefault((first, end), []).append(row)
     if not gaps:
         return None
-    # A corridor's walls stand farther apart than its door's jambs.
+    # A corridor's walls are farther apart than its door's jambs.
     first, end = min(gaps, key=lambda g: (g[1] - g[0], -len(gaps[g])))
     rows = gaps[first, end]
     s_half, t_half = _CELL_M / 2, _STEP_M / 2
@@ -281,7 +281,7 @@ def _passage(
 def _room_at(
     centre: F64, out: F64, rooms: Sequence[tuple[Room, BaseGeometry]], low: float, high: float
 ) -> str | None:
-    # The first room that is met when going through the wall.
+    # The first room behind the wall.
     for reach in _REACH_M:
         x, _, z = centre + out * reach
         for room, area in rooms:

@@ -1,4 +1,4 @@
-"""Wall faces cut to rooms, and what of them structure and things leave free; no effects."""
+"""Wall faces cut to rooms, and their areas free of structure and items; no effects."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _UNDER_CEILING_M = 0.01
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WallAreas:
-    """Where walls stand: plan areas and (I, 2, 3) bounds."""
+    """Plan areas and (I, 2, 3) bounds of walls."""
 
     areas: tuple[BaseGeometry, ...]
     bounds: F64
@@ -45,11 +45,11 @@ class WallAreas:
 def room_faces(
     planes: Iterable[WallPlane], rooms: Sequence[Room], areas: Sequence[BaseGeometry]
 ) -> dict[int, list[WallFace]]:
-    """The wall faces of each room (by its number), cut to the room, nothing in front considered.
+    """The wall faces of each room (by index), cut to the room, ignoring obstacles.
 
-    A face is a rectangle of cells in the plane of a wall, with FAR_M free before cells that the
-    wall covers and 0 elsewhere. Of rooms that overlap the smaller one has the face. Limit it by
-    `with_structure` and `with_things`.
+    A face is a rectangle of cells in the plane of a wall, with FAR_M free in front of wall cells and 0
+    elsewhere. Of overlapping rooms the smaller one gets the face. Limit it by `with_structure` and
+    `with_things`.
     """
     order = sorted(range(len(areas)), key=lambda k: (areas[k].area, k))
     found: dict[int, list[WallFace]] = {}
@@ -107,7 +107,7 @@ def with_structure(
     clear = face.clear.copy()
     columns = np.asarray((np.arange(clear.shape[1]) + 0.5) * CELL_M, np.float64)
     ys = face.low_y + (np.arange(clear.shape[0]) + 0.5) * CELL_M
-    # Other walls hide the face, or stand before it.
+    # Other walls cover the face, or obstruct it.
     for n in meeting(walls.bounds, reach_of(face)):
         rows = (ys > walls.bounds[n, 0, 1]) & (ys < walls.bounds[n, 1, 1])
         for out_m in _WALL_BEFORE_M:
@@ -120,14 +120,14 @@ def with_structure(
     # Openings take their hole and a margin.
     for passage in passages:
         _cut_passage(clear, face, passage)
-    # What is over the room hides what is above it.
+    # The ceiling hides the part of the wall above it.
     top = np.minimum(*(_ceiling_over(face, ceiling_y, columns, out_m) for out_m in (0.03, 0.2)))
     clear[ys[:, None] > (top - _UNDER_CEILING_M)[None, :]] = 0.0
     return replace(face, clear=clear)
 
 
 def with_things(face: WallFace, hidden: Sequence[Hidden | None]) -> WallFace:
-    """The face with its free space limited by things: what each of them hides, None = nothing."""
+    """The face with its free space limited by items; hidden: the area of each, None = nothing."""
     if not hidden:
         return face
     clear = face.clear.copy()
@@ -138,9 +138,9 @@ def with_things(face: WallFace, hidden: Sequence[Hidden | None]) -> WallFace:
 
 
 def reach_of(face: WallFace) -> F64:
-    """(2, 3) bounds of the space before the face in which things limit it.
+    """(2, 3) bounds of the space in front of the face in which items limit it.
 
-    Metres, world; a thing whose box does not meet it hides nothing of the face.
+    Metres, world; an item whose box is outside does not limit the face.
     """
     ends = [face.point(s, y, out) for s in (0.0, face.length) for y in (face.low_y, face.high_y)
             for out in (-0.03, FAR_M)]  # fmt: skip

@@ -19,7 +19,7 @@ CELL_M = 0.025
 FAR_M = 1.2  # free space is measured up to here
 _SAME_PLANE_M = 0.002
 _LEAST_LENGTH_M = 0.25
-_LEAST_AREA_M2 = 0.02  # smaller triangles start no plane of their own
+_LEAST_AREA_M2 = 0.02  # minimum area of a triangle to start a plane, square metres
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,7 +36,7 @@ class WallFace:
     along: F64  # (3,) unit, horizontal
     normal: F64  # (3,) unit, horizontal, into the room
     clear: F32  # (H, S) metres free before the cell, at most FAR_M; 0 = no wall to be seen
-    recess: F32  # (S,) metres that the wall lies behind the face's plane, at most 2 mm
+    recess: F32  # (S,) depth of the wall behind the face's plane, at most 2 mm
 
     @property
     def length(self) -> float:
@@ -83,7 +83,7 @@ class WallFace:
         return np.asarray((points - self.origin) @ self.normal)
 
     def recess_m(self, s0: float, s1: float) -> float:
-        """How far the wall lies behind the plane between s0 and s1, where it is nearest to it."""
+        """Minimum depth of the wall behind the plane between s0 and s1."""
         columns = _cells_between(s0, s1)
         part = self.recess[max(columns[0], 0) : max(columns[1], 0)]
         return float(part.min()) if part.size else 0.0
@@ -102,10 +102,10 @@ class WallFace:
         return float(part.min()) if part.size else 0.0
 
     def starts(self, width_m: float, y0: float, y1: float, depth_m: float) -> F64:
-        """(K,) every s, in steps of a cell, at which a thing fits that begins there.
+        """(K,) start positions s, in steps of a cell, at which an item fits.
 
-        width_m: of the thing along the face. y0, y1: world heights of its lower and upper edge. depth_m: free
-        space it needs before the face. Empty where it fits nowhere.
+        width_m: of the item along the face. y0, y1: world heights of its lower and upper edge. depth_m:
+        required free depth in front of the face. Empty if it fits nowhere.
         """
         rows, columns = self._window(0.0, width_m, y0, y1)
         if rows[0] < 0 or rows[1] > self.clear.shape[0] or rows[1] <= rows[0]:
@@ -119,16 +119,16 @@ class WallFace:
         return np.asarray(np.flatnonzero(count[n:] - count[:-n] == n) * CELL_M, np.float64)
 
     def taken(self, s0: float, s1: float, y0: float, y1: float) -> WallFace:
-        """The face with the rectangle s0..s1, y0..y1 (world heights) no longer free; a new value.
+        """The face with the rectangle s0..s1, y0..y1 (world heights) occupied; a new value.
 
-        What lies beyond the face's edges is ignored.
+        Parts outside the face are ignored.
         """
         return self.limited(s0, s1, y0, y1, 0.0)
 
     def limited(self, s0: float, s1: float, y0: float, y1: float, free_m: float) -> WallFace:
-        """The face with at most free_m metres free before the rectangle s0..s1, y0..y1; a new value.
+        """The face with at most free_m metres free in front of a rectangle s0..s1, y0..y1; a new value.
 
-        For what stands before a wall and lets flat things hang behind it.
+        For obstacles that leave space for flat items behind them.
         """
         rows, columns = self._window(s0, s1, y0, y1)
         clear = self.clear.copy()
@@ -156,14 +156,10 @@ class WallPlane:
     along: F64
     normal: F64
     corners: F64  # (F, 3, 2) s and y
-    behind: F64  # (F,) metres that a triangle lies behind the plane
+    behind: F64  # (F,) depth of a triangle behind the plane, metres
 
     def recess(self, s0: float, n_columns: int) -> F32:
-        """(S,) how far the nearest triangle of each column from s0 on lies behind the plane.
-
-        float32 metres, 0 where a column has no triangle. The plane itself is where the outermost
-        triangle lies.
-        """
+        """(S,) depth behind the plane of the nearest triangle in each column from s0 on."""
         found = np.full(n_columns, np.inf)
         s = (self.corners[:, :, 0] - s0) / CELL_M
         first = np.clip(np.floor(s.min(1) + 1e-6), 0, n_columns).astype(int)
@@ -229,7 +225,8 @@ def wall_planes(walls: Sequence[Item]) -> Iterator[WallPlane]:
             continue
         if areas[first] < 2 * _LEAST_AREA_M2:
             break
-        # Gather what lies in the plane of the largest triangle left, seen from the same side.
+        # Collect the triangles in the plane of the largest remaining one, with the same
+        # orientation.
         normal = normals[first] * [1, 0, 1]
         normal = normal / np.linalg.norm(normal)
         out = (triangles - triangles[first, 0]) @ normal
@@ -263,14 +260,14 @@ def runs(room_of_column: Sequence[int]) -> Iterator[tuple[int, int, int]]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Hidden:
-    """How far before a face a thing comes, in a window of its cells."""
+    """Distance of an item in front of a face, for a window of the face's cells."""
 
     row: int
     column: int
     out: F32  # (h, w) metres before the face, FAR_M where there is nothing
 
     def limit(self, clear: F32) -> None:
-        """Limit the face's free space (H, S) by the thing, in place."""
+        """Limit the face's free space (H, S) by the item, in place."""
         h, w = self.out.shape
         part = clear[self.row : self.row + h, self.column : self.column + w]
         np.minimum(part, self.out, out=part)
@@ -288,11 +285,11 @@ def _least_around(depth: F32) -> F32:
 
 
 def hidden_cells(face: WallFace, points: F64) -> Hidden | None:
-    """What a thing hides of a face; points (N, 3): on its surface, grown by a cell.
+    """Cells of a face that an item obstructs, from points (N, 3) on its surface, grown by a cell.
 
-    points (N, 3) float64 in the world; None where none of them is near the face. Points farther
-    than FAR_M before it, or behind its plane, hide nothing. Sample surfaces as densely as the
-    cells, or gaps stay free.
+    points (N, 3) float64 in the world; None if none of them is near the face. Points farther than
+    FAR_M in front, or behind its plane, obstruct nothing. Sample surfaces as densely as the cells, or
+    gaps stay free.
     """
     out, s, y = face.out_of(points), face.s_of(points), points[:, 1] - face.low_y
     n_rows, n_columns = face.clear.shape
@@ -310,7 +307,7 @@ def hidden_cells(face: WallFace, points: F64) -> Hidden | None:
     cell = (i - row) * depth.shape[1] + (j - column)
     np.minimum.at(depth.reshape(-1), cell, np.maximum(out[near], 0.0).astype(np.float32))
     depth = _least_around(depth)
-    # Cut off what is beyond the face.
+    # Clip to the face.
     above, left = max(-row, 0), max(-column, 0)
     depth = depth[above : max(n_rows - row, 0), left : max(n_columns - column, 0)]
     return Hidden(row + above, column + left, depth)

@@ -49,7 +49,7 @@ from pbrs_farm.furnishings.textures.families import (
 from pbrs_farm.home.room_use import RoomKind
 
 PASS = "surfaces"
-_KEPT_SHARE = 0.1  # share of photographed floors and walls that stay as they are
+_KEPT_SHARE = 0.1  # share of photographed floors and walls that are kept
 
 
 def room_frame(area: BaseGeometry) -> tuple[F64, F64]:
@@ -92,7 +92,7 @@ def _laid(surface: Surface, material: PatternMaterial, origin: F64, axes: F64) -
 
 @dataclass(frozen=True, slots=True)
 class _RoomFinish:
-    # What one room gets; None leaves what the source has.
+    # Finishes of one room; None keeps the source's.
     space: RoomSpace
     floor: Floor | None
     walls: WallFinish | None
@@ -113,7 +113,7 @@ def _room_finish(
     house: MutableHouse, catalogue: Catalogue, style: Style, home: HomeFinish, room: RoomSpace,
     share: float,
 ) -> _RoomFinish:  # fmt: skip
-    # Streams of their own: what one room draws changes nothing in another.
+    # Separate streams: draws of one room do not affect another.
     rng = house.rng(PASS, room.room.id)
     taste = room_style(style, rng)
     floor = floor_of(house.rng(PASS, room.room.id, "floor"), taste, home, room.kind)
@@ -125,7 +125,7 @@ def _room_finish(
     # Now and then a photographed floor stays.
     if rng.random() < _KEPT_SHARE and _is_photographed(house, f"floor_{room.room.id}"):
         floor = None
-    # Libraries may hold pictures of what was drawn.
+    # Libraries may have photographs of the drawn kind.
     if floor is not None:
         floor = replace(floor, pattern=photographed(house, catalogue, floor.pattern))
     if walls is not None:
@@ -153,7 +153,7 @@ def _lay_floors(house: MutableHouse, home: HomeFinish, finishes: list[_RoomFinis
         if finish is None or item.kind not in (ItemKind.FLOOR, ItemKind.CEILING):
             continue
         if item.kind is ItemKind.CEILING:
-            # Ceilings of rooms that are left alone stay as well.
+            # Rooms without new finishes keep their ceilings too.
             if finish.walls is None:
                 continue
             pattern, turn = home.ceiling, 0.0
@@ -258,7 +258,7 @@ def _set_boards(
         board_finish = _board_finish(house, home, scheme, finish)
         board = skirting_board(house.source, room, finish.space.area, walls, home.board_m, 0)
         if board is not None:
-            # A new board has no look of its own yet: the finish covers all of it.
+            # A new board has no finish yet: apply it to all faces.
             looks = tuple(with_finish(house, s, board_finish, np.eye(3)) for s in board.surfaces)
             board = replace(board, surfaces=looks)
             house.add(replace(board, tags=(*board.tags, f"seed:{house.seed}")), PASS)
@@ -284,7 +284,7 @@ def _paint_boards(
 
 
 def _rooms_before(board: Item, finder: RoomFinder) -> list[int]:
-    # The rooms of a board by the points of its own plan, most points first.
+    # Rooms of a board by its own plan's points, most points first.
     wall = sided_wall(board, finder)
     lengths: dict[int, float] = {}
     for side in wall.sides:

@@ -1,4 +1,4 @@
-"""What floors, walls, ceilings and skirting boards of a home are made of, by style; no effects."""
+"""Finishes of a home's floors, walls, ceilings and skirting boards, by style; no effects."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ WOOD_FLOORS = ("planks", "strip", "laminate", "herringbone", "chevron")
 _MARBLES = tuple(zip(COLOURS["marbles"], COLOURS["marble_veins"], strict=True))
 _DIRT = rgb("b9b5ac")
 _PRINTED_CARPETS = 0.35  # share of carpets with a pattern
-_ALL_WALLS = 0.35  # of covers for one wall or all, the share that is on all
+_ALL_WALLS = 0.35  # share of wall coverings that are on all walls instead of one
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +45,7 @@ class Floor:
 
 @dataclass(frozen=True, slots=True)
 class WallFinish:
-    """What a room's walls show."""
+    """Finish of a room's walls."""
 
     main: Pattern
     accent: Pattern | None = None  # of one wall of the room
@@ -60,18 +60,18 @@ class WallFinish:
 
 @dataclass(frozen=True, slots=True)
 class HomeFinish:
-    """What all rooms of a home share."""
+    """Finishes shared by all rooms of a home."""
 
     dry_floors: tuple[Floor, Floor]  # the usual one, and the one of some rooms
     wet_floor: Floor
     ceiling: Pattern
     wall: Rgb  # the paint of most walls
     has_floor_boards: bool  # skirting boards of the floor's wood, not of the doors'
-    board_m: float  # height of the boards that are added
+    board_m: float  # height of added boards
 
 
 def home_finish(rng: np.random.Generator, style: Style) -> HomeFinish:
-    """What the home's builder chose."""
+    """Draw the shared finishes of a home."""
     wood = [f for f in style.floors if f in WOOD_FLOORS] or ["planks"]
     usual = _wood_floor(rng, style, wood[0] if rng.random() < 0.6 else _pick(rng, wood))
     second = _dry_floor(rng, style, RoomKind.OTHER)
@@ -106,7 +106,7 @@ def floor_of(
         return home.wet_floor
     if kind is RoomKind.BEDROOM and rng.random() < 0.25:
         return _carpet(rng, style)
-    # Most dry rooms have one floor, laid at once.
+    # Most dry rooms share one floor.
     draw = rng.random()
     if draw < 0.65:
         return home.dry_floors[0]
@@ -152,7 +152,7 @@ def walls_of(
 def covered(
     rng: np.random.Generator, style: Style, walls: WallFinish, kind: RoomKind
 ) -> WallFinish:
-    """The walls of a room, by chance clad or panelled as the style likes; what is paper gets a foot alone."""
+    """A room's walls, with cladding or panelling by chance and style; wallpaper only gets a foot."""
     if walls.accent is not None or (walls.is_tiled and walls.low is None):
         return walls
     if not style.covers or rng.random() >= COVERED_ROOMS.get(kind, 0.0):

@@ -54,7 +54,7 @@ class SidedWall:
 
     rows: F64  # (F, 3, 8) corners: metres, normals or zeros, uv or zeros
     surface: Ints  # (F,) index into Item.surfaces
-    side: Ints  # (F,) index into sides, -1 = lies flat
+    side: Ints  # (F,) index into sides, -1 = horizontal
     sides: tuple[Side, ...]
     is_closed: bool
 
@@ -96,7 +96,7 @@ def sided_wall(wall: Item, finder: RoomFinder) -> SidedWall:
     normals = vectors / np.maximum(areas, 1e-12)[:, None]
     side = np.full(len(rows), -1, np.int64)
     sides: list[Side] = []
-    # Begin each plane with the largest triangle that has none.
+    # Start each plane with the largest unassigned triangle.
     for first in np.argsort(-areas, kind="stable"):
         if side[first] >= 0 or areas[first] < 1e-6 or abs(normals[first, 1]) > 0.05:
             continue
@@ -141,7 +141,7 @@ def _side_of_plane(corners: F64, normal: F64, offset: float, finder: RoomFinder)
 
 
 def _runs_of_rooms(found: Ints, low: float, high: float) -> tuple[SideRun, ...]:
-    """Runs of one room; what faces no room, but lies between or beside rooms, is shared out."""
+    """Runs of one room; stretches between or beside rooms are divided between them."""
     if (found < 0).all():
         return (SideRun(None, low, high),)
     step = (high - low) / len(found)

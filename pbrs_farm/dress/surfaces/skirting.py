@@ -1,4 +1,4 @@
-"""Skirting boards where the source has none: a strip along a room's walls, mitred; no effects."""
+"""Skirting boards for sources without any: a mitred strip along a room's walls; no effects."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ BASEBOARD = "baseboard"
 """Tag that repair knows: the item bounds no room and is joined to nothing."""
 
 _THICK_M = 0.01
-_SUNK_M = 0.002  # its back stands so deep in the wall, so that the two share no plane
+_SUNK_M = 0.002  # depth of its back inside the wall, to avoid coplanar faces, metres
 _BESIDE_DOOR_M = 0.015
 _LEAST_M = 0.04  # shorter pieces are left out
 _OVER_OUTLINE_M = 0.04  # walls are looked for so far outside a room's outline
 
 
 def has_boards(house: House) -> bool:
-    """Whether the source brings skirting boards of its own."""
+    """True if the source has skirting boards."""
     return any(BASEBOARD in item.tags for item in house.items)
 
 
@@ -47,7 +47,7 @@ def skirting_board(
     house: House, room: Room, area: BaseGeometry,
     walls: Sequence[tuple[BaseGeometry, float, float]], height_m: float, material: int,
 ) -> Item | None:  # fmt: skip
-    """The room's board: along its walls, with gaps at doors; None where there is none."""
+    """The room's board along its walls, with gaps at doors; None if no part remains."""
     reach = area.buffer(_OVER_OUTLINE_M, join_style="mitre")
     near = [
         w
@@ -91,7 +91,7 @@ def _doors(house: House, room: Room, height_m: float) -> BaseGeometry:
 
 def _pieces_of_strip(strip: BaseGeometry, solid: BaseGeometry) -> Iterator[shapely.Polygon]:
     for part in shapely.get_parts(areal(shapely.set_precision(strip, 1e-5))):
-        # Leave crumbs out, and what lies in the wall alone.
+        # Skip tiny pieces, and pieces inside the wall.
         if part.geom_type != "Polygon" or part.length / 2 < _LEAST_M:
             continue
         if part.difference(solid).area > 0.5 * _THICK_M * _LEAST_M:

@@ -16,7 +16,7 @@ from pbrs_farm.furnishings.textures.families import PatternMaterial
 
 REVEAL = "reveal"
 """Name of the faces by whose material repair paints the sides of openings."""
-_LEVEL = 0.9  # |cosine| to the vertical of what lies flat
+_LEVEL = 0.9  # minimum |cosine| to the vertical of a horizontal face's normal
 _LEAST_CUT_M = 0.02  # cuts nearer to a side's end than this are left out
 
 
@@ -39,7 +39,7 @@ class RestOfWall:
 
 
 LooksOf = Mapping[tuple[int, int], RoomWalls]
-"""What a wall's runs show, by side and run."""
+"""Finishes of a wall's runs, by side and run."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,7 +55,7 @@ class _SidePart:
 def painted_wall(item: Item, wall: SidedWall, looks: LooksOf, rest: RestOfWall) -> Item:
     """The wall with the materials of its rooms; upright faces without a look keep their own and their uv."""
     rows, surface, side = wall.rows, wall.surface, wall.side
-    # Cut the whole wall, so that it stays closed; what is no solid is painted by whole triangles.
+    # Cut the whole wall, so that it stays closed; open walls are painted by whole triangles.
     for normal, offset in _cuts(wall, looks) if wall.is_closed else ():
         rows, parents = cut_triangles(rows, normal, offset)
         surface, side = surface[parents], side[parents]
@@ -66,7 +66,7 @@ def painted_wall(item: Item, wall: SidedWall, looks: LooksOf, rest: RestOfWall) 
         for n in np.unique(surface[part.members]).tolist():
             mine = rows[part.members & (surface == n)]
             found.append(_surface_of_rows(item.surfaces[n].name, part.material.number, _in_metres(mine, part)))  # fmt: skip
-    # Level faces are of plaster; what else is left stays as it is.
+    # Horizontal faces get plaster; the others are unchanged.
     height = unit_normals(rows[..., :3])[:, 1]
     for mine, name, material in (
         (left & (height < -_LEVEL), REVEAL, rest.foot),

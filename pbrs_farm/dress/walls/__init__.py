@@ -1,4 +1,4 @@
-"""What hangs on walls: pictures, mirrors, clocks, shelves, sockets and switches; no effects."""
+"""Wall items: pictures, mirrors, clocks, shelves, sockets and switches; no effects."""
 
 from pbrs_farm.dress.walls.hang_walls import furnish_walls
 

@@ -118,9 +118,9 @@ def hang_anywhere(
     hanging: Hanging, made: Model, low_m: float, depth_m: float, rng: np.random.Generator, *,
     above_m: float = 0.05, tags: tuple[str, ...] = (),
 ) -> bool:  # fmt: skip
-    """Hang the thing at that height at a place drawn from all that have depth_m free before them.
+    """Hang the item at a height, at a random place with depth_m free in front.
 
-    above_m: free above it. False, and a reason counted, where there is no place.
+    above_m: free height above it. False, with the reason counted, if there is no place.
     """
     piece, shape = made
     (x0, _y0, _z0), (x1, y1, _z1) = shape.bounds
@@ -164,7 +164,7 @@ def fit_switches(hanging: Hanging, catalogue: Catalogue, style: Style, share: fl
 
 
 def _draw_fitting(catalogue: Catalogue, group: str, rng: np.random.Generator) -> Model | None:
-    """A socket or switch of the catalogue that is as small as they are; None = make one."""
+    """A socket or switch of the catalogue with a realistic size; None = generate one."""
     fit = [p for p in catalogue.of(group) if max(p.size) < 0.2 and p.size[1] < 0.06]
     if not fit or rng.random() < 0.4:
         return None
@@ -176,7 +176,7 @@ def _draw_fitting(catalogue: Catalogue, group: str, rng: np.random.Generator) ->
 def _fit_beside_door(
     hanging: Hanging, door: Passage, side: int, made: Model, rng: np.random.Generator
 ) -> bool:
-    """Hang a switch on one side of a door: the handle's side is unknown, so either that is free."""
+    """Hang a switch on one side of a door: the handle's side is unknown, so any free side."""
     piece, shape = made
     low = hanging.floor_y + _SWITCH_M - float(shape.bounds[1, 1]) / 2
     half = float(np.abs(shape.bounds[:, 0]).max()) + 0.02

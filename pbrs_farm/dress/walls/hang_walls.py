@@ -1,4 +1,4 @@
-"""The part `walls` of dressing: everything that hangs on walls, room by room; no effects."""
+"""The pass `walls`: hang all wall items, room by room; no effects."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def furnish_walls(house: MutableHouse, catalogue: Catalogue, style: Style, share
         if not room.faces or room.kind is RoomKind.OUTDOOR:
             continue
         hanging = Hanging(house, room, PASS)
-        # What has one right place comes first.
+        # Items with a single valid place come first.
         hang_mirrors(hanging, space, style, share)
         if is_heated:
             hang_radiators(hanging, style, share)

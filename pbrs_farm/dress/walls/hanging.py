@@ -1,4 +1,4 @@
-"""Walls of one room while things are hung on them; state: what is taken."""
+"""Walls of one room while items are hung; state: the occupied areas."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from pbrs_farm.home.room_use import RoomKind
 
 
 class RoomWants(Record):
-    """What a room gets: a row of rooms.csv. Likelihoods 0..1, counts, lux."""
+    """Wall items of a room type: a row of rooms.csv. Probabilities 0..1, counts, lux."""
 
     room: RoomKind
     pictures: int
@@ -45,21 +45,21 @@ class RoomWants(Record):
 
 WANTS: Final = {row.room: row for row in read_csv(Path(__file__).with_name("rooms.csv"), RoomWants)}
 
-GAP_M = 0.0008  # gap between a wall's face and the back of what hangs on it
+GAP_M = 0.0008  # gap between a wall's face and the back of an item on it
 _LEAF_M = (0.03, 0.12, 0.22)  # distances before a wall at which an open door's leaf is looked for
-_WAY_M = (0.36, 0.5, 0.7, 0.9)  # farther out it is in the way of deep things alone
-_DEEP_M = 0.06  # what stands out farther is in the way of the walls beside it
+_WAY_M = (0.36, 0.5, 0.7, 0.9)  # distances beyond which only deeper items are obstructed
+_DEEP_M = 0.06  # deeper items also obstruct the adjacent walls
 _BESIDE_STAIRS_M = 0.1
-_OVER_STAIRS_M = 2.1  # things over stairs hang at least so high above the floor
+_OVER_STAIRS_M = 2.1  # minimum height above the floor of items over stairs
 IN_FRONT_M = 0.35  # free depth before a picture, so that it is seen
 
 
 @dataclass
 class Hanging:
-    """A room's wall faces, without what was hung there; state: the faces, and the house gets the items.
+    """A room's free wall faces; state: the faces, and the house receives the items.
 
-    part: the pass that hangs, for ids and the report. Faces are cut where leaves of doors swing and
-    over stairs. `WallFace.starts` of a face says where a thing of a size fits; `hang` puts it there.
+    part: the pass that hangs, for ids and the report. Faces are cut by door swings and stairs.
+    `WallFace.starts` of a face gives the places for an item of a size; `hang` puts it there.
     """
 
     house: MutableHouse
@@ -108,7 +108,7 @@ class Hanging:
         return item
 
     def _stand_before_others(self, item: Item, face: int) -> None:
-        """Limit what is free before the walls beside the one that a deep thing hangs on."""
+        """Limit the free depth of the walls adjacent to a deep item."""
         low, high = item.bounds
         corners = np.array(
             [[x, low[1], z] for x in (low[0], high[0]) for z in (low[2], high[2])], np.float64
@@ -124,9 +124,9 @@ class Hanging:
 
 
 def _clear_of_doors(face: WallFace, doors: Sequence[tuple[BaseGeometry, float]]) -> WallFace:
-    """The face without what a door's leaf would hit, below the door's top.
+    """The face without the area that a door's leaf would hit, below the door's top.
 
-    What sticks out of it may reach as far as where one goes through the door.
+    Flat items may extend up to the passage through the door.
     """
     columns = (np.arange(face.clear.shape[1]) + 0.5) * CELL_M
     clear = face.clear
@@ -153,7 +153,7 @@ def next_id(house: MutableHouse, part: str) -> str:
 def faces_behind(
     room: RoomSpace, low: F64, high: F64, reach_m: float = 0.12
 ) -> list[tuple[int, float, float]]:
-    """(face, s0, s1) of every wall face that a box low..high (3,) stands against, largest first."""
+    """(face, s0, s1) of every wall face behind a box low..high (3,), largest first."""
     corners = np.array([[x, 0.0, z] for x in (low[0], high[0]) for z in (low[2], high[2])])
     found = []
     for k, face in enumerate(room.faces):

@@ -1,8 +1,8 @@
-"""Pictures as things: framed, on canvas, as posters; mirrors and clocks; no effects.
+"""Framed pictures, canvases, posters, mirrors and clocks as items; no effects.
 
-What needs no picture is in things/hung.py.
+Wall items without a picture are in things/hung.py.
 
-Shapes have their back at z = 0 and grow to +z, the middle of the lower edge at the origin.
+Shapes have their back at z = 0 and grow to +z, the centre of the lower edge at the origin.
 """
 
 from __future__ import annotations

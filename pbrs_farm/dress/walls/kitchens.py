@@ -1,4 +1,4 @@
-"""Cupboards, open boxes and rails over the worktops of kitchens that have none. Effects: changes the house."""
+"""Cupboards, open boxes and rails above the worktops of kitchens without any. Effects: changes the house."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _DEEP_M: Final = 0.32  # depth of cupboards; open ones are 4 cm less
 
 
 def hang_kitchen(hanging: Hanging, space: HouseSpace, style: Style, share: float) -> None:
-    """Cupboards over a kitchen's worktops, as far as the wall is free, and a rail below or instead."""
+    """Hang cupboards above a kitchen's worktops where the wall is free, and a rail below or instead."""
     rng = hanging.house.rng("kitchen wall", hanging.room.room.id)
     if hanging.room.kind is not RoomKind.KITCHEN or rng.random() >= share:
         return
@@ -57,7 +57,7 @@ def _walls_over_worktops(hanging: Hanging, space: HouseSpace) -> list[tuple[int,
                 pieces.setdefault(k, []).append((s0, s1))
     runs: list[tuple[int, float, float]] = []
     for k in sorted(pieces):
-        # Join what stands side by side.
+        # Merge adjacent worktops.
         for s0, s1 in sorted(pieces[k]):
             if runs and runs[-1][0] == k and s0 < runs[-1][2] + 0.05:
                 runs[-1] = (k, runs[-1][1], max(s1, runs[-1][2]))

@@ -75,9 +75,9 @@ class Print:
 
 
 class Gallery:
-    """The prints of a home, drawn as they are needed; state: those drawn so far.
+    """The prints of a home, made on demand; state: those made so far.
 
-    Pictures of the catalogue that are meant for walls come before drawn ones.
+    Pictures of the catalogue for walls take precedence over generated ones.
     """
 
     def __init__(self, house: MutableHouse, catalogue: Catalogue, style: Style) -> None:
@@ -106,7 +106,7 @@ class Gallery:
         return near[int(self._rng.integers(len(near)))]
 
     def _new(self, aspect: float) -> tuple[Srgb8Image, str]:
-        """Pixels of a picture that does not hang yet, and what it is."""
+        """Pixels and kind of a picture that is not in use yet."""
         if self._own:
             likeness = [abs(np.log(p.size[0] / p.size[1] / aspect)) for p in self._own]
             picture = self._own.pop(int(np.argmin(likeness)))
@@ -236,7 +236,7 @@ def _hang_group(
     gallery: Gallery, style: Style, frame: Material,
 ) -> None:  # fmt: skip
     pictures, left, bottom = group
-    # What hangs together is framed alike.
+    # A group of pictures has the same kind of frame.
     kind = str(rng.choice(["framed", "canvas", "poster"], p=[0.68, 0.22, 0.1]))
     own, hung = int(rng.integers(1 << 30)), list[str]()
     for x, y, w, h in pictures.frames:

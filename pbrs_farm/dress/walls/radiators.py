@@ -1,4 +1,4 @@
-"""Panel radiators below the windows of a home that has none. Effects: changes the house."""
+"""Panel radiators below the windows of a home without any. Effects: changes the house."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _UNHEATED = (RoomKind.STORE, RoomKind.OUTDOOR)
 
 
 def wants_radiators(house: MutableHouse) -> bool:
-    """Whether the home is heated neither by what was drawn nor from its floors."""
+    """True if the home has neither radiators in the source nor floor heating."""
     drawn = any(words_of_item(item) & (RADIATORS | _OTHER_HEAT) for item in house.source.items)
     return not drawn and float(house.rng("radiators").random()) < _HEATED
 

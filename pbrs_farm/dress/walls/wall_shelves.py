@@ -22,7 +22,7 @@ from pbrs_farm.home.room_use import RoomKind
 
 _RADIATORS: Final = 0.65  # share of bathrooms with a towel radiator
 _LADDER_M: Final = 0.45  # height of a towel radiator's foot above the floor
-_ABOVE_M: Final = 0.32  # free over the highest board: things stand there
+_ABOVE_M: Final = 0.32  # free height above the highest board, for its contents
 _BEFORE_M: Final = 0.3  # free before it
 
 
@@ -37,7 +37,7 @@ def hang_shelves(hanging: Hanging, style: Style, share: float) -> None:
         hang_anywhere(hanging, radiators.towel_radiator.make(rng, style), _LADDER_M, 0.2, rng)
     wood = plain(f"shelf {style.wood.name}", style.wood.mean, 0.4)
     board = wood if rng.random() < 0.6 else plain("shelf white", (0.9, 0.9, 0.88), 0.4)
-    # What hangs in one room is of one make, of several widths.
+    # Shelves of one room share a design, with several widths.
     for _ in range(wanted):
         longest = 0.7 if is_bath else 1.7
         width = float(rng.uniform(0.35 if is_bath else 0.6, longest))

@@ -147,7 +147,7 @@ def bridge_gaps(
 ) -> list[Manifold]:
     """Solids that join the planes of one ceiling behind its creases, where slabs only abut.
 
-    surfaces: of all items; only those of one item are joined. The solids stay behind what is seen.
+    surfaces: of all items; only those of one item are joined. The solids stay behind visible faces.
     """
     solids = []
     for k, surface in enumerate(surfaces):
