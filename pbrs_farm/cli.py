@@ -62,7 +62,7 @@ def _module_of(words: Sequence[str]) -> str | None:
 def _verb_first(words: Sequence[str]) -> list[str]:
     def parser_of(verb: str) -> argparse.ArgumentParser:
         # A verb whose packages are not installed takes no option.
-        return build_parser(_module_of([verb])).verbs().get(verb, Parser())
+        return build_parser(_module_of([verb]), words).verbs().get(verb, Parser())
 
     return verb_first(words, list(VERBS), parser_of)
 
@@ -98,7 +98,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _run_parsed(words: Sequence[str], verb: str, module: str | None) -> int:
     """Read the options of a verb and run it."""
-    parser = build_parser(module) if module else first_screen()
+    parser = build_parser(module, words) if module else first_screen()
     args, unknown = parser.parse_known_args(words)
     if unknown:
         of_verb = parser.verbs().get(verb, parser)
@@ -151,26 +151,30 @@ def _handled(args: argparse.Namespace) -> int:
         return 1
 
 
-def build_parser(module: str | None = None) -> Parser:
+def build_parser(module: str | None = None, words: Sequence[str] | None = None) -> Parser:
     """The parser with the verbs of one module of pbrs_farm.commands, or with all.
 
     module: a name of MODULES. One module is imported for one verb, so that a command starts fast; the
-    farm's verbs are left out where celery or redis is not installed.
+    farm's verbs are left out where celery or redis is not installed. words: of the command, which some
+    options depend on; with None the parser has all options.
     """
     # Every verb takes --debug, before or after its own options.
     common = Parser(add_help=False)
     common.add_argument("--debug", action="store_true", help="show tracebacks")
     parser, add_parser = _bare_parser()
 
-    def verb(name: str, handler: Handler) -> argparse.ArgumentParser:
+    def verb(name: str, handler: Handler) -> Parser:
         text = VERBS[name].help
-        sub = add_parser(name, help=text, description=text, parents=[common])
+        sub: Parser = add_parser(name, help=text, description=text, parents=[common])
         sub.set_defaults(handler=handler)
         return sub
 
     for name in [module] if module else MODULES:
         if name not in _OF_THE_FARM or _has_farm():
             import_module(f"pbrs_farm.commands.{name}").add_verbs(verb)
+    for name, sub in parser.verbs().items():
+        if sub.options_by_words is not None and (words is None or name in words):
+            sub.options_by_words(sub, words)
     return parser
 
 

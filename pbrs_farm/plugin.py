@@ -49,9 +49,11 @@ if TYPE_CHECKING:
     from pbrs_farm.core.layers import optional_layer as optional_layer
     from pbrs_farm.core.lighting import LightForm as LightForm
     from pbrs_farm.core.lighting import PowerUnit as PowerUnit
+    from pbrs_farm.core.options import option as option
     from pbrs_farm.core.recipe import CameraFields as CameraFields
     from pbrs_farm.core.recipe import ReadFields as ReadFields
     from pbrs_farm.core.recipe import ToneFields as ToneFields
+    from pbrs_farm.core.record import Record as Record
     from pbrs_farm.dress.mutable_house import MutableHouse as MutableHouse
     from pbrs_farm.dress.style import Style as Style
     from pbrs_farm.export.chosen_view import Choice as Choice
@@ -105,7 +107,9 @@ _MODULES: Final = {
     "core.keys": ("sha256", "view_id"),
     "core.layers": ("Layer", "optional_layer"),
     "core.lighting": ("LightForm", "PowerUnit"),
+    "core.options": ("option",),
     "core.recipe": ("CameraFields", "ReadFields", "ToneFields"),
+    "core.record": ("Record",),
     "dress.mutable_house": ("MutableHouse",),
     "dress.style": ("Style",),
     "furnishings.things.bodies": (

@@ -132,6 +132,11 @@ def fault_of(error: OSError) -> str:
     return f"cannot be read: {error.strerror or 'the system gave no reason'}"
 
 
+def files_below(folder: Path) -> list[Path]:
+    """The regular files of a folder and of all folders in it."""
+    return [path for path in folder.rglob("*") if path.is_file()]
+
+
 @contextmanager
 def new_folder(out: Path) -> Iterator[Path]:
     """Yield a temporary folder that is renamed to out at the end, or removed on any error.

@@ -9,9 +9,10 @@ from pathlib import Path
 from pydantic import ConfigDict, Field
 
 from pbrs_farm.core import keys
+from pbrs_farm.core.options import option
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.core.record import Record
-from pbrs_farm.run.request import ModelsOption, Request, Wanted, option
+from pbrs_farm.run.request import ModelsOption, Request, Wanted
 from pbrs_farm.store.pack import FORMAT
 from workers.ids import DEFAULT_PRIORITY, GL, LEAST_URGENT, LIGHT
 

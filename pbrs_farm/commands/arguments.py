@@ -14,6 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, cast
 
+from pbrs_farm.commands.command_line import Parser
 from pbrs_farm.commands.options import add_options, group_of
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.number_ranges import seeds_of
@@ -25,8 +26,8 @@ if TYPE_CHECKING:
     from workers.client.farm_client import Farm
 
 Handler = Callable[[argparse.Namespace], int]
-# (name, handler) -> the verb's parser; its help stands in verbs.csv.
-Verb = Callable[[str, Handler], argparse.ArgumentParser]
+# (name, handler) -> the verb's parser; verbs.csv has its help
+Verb = Callable[[str, Handler], Parser]
 
 # Help of arguments that name a home, and a view.
 HOME: Final = (

@@ -39,7 +39,10 @@ VERBS: Final = {row.verb: row for row in _rows()}
 class Parser(argparse.ArgumentParser):
     """An ArgumentParser whose help lists verbs in groups."""
 
-    def verbs(self) -> dict[str, argparse.ArgumentParser]:
+    options_by_words: Callable[[Parser, Sequence[str] | None], None] | None = None
+    """Of a verb: adds the options that depend on the command's words, as on --to; all of them for None."""
+
+    def verbs(self) -> dict[str, Parser]:
         """Verb -> its parser, in the order in which they were added.
 
         Empty for the parser of a verb itself.

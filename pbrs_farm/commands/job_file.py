@@ -19,8 +19,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from pbrs_farm.commands.options import flag, values_of_table
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.options import flag, values_of_table
 from pbrs_farm.core.shown_text import did_you_mean
 from pbrs_farm.regular_files import text_given
 

@@ -3,38 +3,45 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pbrs_farm.commands.arguments import VIEW, Verb, counted, echo, echo_json, size_of, warn
 from pbrs_farm.commands.options import add_options, request_from
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.export.form import HomeForm, form_names, form_of
+from pbrs_farm.export.form import HomeForm, ViewForm, form_names, form_of
 
 if TYPE_CHECKING:
+    from pbrs_farm.core.house_split import SplitShares
     from pbrs_farm.export.chosen_view import Choice
-    from pbrs_farm.export.export_options import ExportOptions
+    from pbrs_farm.export.form import Form
+    from pbrs_farm.export.view_options import ViewOptions
+    from pbrs_farm.views.packing.packing_plan import Packing, PackOptions
 
 SPLIT = "by home: train/val/test (default 80/10/10); without it all views are one"
 
 
 def add_verbs(verb: Verb) -> None:
     """Add export, pack, classes and label-sheet."""
-    from pbrs_farm.export.export_options import ExportOptions
+    from pbrs_farm.export.view_options import ViewOptions
     from pbrs_farm.run.request import ModelsOption
+    from pbrs_farm.views.packing.pack_options import PackOptions
 
     p = verb("export", _export)
+    p.options_by_words = _add_form_options
     add = p.add_argument
     add("folder", metavar="ROOT", help="an output folder, or s3://bucket/prefix")
     add(
         "--to",
         required=True,
         choices=form_names(),
-        help="docs/formats/export.md describes the forms",
+        help="docs/formats/export.md describes the forms; `--to FORM --help` lists the options of one",
     )
     add("--out", type=Path, help="new folder (default FOLDER_<form>)")
     add("--selection", metavar="RUN", help="only what this run keeps")
-    add_options(p, ExportOptions)
+    add_options(p, ViewOptions)
     add("--split", nargs="?", const="80/10/10", metavar="SHARES", help=SPLIT)
 
     p = verb("pack", _pack_views)
@@ -43,15 +50,8 @@ def add_verbs(verb: Verb) -> None:
     add("--out", type=Path, required=True, help="new folder")
     add("--to", choices=("shards", "parquet"), default="shards", help="default shards")
     add("--selection", metavar="RUN", help="only what this run keeps")
-    layers = "colour normal depth class40 instance boundary (default all)"
-    add("--layers", nargs="+", metavar="LAYER", help=layers)
-    modes = "opengl_dl opengl_il mlt_ol mlt_il_ol (default all there are)"
-    add("--modes", nargs="+", metavar="MODE", help=modes)
-    add("--size", metavar="WxH", help="resize to, e.g. 320x240 (default as rendered)")
+    add_options(p, PackOptions)
     add("--split", nargs="?", const="80/10/10", metavar="SHARES", help=SPLIT)
-    add("--shard-size", type=int, default=200, metavar="N", help="views a shard (default 200)")
-    text = "png (default) keeps every bit; jpeg:95 is a quarter as large and loses a little"
-    add("--colour", default="png", metavar="FORM", help=text)
     add("--seed", type=int, default=0, help="of the order of views (default 0)")
 
     p = verb("classes", _count_classes)
@@ -64,16 +64,53 @@ def add_verbs(verb: Verb) -> None:
     p.add_argument("--out", type=Path, help="PNG (default VIEW_labels.png here)")
 
 
+def _add_form_options(p: argparse.ArgumentParser, words: Sequence[str] | None) -> None:
+    """Add the options of the form that the words name; of all forms if words is None.
+
+    An option of other forms alone ends the command with an error that names them.
+    """
+    from pbrs_farm.export.form import form_options, no_such_option, view_forms
+
+    if words is None:
+        for form in view_forms():
+            if not any(f"--{name}" in p._option_string_actions for name in form_options(form)):
+                _add_options_of(p, form)
+        return
+    chosen = argparse.ArgumentParser(add_help=False, exit_on_error=False)
+    chosen.add_argument("--to")
+    try:
+        name = chosen.parse_known_args(words)[0].to
+    except argparse.ArgumentError:
+        return
+    if name not in form_names():
+        return
+    form = form_of(name)
+    _add_options_of(p, form)
+    unknown = {word.partition("=")[0] for word in words if word.startswith("--")}
+    for option in sorted(unknown - p._option_string_actions.keys()):
+        field = option.removeprefix("--").replace("-", "_")
+        if any(field in form_options(other) for other in view_forms()):
+            p.error(str(no_such_option(form, field)))
+
+
+def _add_options_of(p: argparse.ArgumentParser, form: Form) -> None:
+    if isinstance(form, ViewForm) and form.options is not None:
+        add_options(p, form.options, group=f"{form.name} (--to {form.name})")
+
+
 def _export(args: argparse.Namespace) -> int:
-    if isinstance(form_of(args.to), HomeForm):
+    form = form_of(args.to)
+    if isinstance(form, HomeForm):
         return _export_homes(args)
     from pbrs_farm.core.house_split import shares_from_text
-    from pbrs_farm.export.export_options import ExportOptions
     from pbrs_farm.export.export_views import export, remarks_of
+    from pbrs_farm.export.view_options import ViewOptions
     from pbrs_farm.run.output_root import as_files
     from pbrs_farm.settings import settings_from_environment
 
-    choice = choice_of(request_from(args, ExportOptions))
+    choice = choice_of(request_from(args, ViewOptions))
+    if form.options is not None:
+        choice = replace(choice, options=request_from(args, form.options))
     shares = shares_from_text(args.split) if args.split else None
     out = args.out or Path(f"{Path(args.folder).resolve().name}_{args.to}")
     with as_files(args.folder, settings_from_environment().store) as folder:
@@ -86,19 +123,17 @@ def _export(args: argparse.Namespace) -> int:
     return 0
 
 
-def choice_of(options: ExportOptions) -> Choice:
-    """What is exported by options; BadInput for a layer, mode, size or table that there is not."""
+def choice_of(options: ViewOptions) -> Choice:
+    """The exported layers, modes, size and classes; BadInput for unknown or damaged ones."""
     from pbrs_farm.export.chosen_view import Choice
     from pbrs_farm.formats.class_map import class_map
 
-    # None is all there is: layers (but radiance), modes, the stored size.
+    # None: all layers but radiance, all modes, the stored size.
     return Choice(
         layers=options.layers or None,
         modes=options.modes or None,
         size=size_of(options.size),
-        views_per_shard=options.shard_size,
         classes=class_map(options.classes) if options.classes else None,
-        lidar=options.lidar,
     )
 
 
@@ -124,34 +159,39 @@ def _export_homes(args: argparse.Namespace) -> int:
 def _pack_views(args: argparse.Namespace) -> int:
     from pbrs_farm.core.house_split import shares_from_text
     from pbrs_farm.views.open_views import open_views
+    from pbrs_farm.views.packing.pack_options import PackOptions
     from pbrs_farm.views.packing.pack_shards import pack
-    from pbrs_farm.views.packing.packing_plan import Packing
-    from pbrs_farm.views.view_sample import LAYERS
 
-    colour, _, quality = args.colour.partition(":")
-    if quality and not quality.isdigit():
-        raise BadInput("--colour", args.colour, "expected png, jpeg or jpeg:QUALITY")
     views = open_views(args.root)
     if args.selection is not None:
         views = views.only(selection=args.selection)
-    packing = Packing(
-        size=size_of(args.size),
-        layers=tuple(args.layers or LAYERS),
-        modes=tuple(args.modes or views[:1].modes),
-        shares=shares_from_text(args.split) if args.split else None,
-        views_per_shard=args.shard_size,
-        colour=colour,
-        quality=int(quality or 95),
-        seed=args.seed,
-    )
+    shares = shares_from_text(args.split) if args.split else None
+    packing = packing_of(request_from(args, PackOptions), shares, views[:1].modes, args.seed)
     packed = pack(views, args.out, packing, form=args.to, tell=echo)
-    # Say what was left out: a run may still go on.
+    # A run may still go on: name the views that are left out.
     if packed.left_out:
         at, why = next(iter(packed.left_out.items()))
         warn(f"{counted(len(packed.left_out), 'view')} left out, {at}: {why}")
     said = ", ".join(f"{split} {n}" for split, n in packed.n_views.items())
     echo(f"{args.out}: {said} views, {packed.n_files} files, {packed.n_bytes / 1e6:.1f} MB")
     return 0
+
+
+def packing_of(
+    options: PackOptions, shares: SplitShares | None, modes: Sequence[str], seed: int = 0
+) -> Packing:
+    """The packing of these options; modes: if the options name none. BadInput for a wrong colour or size."""
+    from pbrs_farm.views.packing.packing_plan import Packing
+    from pbrs_farm.views.view_sample import LAYERS
+
+    colour, _, quality = options.colour.partition(":")
+    if quality and not quality.isdigit():
+        raise BadInput("--colour", options.colour, "expected png, jpeg or jpeg:QUALITY")
+    return Packing(
+        size=size_of(options.size), layers=options.layers or LAYERS, shares=shares,
+        modes=options.modes or tuple(modes), views_per_shard=options.shard_size, colour=colour,
+        quality=int(quality or 95), seed=seed,
+    )  # fmt: skip
 
 
 def _count_classes(args: argparse.Namespace) -> int:
@@ -173,7 +213,7 @@ def _is_home(word: str) -> bool:
 
 
 def _home_classes(args: argparse.Namespace) -> int:
-    """What a home's pieces are and why, without rendering it."""
+    """Print the class of each piece of a home, and the rule that chose it, without rendering the home."""
     from pbrs_farm.core.recipe import ReadFields
     from pbrs_farm.gallery.class_decisions import class_decisions, decisions_text
     from pbrs_farm.prepare.read_source import read_house

@@ -21,36 +21,32 @@ import re
 import tomllib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
-from pbrs_farm.commands.arguments import dress_seeds, recipe_of, size_of
-from pbrs_farm.commands.labelling import choice_of
-from pbrs_farm.commands.options import request_from, values_of_table
+from pbrs_farm.commands.arguments import dress_seeds, recipe_of
+from pbrs_farm.commands.labelling import choice_of, packing_of
+from pbrs_farm.commands.options import request_from
 from pbrs_farm.core.errors import BadInput, PbrsError
 from pbrs_farm.core.house_split import shares_from_text
+from pbrs_farm.core.options import option, options_of, values_of_table
 from pbrs_farm.core.record import Record
 from pbrs_farm.core.shown_text import did_you_mean, hint_of_choice
 from pbrs_farm.curate.teaching_rules import REASONS
-from pbrs_farm.export.export_options import ExportOptions
-from pbrs_farm.export.form import ViewForm, form_names, form_of
+from pbrs_farm.export.form import ViewForm, form_names, form_of, options_from
+from pbrs_farm.export.view_options import ViewOptions
 from pbrs_farm.prepare.source import words_of_homes
 from pbrs_farm.regular_files import read_given, text_from_bytes
-from pbrs_farm.run.request import (
-    CameraOptions,
-    ModelsOption,
-    Request,
-    option,
-    options_of,
-    wanted_of,
-)
+from pbrs_farm.run.request import CameraOptions, ModelsOption, Request, wanted_of
 from pbrs_farm.sets.data_set import SHIPPED, DataSet, SetCard, SetForm, SetPart, shipped_sets
 from pbrs_farm.truth.optional_layers import check_lens
-from pbrs_farm.views.packing.packing_plan import FORMS, Packing
-from pbrs_farm.views.view_sample import LAYERS
+from pbrs_farm.views.packing.pack_options import PackOptions
+from pbrs_farm.views.packing.packing_plan import FORMS
 
 _ENDING: Final = ".toml"
 _TABLES: Final = ("card", "render", "part", "form")
+_SHARD_SIZE: Final = 500  # default views a shard of a set
 _NAME: Final = re.compile(r"[a-z0-9][a-z0-9_-]{0,40}")
 
 
@@ -76,12 +72,19 @@ class CardTable(Record):
     licence: str = option("", "under which it may be used")
 
 
-class FormTable(ExportOptions):
-    """A table [form.NAME]."""
+class FormTable(Record):
+    """The entries of every table [form.NAME]."""
 
-    to: str = option("", "the form; the table's name where it is left out")
-    parts: tuple[str, ...] = option((), "of these parts, all where it is left out")
-    colour: str = option("png", "of shards and parquet: png or jpeg:QUALITY")
+    to: str = option("", "the form (default: the table's name)")
+    parts: tuple[str, ...] = option((), "of these parts (default: all)")
+
+
+class ViewFormTable(FormTable, ViewOptions):
+    """A table [form.NAME] of `export`; the options of its form come on top."""
+
+
+class PackTable(FormTable, PackOptions):
+    """A table [form.NAME] of `pack`."""
 
 
 def is_set(word: str) -> bool:
@@ -188,36 +191,40 @@ def _part(name: str, table: Mapping[str, Any], common: Mapping[str, Any], file: 
 def _form(
     name: str, table: Mapping[str, Any], parts: tuple[str, ...], shares: Any, file: str
 ) -> SetForm:
-    values = values_of_table(table, FormTable, f"{file} [form.{name}]")
+    place, to = f"{file} [form.{name}]", str(table.get("to", "")) or name
     with _placed(file, f"form.{name}"):
-        asked = request_from(argparse.Namespace(**values), FormTable)
-        to = asked.to or name
-        known = (*form_names(), *FORMS)
-        if to not in known:
-            raise BadInput("to", to, "no such form", hint=hint_of_choice(to, known))
-        for part in asked.parts:
-            if part not in parts:
-                raise BadInput("parts", part, "no such part", hint=hint_of_choice(part, parts))
-        if to in FORMS:
-            return SetForm(name, to, asked.parts or parts, packing=_packing(asked, shares))
+        forms = (*form_names(), *FORMS)
+        if to not in forms:
+            raise BadInput("to", to, "no such form", hint=hint_of_choice(to, forms))
+    if to in FORMS:
+        values = {"shard_size": _SHARD_SIZE} | values_of_table(table, PackTable, place)
+        with _placed(file, f"form.{name}"):
+            pack_table = request_from(argparse.Namespace(**values), PackTable)
+            # Without modes, those of each part.
+            packing = packing_of(pack_table, shares, ())
+            return SetForm(name, to, _parts_of(pack_table, parts), packing=packing)
+    common = options_of(ViewFormTable)
+    of_form = {k: v for k, v in table.items() if k.replace("-", "_") not in common}
+    values = values_of_table(
+        {k: v for k, v in table.items() if k not in of_form}, ViewFormTable, place
+    )
+    with _placed(file, f"form.{name}"):
+        view_table = request_from(argparse.Namespace(**values), ViewFormTable)
         form = form_of(to)
         if not isinstance(form, ViewForm):
             raise BadInput("to", to, "is a form of homes, not of views")
-        if asked.classes and not form.has_classes:
+        if view_table.classes and not form.has_classes:
             raise BadInput("classes", "", f"{to} has no classes of your own")
-        return SetForm(name, to, asked.parts or parts, choice_of(asked))
+        options = options_from(form, {k.replace("-", "_"): v for k, v in of_form.items()})
+        choice = replace(choice_of(view_table), options=options)
+        return SetForm(name, to, _parts_of(view_table, parts), choice)
 
 
-def _packing(asked: FormTable, shares: Any) -> Packing:
-    """How `pack` would do it; without modes, those of each part."""
-    colour, _, quality = asked.colour.partition(":")
-    if quality and not quality.isdigit():
-        raise BadInput("colour", asked.colour, "expected png, jpeg or jpeg:QUALITY")
-    return Packing(
-        size=size_of(asked.size), layers=asked.layers or LAYERS, shares=shares,
-        views_per_shard=asked.shard_size, colour=colour, quality=int(quality or 95),
-        modes=asked.modes,
-    )  # fmt: skip
+def _parts_of(table: FormTable, parts: tuple[str, ...]) -> tuple[str, ...]:
+    for part in table.parts:
+        if part not in parts:
+            raise BadInput("parts", part, "no such part", hint=hint_of_choice(part, parts))
+    return table.parts or parts
 
 
 def options_given(part: SetPart) -> dict[str, Any]:

@@ -9,7 +9,7 @@ import json
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,7 @@ from pbrs_farm.core.frames import PUBLISHED_FROM_OPENGL
 from pbrs_farm.core.layers import LAYER, LAYERS, Layer
 from pbrs_farm.core.lenses import PINHOLE, lens_from_table
 from pbrs_farm.core.lighting import Mode
+from pbrs_farm.core.record import Record
 from pbrs_farm.core.resampling import resized_any, resized_by_area, resized_nearest
 from pbrs_farm.formats.class_map import ClassMap
 from pbrs_farm.formats.layer_file import layer_bytes, layer_from_bytes
@@ -33,6 +34,7 @@ PICTURES: Final = (Mode.MLT_IL_OL, Mode.MLT_OL, Mode.OPENGL_IL, Mode.OPENGL_DL)
 
 _MODES: Final = tuple(str(mode) for mode in Mode)
 _RADIANCE: Final = "radiance"  # nine tenths of a view's bytes: only when it is named
+_Options = TypeVar("_Options", bound=Record)
 _NEEDED: Final = ("width_px", "height_px", "instances")  # of view.json, by every export
 _CLASSES: Final = "semantic"  # the layer that a user's own classes replace
 # Classes of NYU40 that are parts of the building; all others are objects.
@@ -41,19 +43,18 @@ _STRUCTURE: Final = ("wall", "floor", "ceiling", "door", "window", "otherstructu
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """What is exported. Raises BadInput for a name that is no layer or mode.
+    """The exported layers, modes, size and classes. Raises BadInput for a name that is no layer or mode.
 
-    layers: names of core/layers.py without the modes; None for all there are, radiance apart.
-    modes: None for all. size: (width, height), None as rendered. classes: None for NYU40. lidar: which
-    scanner of truth/lidar.py the form lidar has.
+    layers: names of core/layers.py without the modes; None for all but radiance. modes: None for all.
+    size: (width, height), None as rendered. classes: None for NYU40. options: those of the form, None
+    for its defaults.
     """
 
     layers: tuple[str, ...] | None = None
     modes: tuple[str, ...] | None = None
     size: tuple[int, int] | None = None
-    views_per_shard: int = 500  # of WebDataset
     classes: ClassMap | None = None
-    lidar: str = "vlp16"
+    options: Record | None = None
 
     def __post_init__(self) -> None:
         labels = [layer.name for layer in LAYERS if layer.name not in _MODES]
@@ -68,14 +69,15 @@ class Choice:
             raise BadInput(
                 "--size", "", "radiance.exr is not resized", hint="leave out one of them"
             )
-        if self.views_per_shard < 1:
-            raise BadInput("--shard-size", str(self.views_per_shard), "expected 1 or more")
+
+    def of(self, kind: type[_Options]) -> _Options:
+        """The form's options, of the type that its FORM names."""
+        return self.options if isinstance(self.options, kind) else kind()
 
     def takes(self, name: str) -> bool:
-        """Whether a layer is exported where a view has it; valid comes with normal.
+        """True if a layer is exported from views that have it; valid comes with normal.
 
-        Without a choice all modes and layers are taken but radiance, which must be named: it is
-        large.
+        By default all modes and all layers but radiance, which is large and must be named.
         """
         if name in _MODES:
             return self.modes is None or name in self.modes

@@ -1,7 +1,6 @@
 """`pbrs-farm export ROOT --to gltf | habitat | mjcf | sdf | urdf | usd`: homes as scenes of other simulators.
 
-Effects: reads house.glb and house.json of an output folder, writes a new folder; it appears whole or
-not at all.
+Effects: reads house.glb and house.json of an output folder, writes a new folder; it appears whole or not at all.
 """
 
 from __future__ import annotations
@@ -14,78 +13,73 @@ from pbrs_farm.export.form import HomeForm, form_names, form_of
 from pbrs_farm.export.grasps import GRASPS, grasps_json
 from pbrs_farm.export.home_pieces import ExportedHome, exported_home
 from pbrs_farm.formats.house_bundle import house_from_bundle
-from pbrs_farm.regular_files import MAX_SCENE_BYTES, fault_of, new_folder, read_regular
+from pbrs_farm.regular_files import MAX_SCENE_BYTES, fault_of, files_below, new_folder, read_regular
 
 
 def export_homes(folder: Path, out: Path, name: str) -> tuple[int, int, list[str]]:
     """Write every home of folder to out in the form of that name: (homes, files, remarks for the user).
 
-    folder: an output folder, or one of `repair` or `dress` with house.glb. Each home lies in a
-    folder of its id. Raises BadInput for a form that writes no homes, where folder holds no home, or
-    out holds something.
+    folder: an output folder, or one of `repair` or `dress` with house.glb. Each home gets a folder of
+    its id. Raises BadInput for a form of views, a folder without homes, or an out that is not empty.
     """
     form, remarks = _home_form(name), []
-    found = house_folders(folder)
-    n_files = 0
+    folders = house_folders(folder)
     with new_folder(out) as scratch:
-        for one in found:
-            home = exported_home(stored_house(one))
-            n_files += _write_home(home, scratch / home.house.id, form)
+        for house_folder in folders:
+            home = exported_home(stored_house(house_folder))
+            _write_home(home, scratch / home.house.id, form)
             if form.remark:
                 remarks.append(f"{home.house.id}: {form.remark}")
-    return len(found), n_files, remarks
+        return len(folders), len(files_below(scratch)), remarks
 
 
 def export_house(house: House, out: Path, name: str) -> int:
-    """Write one house to a new folder in the form of that name: the number of files.
+    """Write one house to a new folder in the form of that name; returns the number of files.
 
-    Raises BadInput for a form that writes no homes, or where out holds something.
+    Raises BadInput for a form of views, or an out that is not empty.
     """
     form = _home_form(name)
     with new_folder(out) as scratch:
-        return _write_home(exported_home(house), scratch, form)
+        _write_home(exported_home(house), scratch, form)
+        return len(files_below(scratch))
 
 
 def _home_form(name: str) -> HomeForm:
     form = form_of(name) if name in form_names() else None
     if not isinstance(form, HomeForm):
-        known = (form_of(other) for other in form_names())
-        hint = f"of {', '.join(form.name for form in known if isinstance(form, HomeForm))}"
+        forms = (form_of(other) for other in form_names())
+        hint = f"of {', '.join(form.name for form in forms if isinstance(form, HomeForm))}"
         raise BadInput("--to", name, "no such form of a home", hint=hint)
     return form
 
 
-def _write_home(home: ExportedHome, folder: Path, form: HomeForm) -> int:
+def _write_home(home: ExportedHome, folder: Path, form: HomeForm) -> None:
     folder.mkdir(exist_ok=True)
-    n_files = form.write(home, folder)
+    form.write(home, folder)
     if form.up:
         (folder / GRASPS).write_bytes(grasps_json(home, form.up))
-        n_files += 1
     if home.credit:
         (folder / "ATTRIBUTION.txt").write_text(f"{home.credit}\n", "utf-8")
-        n_files += 1
-    return n_files
 
 
 def house_folders(folder: Path) -> list[Path]:
     """Folders that hold house.glb and house.json: folder itself, or those below its houses.
 
-    Sorted by name. BadInput where there is none; houses that lack one of the files are left out.
+    Sorted by name. BadInput if there are none; houses that lack one of the files are left out.
     """
     below = folder / "houses"
-    found = sorted(below.iterdir()) if below.is_dir() else [folder]
-    found = [f for f in found if (f / "house.glb").is_file() and (f / "house.json").is_file()]
-    if not found:
+    folders = sorted(below.iterdir()) if below.is_dir() else [folder]
+    folders = [f for f in folders if (f / "house.glb").is_file() and (f / "house.json").is_file()]
+    if not folders:
         hint = "an output folder of `run`, `dress` or `repair`"
         raise BadInput(folder, "", "holds no house.glb and house.json", hint=hint)
-    return found
+    return folders
 
 
 def stored_house(folder: Path) -> House:
-    """The house of a folder's house.glb and house.json; BadInput where they are damaged.
+    """The house of a folder's house.glb and house.json, which needs no recipe or manifest beside them.
 
-    Also without a recipe or manifest beside it. BadInput for what is no regular file or larger than
-    a scene may be.
+    BadInput for files that are damaged, not regular, or larger than a scene may be.
     """
     try:
         data = {

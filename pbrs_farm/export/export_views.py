@@ -1,4 +1,4 @@
-"""`pbrs-farm export`: a finished output folder in the forms other tools read.
+"""`pbrs-farm export`: the views of an output folder in the forms of other tools.
 
 Effects: reads an output folder, writes a new folder; it appears whole or not at all. The forms are
 the modules of `forms/`; docs/formats/export.md describes them.
@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
@@ -18,10 +19,10 @@ from pbrs_farm.core.checked_calls import as_words, checked_call
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house_split import SPLITS, SplitShares, split_of_house
 from pbrs_farm.export.chosen_view import Choice, ChosenView
-from pbrs_farm.export.form import LEFT_OUT, REMARKS, ViewForm, form_of, forms_with_classes
+from pbrs_farm.export.form import LEFT_OUT, REMARKS, ViewForm, form_of, options_from, view_forms
 from pbrs_farm.formats.class_map import class_map
 from pbrs_farm.formats.output_folder import ViewEntry, views_of
-from pbrs_farm.regular_files import fault_of, new_folder, read_regular
+from pbrs_farm.regular_files import fault_of, files_below, new_folder, read_regular
 
 if TYPE_CHECKING:
     from pbrs_farm.views.views import Views
@@ -37,15 +38,16 @@ def export(
     choice: Choice | None = None,
     shares: SplitShares | None = None,
     views: Collection[tuple[str, str]] | None = None,
+    **options: Any,
 ) -> tuple[int, int]:
     """Write the finished views of folder to out in the form of that name: (views, files written).
 
-    out must not exist, or be empty. selection: only the views that selection/<selection>.jsonl
-    keeps; views: only these (house, view). choice: which layers and modes, at which size. shares: a folder for each split that has
-    views (train, val, test, by home), each whole in itself. Views without labels are left out.
-    Raises BadInput for an unknown form or one of homes, classes of the user's for a form without
-    classes, a folder without finished views, a selection that does not exist, or an out that holds
-    something.
+    out must not exist, or be empty. selection: only the views that selection/<selection>.jsonl keeps;
+    views: only these (house, view). choice: layers, modes, size and classes. shares: a folder for each
+    split that has views (train, val, test, by home), each whole in itself. options: of the form, as
+    `scanner="vlp16"` of lidar. Views without labels are left out. Raises BadInput for an unknown form
+    or one of homes, an option that the form does not have, classes of the user's for a form without
+    classes, a folder without finished views, a missing selection, or an out that is not empty.
 
     >>> frame.save("out/detect")
     >>> n_views, n_files = pf.export_views("out/detect", "out/coco", "coco")
@@ -57,57 +59,59 @@ def export(
     if not isinstance(form, ViewForm):
         raise BadInput("--to", name, "is a form of homes", hint="export_homes writes it")
     choice = choice or Choice()
+    if options or choice.options is None:
+        choice = replace(choice, options=options_from(form, options))
     if choice.classes is not None and not form.has_classes:
-        hint = f"--to {', '.join(forms_with_classes())}"
+        hint = f"--to {', '.join(form.name for form in view_forms() if form.has_classes)}"
         raise BadInput("--classes", "", f"{name} has no classes of your own", hint=hint)
-    found = finished_entries(folder, selection)
+    entries = finished_entries(folder, selection)
     if views is not None:
-        found = [v for v in found if (v.house.id, v.id) in views]
-    if not found:
+        entries = [v for v in entries if (v.house.id, v.id) in views]
+    if not entries:
         raise BadInput(folder, "", "no finished view to export")
     with new_folder(out) as scratch:
-        n_files = 0
-        by_split = _by_split(found, shares)
-        for split, own in by_split.items():
+        by_split = _by_split(entries, shares)
+        for split, split_entries in by_split.items():
             part = scratch / split
             part.mkdir(exist_ok=True)
-            n_files += form.write([ChosenView(v, choice) for v in own], part, choice)
+            form.write([ChosenView(v, choice) for v in split_entries], part, choice)
         if form.finish is not None:
-            n_files += form.finish(scratch, tuple(filter(None, by_split)), choice)
-    return len(found), n_files
+            form.finish(scratch, tuple(filter(None, by_split)), choice)
+        return len(entries), len(files_below(scratch))
 
 
 def finished_entries(folder: Path, selection: str | None = None) -> list[ViewEntry]:
     """The finished views of a folder, or those that selection/<selection>.jsonl keeps; BadInput as export."""
     # A view is finished when its labels are there.
-    found = [v for v in views_of(folder) if "instances" in v.facts and v.file("instance.png")]
+    entries = [v for v in views_of(folder) if "instances" in v.facts and v.file("instance.png")]
     if selection is None:
-        return found
-    kept = _kept(folder, selection)
-    return [v for v in found if (v.house.id, v.id) in kept]
+        return entries
+    names = _selected(folder, selection)
+    return [v for v in entries if (v.house.id, v.id) in names]
 
 
 def export_frames(
     frames: Views, out: Path, name: str, *, layers: str | Sequence[str] | None = None,
     modes: str | Sequence[str] | None = None, size: tuple[int, int] | None = None,
-    classes: str | Path | None = None, shares: SplitShares | None = None, lidar: str = "vlp16",
-) -> None:  # fmt: skip
-    """Write frames to out in the form of that name: what `Views.export` does.
+    classes: str | Path | None = None, shares: SplitShares | None = None, **options: Any,
+) -> Path:  # fmt: skip
+    """Write frames to the new folder out in the form of that name, as `Views.export`; returns out.
 
-    Frames that lie in no folder are saved into one first. Raises BadInput as `export`, and for
+    Frames that are in no folder are saved into one first. Raises BadInput as `export`, and for
     frames of shards.
     """
     choice = Choice(
         layers=None if layers is None else as_words(layers),
         modes=None if modes is None else as_words(modes), size=size,
-        classes=None if classes is None else class_map(classes), lidar=lidar,
+        classes=None if classes is None else class_map(classes),
     )  # fmt: skip
     with _stored(frames) as (folder, wanted):
-        export(folder, out, name, choice=choice, shares=shares, views=wanted)
+        export(folder, out, name, choice=choice, shares=shares, views=wanted, **options)
+    return out
 
 
 def questions_of(frames: Views) -> list[dict[str, Any]]:
-    """Rows of questions about frames, as questions.jsonl has them: what `Views.questions` gives.
+    """Rows of questions about frames, as in questions.jsonl, for `Views.questions`.
 
     Walks are asked about as wholes. Raises BadInput for frames of shards.
     """
@@ -115,14 +119,14 @@ def questions_of(frames: Views) -> list[dict[str, Any]]:
     from pbrs_farm.export.questions.clips import clips_of
 
     with _stored(frames) as (folder, wanted):
-        found = [v for v in views_of(folder) if (v.house.id, v.id) in wanted]
-        asked = Asker().asked(clips_of([ChosenView(v, Choice()) for v in found]))
-    return [q.row(k) | {"instances": list(q.about)} for k, q in enumerate(asked)]
+        entries = [v for v in views_of(folder) if (v.house.id, v.id) in wanted]
+        questions = Asker().asked(clips_of([ChosenView(v, Choice()) for v in entries]))
+    return [q.row(k) | {"instances": list(q.about)} for k, q in enumerate(questions)]
 
 
 @contextmanager
 def _stored(frames: Views) -> Iterator[tuple[Path, frozenset[tuple[str, str]]]]:
-    """A folder that holds the frames, theirs or one for now, and the names of house and view."""
+    """A folder with the frames, temporary unless they have one, and the names of house and view."""
     wanted = frozenset((ref.house, ref.view) for ref in frames.refs)
     with TemporaryDirectory(prefix="pbrs-export-") as scratch:
         folder = Path(frames.source.url)
@@ -138,10 +142,10 @@ def _by_split(views: list[ViewEntry], shares: SplitShares | None) -> dict[str, l
         return {"": views}
     split_of = {v.house.id: split_of_house(v.house.id, shares) for v in views}
     parts = {name: [v for v in views if split_of[v.house.id] == name] for name in SPLITS}
-    return {name: own for name, own in parts.items() if own}
+    return {name: entries for name, entries in parts.items() if entries}
 
 
-def _kept(folder: Path, run: str) -> set[tuple[str, str]]:
+def _selected(folder: Path, run: str) -> set[tuple[str, str]]:
     file = folder / keys.selection_key(run, "jsonl")
     if not file.is_file():
         raise BadInput(file, "", "no such selection", hint="pbrs-farm select makes one")
@@ -156,18 +160,18 @@ def _kept(folder: Path, run: str) -> set[tuple[str, str]]:
 
 
 def remarks_of(out: Path) -> list[str]:
-    """What a user should know of an export: its data.yaml's comments, its remarks, which views are left out.
+    """Remarks for the user of an export: comments of data.yaml, remarks, views that are left out.
 
-    Read from the files of the export, so also of one made earlier. [] where there is nothing to say.
+    They are read from the files of the export, so an earlier one has them too.
     """
     files = [out / "data.yaml", out / LEFT_OUT, *(out / split / LEFT_OUT for split in SPLITS)]
     lines = [
         line for file in files if file.is_file() for line in file.read_text("utf-8").splitlines()
     ]
-    said = [
+    notes = [
         line.removeprefix("# ") for line in lines if line.startswith("# ") or ": has no " in line
     ]
     remarks = [out / REMARKS, *(out / split / REMARKS for split in SPLITS)]
-    return said + [
+    return notes + [
         line for file in remarks if file.is_file() for line in file.read_text("utf-8").splitlines()
     ]

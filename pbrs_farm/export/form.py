@@ -1,21 +1,24 @@
-"""What a form of export is, and the table of all forms: the modules of `forms/` and plugins.
+"""The type of a form of export, and the table of all forms: the modules of `forms/` and plugins.
 
-Effects: a form's module is imported when it is first asked for. The table of
-docs/formats/export.md is printed from it (`python -m pbrs_farm.export.form`).
+Effects: a form's module is imported at its first use. `python -m pbrs_farm.export.form` prints the
+tables of docs/formats/export.md.
 """
 
 from __future__ import annotations
 
 import pkgutil
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar, Final, TypeAlias
+from typing import TYPE_CHECKING, Any, ClassVar, Final, TypeAlias
 
 from pbrs_farm.core.errors import BadInput, MachineFailed
+from pbrs_farm.core.options import flag, options_of, record_of
 from pbrs_farm.core.plugins import plugins
+from pbrs_farm.core.record import Record
+from pbrs_farm.core.shown_text import did_you_mean
 from pbrs_farm.export import forms
 
 if TYPE_CHECKING:
@@ -24,21 +27,21 @@ if TYPE_CHECKING:
 
 LEFT_OUT: Final = "left_out.txt"
 REMARKS: Final = "remarks.txt"
-"""A file of an export whose lines its user is told."""
+"""A file of an export whose lines are shown to its user."""
 _GROUP: Final = "exports"  # of plugins
 
-WriteViews: TypeAlias = "Callable[[list[ChosenView], Path, Choice], int]"
-WriteHome: TypeAlias = "Callable[[ExportedHome, Path], int]"
+WriteViews: TypeAlias = "Callable[[list[ChosenView], Path, Choice], None]"
+WriteHome: TypeAlias = "Callable[[ExportedHome, Path], None]"
 
 
 @dataclass(frozen=True, slots=True)
 class Convention:
-    """How a form counts pixels and points its axes: a row of the table in docs/formats/export.md.
+    """Pixel origin, axes and depth of a form: a row of the table in docs/formats/export.md.
 
-    first_pixel: where the centre of the first pixel lies in K and in pixel coordinates, along x and
-    along y: 0.5 as in view.json, 0 of forms whose readers count from it; None of a form with neither.
-    has_k: whether K, or focal lengths and principal point, stand in the form's files. axes: of poses,
-    normals and points. depth: its unit, and along what; "" for none.
+    first_pixel: x and y of the first pixel's centre in K and in pixel coordinates: 0.5 as in view.json,
+    0 for readers that count from the centre; None for a form with neither. has_k: True if the form's
+    files have K, or focal lengths and principal point. axes: of poses, normals and points. depth: its
+    unit and direction; "" for no depth.
     """
 
     first_pixel: float | None
@@ -48,28 +51,30 @@ class Convention:
 
     @property
     def row(self) -> str:
-        """Its cells."""
-        at = self.first_pixel
-        k = "as view.json" if at == 0.5 else f"cx, cy less {0.5 - (at or 0):g}"
-        pixel = "-" if at is None else f"({at:g}, {at:g})"
+        """The cells of its row, joined."""
+        centre = self.first_pixel
+        k = "as view.json" if centre == 0.5 else f"cx, cy less {0.5 - (centre or 0):g}"
+        pixel = "-" if centre is None else f"({centre:g}, {centre:g})"
         return " | ".join((pixel, k if self.has_k else "-", self.axes or "-", self.depth or "-"))
 
 
 @dataclass(frozen=True, slots=True)
 class ViewForm:
-    """A form of finished views: what `pbrs-farm export --to NAME` writes of them.
+    """A form of finished views, written by `pbrs-farm export --to NAME`.
 
     A module `forms/<name>.py` ends with one, its dashes written `_`; a plugin's entry point names
     one. Nothing else lists forms: the choices of --to, messages and docs/formats/export.md read the table.
 
-        FORM = ViewForm("words", write_words, "`words.tsv`: a line of words a view")
+        FORM = ViewForm("words", write_words, "`words.tsv`: a line of words a view", options=WordOptions)
 
-    name: of --to. write: called with the views that are exported, an empty folder and the Choice;
-    it returns the number of files it wrote, and raises BadInput for views that it cannot hold. With
-    --split it is called once for each of train, val and test. help: what is written, in Markdown.
-    has_classes: whether classes of a user's own can stand in for NYU40's. finish: called once after
-    all splits with the whole folder, the names of the splits (() without) and the Choice; returns
-    the number of files it added. convention: None where a form says nothing of its own.
+    name: of --to. write: called with the exported views, an empty folder and the Choice; it raises
+    BadInput for views that the form cannot hold. With --split it is called once for each of train,
+    val and test. help: the files, in Markdown. options: a Record whose fields are options
+    (`core/options.py`), None for a form without. The command line, `Views.export` and the tables of a
+    set's file take them from there; write reads them as `choice.of(WordOptions)`. has_classes: True if
+    classes of the user's can replace NYU40's. finish: called once after all splits with the whole
+    folder, the names of the splits (() without) and the Choice. convention: None if the form has no
+    pixels, axes or depth of its own.
     """
 
     of: ClassVar[str] = "views"
@@ -77,8 +82,9 @@ class ViewForm:
     name: str
     write: WriteViews
     help: str
+    options: type[Record] | None = None
     has_classes: bool = False
-    finish: Callable[[Path, tuple[str, ...], Choice], int] | None = None
+    finish: Callable[[Path, tuple[str, ...], Choice], None] | None = None
     convention: Convention | None = None
 
 
@@ -86,9 +92,9 @@ class ViewForm:
 class HomeForm:
     """A form of homes, as scenes of other simulators; it is listed as a ViewForm is.
 
-    write: called with each home and its own empty folder; returns the number of files. remark: what
-    a user should know of each home that was written, "" for nothing. up: the axis that is up in the
-    frames of its bodies, "y" or "z", so that a grasps.json can be written beside them; "" for none.
+    write: called with each home and its own empty folder. remark: a warning for each written home, ""
+    for none. up: the axis that is up in the frames of its bodies, "y" or "z", for the grasps.json
+    beside them; "" for no grasps.json.
     """
 
     of: ClassVar[str] = "homes"
@@ -121,9 +127,9 @@ def form_of(name: str) -> Form:
         >>> form_of("coco").has_classes
         True
     """
-    known = form_names()
-    if name not in known:
-        raise BadInput("--to", name, "no such form", hint=f"of {', '.join(known)}")
+    names = form_names()
+    if name not in names:
+        raise BadInput("--to", name, "no such form", hint=f"of {', '.join(names)}")
     if name in {module.name.replace("_", "-") for module in pkgutil.iter_modules(forms.__path__)}:
         form: Form = import_module(f"{forms.__name__}.{name.replace('-', '_')}").FORM
         return form
@@ -134,13 +140,48 @@ def form_of(name: str) -> Form:
     return loaded
 
 
-def forms_with_classes() -> tuple[str, ...]:
-    """The forms that can hold classes of a user's own; imports them all.
+def view_forms() -> Iterator[ViewForm]:
+    """Every form of views.
 
-    Slow, since every form is imported: for messages and completion, not to check one name.
+    Slow, since all forms are imported: for messages and completion, not to check one name.
     """
-    found = (form_of(name) for name in form_names())
-    return tuple(form.name for form in found if isinstance(form, ViewForm) and form.has_classes)
+    for name in form_names():
+        if isinstance(form := form_of(name), ViewForm):
+            yield form
+
+
+def form_options(form: Form) -> dict[str, str]:
+    """Name of each option of a form -> its help; {} for a form without options.
+
+    >>> list(form_options(form_of("lidar")))
+    ['scanner']
+    """
+    model = form.options if isinstance(form, ViewForm) else None
+    if model is None:
+        return {}
+    return {
+        name: model.model_fields[field].description or ""
+        for name, (field, _shown) in options_of(model).items()
+    }
+
+
+def options_from(form: ViewForm, values: Mapping[str, Any]) -> Record | None:
+    """The form's options with these values, defaults for the others; None for a form without options.
+
+    Raises BadInput for a value that does not fit, and for an option that the form does not have; it
+    names the forms that have it.
+    """
+    for name in values:
+        if name not in form_options(form):
+            raise no_such_option(form, name)
+    return None if form.options is None else record_of(values, form.options)
+
+
+def no_such_option(form: Form, name: str) -> BadInput:
+    """The error for an option that a form does not have; its hint names the forms that have it."""
+    owners = [other.name for other in view_forms() if name in form_options(other)]
+    hint = f"--to {', '.join(owners)}" if owners else did_you_mean(name, form_options(form))
+    return BadInput(flag(name), "", f"{form.name} has no such option", hint=hint)
 
 
 def forms_table(of: str) -> str:
@@ -152,7 +193,7 @@ def forms_table(of: str) -> str:
 
 
 def conventions_table() -> str:
-    """How the package's forms of views count pixels, point axes and measure depth, in Markdown."""
+    """The conventions of the package's forms of views, as a Markdown table."""
     rows = ["| form | centre of the first pixel | K | axes | depth |", "|---|---|---|---|---|"]
     for name in form_names():
         convention = getattr(form_of(name), "convention", None)
@@ -161,16 +202,14 @@ def conventions_table() -> str:
     return "\n".join(rows)
 
 
-def name_left_out(out: Path, views: list[ChosenView], why: str) -> int:
-    """Write left_out.txt, `<house>/<view>: <why>` a line, where there are views; the number of files.
+def name_left_out(out: Path, views: list[ChosenView], why: str) -> None:
+    """Write left_out.txt, `<house>/<view>: <why>` a line, unless there are no views.
 
     why: begins with "has no".
     """
-    if not views:
-        return 0
-    lines = [f"{view.house.id}/{view.id}: {why}\n" for view in views]
-    (out / LEFT_OUT).write_text("".join(lines), "utf-8")
-    return 1
+    if views:
+        lines = [f"{view.house.id}/{view.id}: {why}\n" for view in views]
+        (out / LEFT_OUT).write_text("".join(lines), "utf-8")
 
 
 if __name__ == "__main__":

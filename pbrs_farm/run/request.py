@@ -7,59 +7,19 @@ and travels to every worker. commands/options.py makes the command line. No effe
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal, cast
+from typing import Annotated, Final, Literal
 
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator
 
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.layers import LAYER, LIGHT_LAYERS, OPTIONAL
 from pbrs_farm.core.lighting import ALL_MODES, Mode
+from pbrs_farm.core.options import option, options_of
 from pbrs_farm.core.recipe import RECIPE_NAMES
 from pbrs_farm.core.record import Record
 from pbrs_farm.core.shown_text import hint_of_choice
-
-
-@dataclass(frozen=True, slots=True)
-class Option:
-    """How a field is written as an option: `--name`, a tuple repeated or with many words after it."""
-
-    name: str = ""  # "" = the field's
-    group: str = ""  # title in the help; "" = "options"
-    metavar: str | None = None
-    choices: Sequence[Any] | None = None
-    many_words: bool = False  # of a tuple: --layers a b, else --set a --set b
-    into: str = ""  # the option whose values these join
-    sets: str = ""  # the recipe's field that it is a short form of
-    least: int | None = None  # of a value that is given
-    expected: str = ""  # what a message says that it should be; "" = "{least} or more"
-    hint: str = ""
-
-
-def option(
-    default: Any, text: str, *, ge: float | None = None, le: float | None = None, **shown: Any
-) -> Any:
-    """A field that is an option: its default, its help, limits of any value, and fields of Option.
-
-    In text, {default} stands for the verb's default.
-    """
-    shown_as: dict[str, Any] = {"option": Option(**shown)}
-    return Field(default, ge=ge, le=le, description=text, json_schema_extra=shown_as)
-
-
-def options_of(model: type[Record]) -> dict[str, tuple[str, Option]]:
-    """Option's name as in job files and namespaces -> (field, how it is written), in their order.
-
-    Fields without an option are left out.
-    """
-    found: dict[str, tuple[str, Option]] = {}
-    for field, info in model.model_fields.items():
-        shown: Any = (cast(Any, info.json_schema_extra) or {}).get("option")
-        if shown is not None:
-            found[shown.name or field] = field, shown
-    return found
 
 
 class LibraryOptions(Record):

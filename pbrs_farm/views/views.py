@@ -432,25 +432,25 @@ class Views(Sequence[Frame]):
         size: Size | None = None,
         classes: str | Path | None = None,
         shares: SplitShares | None = None,
-        lidar: str = "vlp16",
+        **options: Any,
     ) -> Path:
-        """Write them in a form that other tools read into the new folder out, and give that.
+        """Write the frames into the new folder out in a form of other tools; returns out.
 
         to: coco, yolo, kitti, bop and the other forms of views of docs/formats/export.md. layers and modes: one
         or several, None = all; size: (width, height), None = as rendered; classes: a CSV file of your own
-        classes; shares: a folder a split; lidar: the scanner of the form lidar. Raises BadInput for a form there is not, views it cannot hold,
-        an out that holds something, and frames of shards.
+        classes; shares: a folder a split. options: of the form, as `scanner="vlp16"` of lidar. Raises BadInput
+        for an unknown form or option, views that the form cannot hold, an out that is not empty, and frames of
+        shards.
 
             >>> sorted(path.name for path in views.export("coco", to="coco").iterdir())[:1]
             ['annotations.json']
         """
         from pbrs_farm.export.export_views import export_frames
 
-        export_frames(
+        return export_frames(
             self, Path(out), to, layers=layers, modes=modes, size=size, classes=classes,
-            shares=shares, lidar=lidar,
+            shares=shares, **options,
         )  # fmt: skip
-        return Path(out)
 
     def questions(self) -> list[dict[str, Any]]:
         """Questions about space: a dict with question_type, question, ground_truth, options, instances.

@@ -324,8 +324,8 @@ def test_only_chosen_layers_and_modes_are_exported_and_radiance_when_named(root,
     try:
         export(root, tmp_path / "a", "webdataset")
         assert "radiance.exr" not in parts_of(tmp_path / "a/shard-000000.tar")
-        choice = Choice(layers=("radiance", "normal"), modes=("opengl_dl",), views_per_shard=1)
-        assert export(root, tmp_path / "b", "webdataset", choice=choice) == (2, 2)
+        choice = Choice(layers=("radiance", "normal"), modes=("opengl_dl",))
+        assert export(root, tmp_path / "b", "webdataset", choice=choice, shard_size=1) == (2, 2)
         parts = {"json", "radiance.exr", "normal.png", "valid.png"}
         assert parts_of(tmp_path / "b/shard-000001.tar") == parts
     finally:
@@ -353,7 +353,6 @@ def test_a_split_is_a_folder_of_its_own_for_each_form(root, tmp_path):
         ({"layers": ("normals",)}, "--layers: normals: no such layer"),
         ({"modes": ("mlt",)}, "--modes: mlt: no such lighting mode"),
         ({"layers": ("radiance",), "size": (8, 6)}, "radiance.exr is not resized"),
-        ({"views_per_shard": 0}, "--shard-size: 0: expected 1 or more"),
     ],
 )
 def test_a_choice_that_cannot_be_is_told(fields, match):

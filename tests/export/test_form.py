@@ -6,8 +6,10 @@ from pathlib import Path
 
 import pytest
 
+import pbrs_farm as pf
 from benchmarks.sets import READ_BACK
 from pbrs_farm.cli import build_parser, main
+from pbrs_farm.commands.set_file import set_from_bytes
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.export import forms
 from pbrs_farm.export.chosen_view import Choice
@@ -63,27 +65,41 @@ def test_an_unknown_form_is_answered_with_those_there_are(root: Path, tmp_path: 
 
 
 MINE = """
-from pbrs_farm.export.form import ViewForm
+from pbrs_farm.plugin import Record, ViewForm, option
+
+
+class LineOptions(Record):
+    prefix: str = option("view", "the first word of a line", metavar="WORD")
+    n_words: int = option(1, "words a line", metavar="N", least=1)
 
 
 def write(views, out, choice):
-    lines = [f"{view.house.id}/{view.id} {sorted(choice.class_names.values())[0]}" for view in views]
+    options = choice.of(LineOptions)
+    words = " ".join(sorted(choice.class_names.values())[: options.n_words])
+    lines = [f"{options.prefix} {view.id} {words}" for view in views]
     (out / "lines.txt").write_text("\\n".join(lines))
-    return 1
 
 
-FORM = ViewForm("my-lines", write, "`lines.txt`: a line a view", has_classes=True)
+FORM = ViewForm(
+    "my-lines", write, "`lines.txt`: a line a view", options=LineOptions, has_classes=True
+)
 """
 
 
-@pytest.mark.kinds("form")
-def test_a_file_is_all_that_a_new_form_takes(
-    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+@pytest.fixture
+def mine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A form of one's own, with options, as one file among the forms."""
     folder = tmp_path / "forms"
     folder.mkdir()
     (folder / "my_lines.py").write_text(MINE)
     monkeypatch.setattr(forms, "__path__", [*forms.__path__, str(folder)])
+
+
+@pytest.mark.kinds("form")
+@pytest.mark.usefixtures("mine")
+def test_a_file_is_all_that_a_new_form_takes(
+    root: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     # It is offered, written with classes of one's own, named where another form has none, and documented.
     assert (
         build_parser("labelling").parse_args(["export", "r", "--to", "my-lines"]).to == "my-lines"
@@ -93,8 +109,62 @@ def test_a_file_is_all_that_a_new_form_takes(
     assert main(["export", str(root), *words, str(tmp_path / "out")]) == 0
     assert capsys.readouterr().out == f"{tmp_path / 'out'}: 2 views, 1 file\n"
     lines = (tmp_path / "out/lines.txt").read_text().splitlines()
-    assert [line.split()[1] for line in lines] == ["seat", "seat"]
+    assert lines == ["view v0 seat", "view v1 seat"]
     choice = Choice(classes=class_map(tmp_path / "mine.csv"))
     with pytest.raises(BadInput, match=r"my-lines"):
         export(root, tmp_path / "x", "bop", choice=choice)
     assert "| `my-lines` | `lines.txt`: a line a view |" in forms_table("views")
+
+
+def _lines(out: Path) -> list[str]:
+    return (out / "lines.txt").read_text().splitlines()
+
+
+@pytest.mark.kinds("form")
+@pytest.mark.usefixtures("mine")
+def test_its_options_are_those_of_the_command_of_python_and_of_a_set(
+    root: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["export", str(root), "--to", "my-lines", "--prefix", "shot", "--n-words", "2"]
+    assert main([*words, "--out", str(tmp_path / "a")]) == 0
+    pf.open(root).export(tmp_path / "b", to="my-lines", prefix="shot", n_words=2)
+    assert (
+        _lines(tmp_path / "a")
+        == _lines(tmp_path / "b")
+        == ["shot v0 bag bathtub", "shot v1 bag bathtub"]
+    )
+    table = '[part.views]\nhomes = ["builtin"]\n[form.mine]\nto = "my-lines"\nprefix = "shot"'
+    (form,) = set_from_bytes(table.encode(), "mine.toml").forms
+    assert repr(form.choice.options) == "LineOptions(prefix='shot', n_words=1)"
+    with pytest.raises(SystemExit):
+        main(["export", "--to", "my-lines", "--help"])
+    text = capsys.readouterr().out
+    assert "--prefix WORD" in text
+    assert "--scanner" not in text
+
+
+@pytest.mark.usefixtures("mine")
+def test_an_option_of_another_form_is_answered_with_the_forms_that_have_it(
+    root: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit):
+        main(["export", str(root), "--to", "coco", "--prefix", "shot"])
+    assert "--prefix: coco has no such option (--to my-lines)" in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        main(["export", str(root), "--to", "gltf", "--scanner=vlp16"])
+    assert "--scanner: gltf has no such option (--to lidar)" in capsys.readouterr().err
+    with pytest.raises(BadInput, match=r"^prefix: coco has no such option \(to my-lines\)"):
+        pf.open(root).export(tmp_path / "x", prefix="shot")
+    with pytest.raises(
+        BadInput, match=r"^prefx: my-lines has no such option \(did you mean prefix"
+    ):
+        pf.open(root).export(tmp_path / "x", to="my-lines", prefx="shot")
+    with pytest.raises(BadInput, match=r"^n_words: 0: expected 1 or more"):
+        pf.export_views(root, tmp_path / "x", "my-lines", n_words=0)
+    with pytest.raises(BadInput, match=r"^n_words: expected a whole number"):
+        pf.export_views(root, tmp_path / "x", "my-lines", n_words="few")
+    table = '[part.views]\nhomes = ["builtin"]\n[form.coco]\nscanner = "vlp16"'
+    with pytest.raises(
+        BadInput, match=r"form\.coco: --scanner: coco has no such option \(--to lidar"
+    ):
+        set_from_bytes(table.encode(), "mine.toml")

@@ -10,7 +10,6 @@ import pytest
 import trimesh
 
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.export.chosen_view import Choice
 from pbrs_farm.export.export_views import export
 from pbrs_farm.export.forms.lidar import scanners_table
 from pbrs_farm.truth.lidar import LIDARS
@@ -28,7 +27,7 @@ def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def scans(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("scans") / "set"
-    assert export(root, out, "lidar", choice=Choice(lidar="vlp16")) == (2, 5)
+    assert export(root, out, "lidar", scanner="vlp16") == (2, 5)
     return next(p for p in out.iterdir() if p.is_dir())
 
 
@@ -104,9 +103,9 @@ def test_the_docs_have_the_scanners() -> None:
 
 
 def test_a_ring_of_a_flat_scanner_is_one_and_an_unknown_one_is_told(root, tmp_path) -> None:
-    export(root, tmp_path / "a", "lidar", choice=Choice(lidar="rplidar_a1"))
+    export(root, tmp_path / "a", "lidar", scanner="rplidar_a1")
     cloud = loaders.ply_cloud(next((tmp_path / "a").glob("*/v0.ply")))
     assert len(cloud) <= 360
     assert (cloud.z == 0).all()
-    with pytest.raises(BadInput, match=r"lidar: vlp61: no such scanner.*vlp16"):
-        export(root, tmp_path / "b", "lidar", choice=Choice(lidar="vlp61"))
+    with pytest.raises(BadInput, match=r"^scanner: vlp61 is none of them.*vlp16"):
+        export(root, tmp_path / "b", "lidar", scanner="vlp61")

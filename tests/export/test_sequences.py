@@ -152,7 +152,7 @@ def test_kittis_maps_are_in_its_steps_and_noc_leaves_out_what_is_hidden(
 
 
 def test_a_walk_has_a_laser_scan_a_frame(root: Path, tmp_path: Path) -> None:
-    export(root, tmp_path / "x", "lidar", choice=Choice(lidar="rplidar_a1"))
+    export(root, tmp_path / "x", "lidar", scanner="rplidar_a1")
     house = only(tmp_path / "x")
     poses = poses_from_tum((house / "poses.txt").read_text(), "poses.txt")
     assert [p.time_s for p in poses] == pytest.approx([0.0, 0.2, 0.4])

@@ -12,9 +12,10 @@ import pytest
 from pbrs_farm.commands.options import add_options, request_from
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.lighting import ALL_MODES, Mode
+from pbrs_farm.core.options import options_of
 from pbrs_farm.core.recipe import Recipe, field_paths
 from pbrs_farm.run import request as request_module
-from pbrs_farm.run.request import SHORT_FORMS, RunRequest, Wanted, options_of, wanted_of
+from pbrs_farm.run.request import SHORT_FORMS, RunRequest, Wanted, wanted_of
 from workers.job import JobSpec, SubmitRequest
 
 ADDED = '''

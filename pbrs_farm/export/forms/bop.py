@@ -51,8 +51,8 @@ class _ModelMesh:
     rgb: NDArray[np.uint8]  # (V, 3)
 
 
-def write_bop(views: list[ChosenView], out: Path, _choice: Choice) -> int:
-    """The layout above of views of homes with placed models; the number of files.
+def write_bop(views: list[ChosenView], out: Path, _choice: Choice) -> None:
+    """The layout above of views of homes with placed models.
 
     A model called obj_<number> or obj-<number> keeps its number, others follow in the order of their names.
     Raises BadInput where no house of the views holds a placed model, and for a lens that is no
@@ -69,16 +69,15 @@ def write_bop(views: list[ChosenView], out: Path, _choice: Choice) -> int:
         hint = "place or scatter models first: docs/python.md"
         raise BadInput("--to bop", "", "no home of these views holds a placed model", hint=hint)
     numbers = _object_numbers(sorted(meshes))
-    n_files = _write_models(out / "models", meshes, numbers)
+    _write_models(out / "models", meshes, numbers)
     scenes: dict[str, list[ChosenView]] = {}
     for view in views:
         require_lens(view, "bop")
         scenes.setdefault(view.house.id, []).append(view)
     for scene, (house_id, own) in enumerate(scenes.items()):
         folder = out / _SPLIT / f"{scene:06d}"
-        n_files += _write_scene(folder, own, houses[house_id], numbers)
+        _write_scene(folder, own, houses[house_id], numbers)
     _write_json(out / "camera.json", _camera_json(views[0]))
-    return n_files + 1
 
 
 def _object_numbers(models: list[str]) -> dict[str, int]:
@@ -106,7 +105,7 @@ def _mesh_of(item: Item, house: House) -> _ModelMesh:
     return _ModelMesh(own * _MM, np.concatenate(faces).astype(np.int32), np.concatenate(rgb))
 
 
-def _write_models(folder: Path, meshes: dict[str, _ModelMesh], numbers: dict[str, int]) -> int:
+def _write_models(folder: Path, meshes: dict[str, _ModelMesh], numbers: dict[str, int]) -> None:
     folder.mkdir(parents=True)
     info = {}
     for model, number in sorted(numbers.items(), key=lambda pair: pair[1]):
@@ -119,7 +118,6 @@ def _write_models(folder: Path, meshes: dict[str, _ModelMesh], numbers: dict[str
             **{f"size_{axis}": float(v) for axis, v in zip("xyz", size)},
         }  # fmt: skip
     _write_json(folder / "models_info.json", info)
-    return len(meshes) + 1
 
 
 def _diameter(points: F64) -> float:
@@ -147,7 +145,7 @@ def _ply(mesh: _ModelMesh) -> bytes:
 
 def _write_scene(
     folder: Path, views: list[ChosenView], house: House, numbers: dict[str, int]
-) -> int:
+) -> None:
     for name in ("rgb", "depth", "mask", "mask_visib"):
         (folder / name).mkdir(parents=True)
     cut_outs = cut_outs_of_house(house)
@@ -158,11 +156,9 @@ def _write_scene(
         "images": [], "annotations": [],
         "categories": [{"id": n, "name": m, "supercategory": "bop"} for m, n in numbers.items()],
     }  # fmt: skip
-    n_files = 0
     for image, view in enumerate(views):
         if view.picture is not None:
             (folder / "rgb" / f"{image:06d}.png").write_bytes(view.data(view.picture))
-            n_files += 1
         (folder / "depth" / f"{image:06d}.png").write_bytes(view.data("depth"))
         rows = [row for row in view.facts["instances"] if row.get("model") in numbers]
         camera[str(image)] = _scene_camera(view)
@@ -184,7 +180,6 @@ def _write_scene(
                 "area": facts["px_count_visib"], "bbox": facts["bbox_visib"],
                 "segmentation": compressed_runs(seen), "width": size[0], "height": size[1],
             })  # fmt: skip
-        n_files += 1 + 2 * len(rows)
     files = {
         "scene_camera": camera,
         "scene_gt": poses,
@@ -193,7 +188,6 @@ def _write_scene(
     }
     for name, document in files.items():
         _write_json(folder / f"{name}.json", document)
-    return n_files + len(files)
 
 
 def _masks(

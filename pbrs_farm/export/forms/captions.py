@@ -151,8 +151,8 @@ def _relations(view: ChosenView, things: Sequence[_Seen]) -> list[dict[str, Any]
     return sorted(rows, key=lambda row: row["relation"] != "on top of")
 
 
-def write_captions(views: list[ChosenView], out: Path, _choice: Choice) -> int:
-    """captions.jsonl, a line a view, and images/<house>/<view>.png; the number of files.
+def write_captions(views: list[ChosenView], out: Path, _choice: Choice) -> None:
+    """captions.jsonl, a line a view, and images/<house>/<view>.png.
 
     A line has file_name, text, objects (id, noun, box2d of each thing that counts, the largest
     first) and relations (subject, relation, object by id, among the largest six). A thing counts
@@ -168,7 +168,6 @@ def write_captions(views: list[ChosenView], out: Path, _choice: Choice) -> int:
         (out / name).write_bytes(view.data(view.picture))
         lines.append(json.dumps({"file_name": name, **caption(view)}, ensure_ascii=False))
     (out / "captions.jsonl").write_text("".join(f"{line}\n" for line in lines), "utf-8")
-    return len(lines) + 1
 
 
 def caption(view: ChosenView) -> dict[str, Any]:

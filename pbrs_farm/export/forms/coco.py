@@ -20,8 +20,8 @@ from pbrs_farm.export.masks import compressed_runs
 from pbrs_farm.images import png_from_array
 
 
-def write_coco(views: list[ChosenView], out: Path, choice: Choice) -> int:
-    """annotations.json, images/<house>/<view>.png and the panoptic form; the number of files.
+def write_coco(views: list[ChosenView], out: Path, choice: Choice) -> None:
+    """annotations.json, images/<house>/<view>.png and the panoptic form.
 
     Categories are NYU40's, or those of choice.classes; an instance without a class is left out. Masks are compressed run
     lengths (as pycocotools reads them), iscrowd 0. Fields of our own: house, view, K, lens and
@@ -43,8 +43,7 @@ def write_coco(views: list[ChosenView], out: Path, choice: Choice) -> int:
     (out / "annotations.json").write_text(
         json.dumps(document, separators=(",", ":")) + "\n", "utf-8"
     )
-    n_pictures = sum("file_name" in image for image in images)
-    return 1 + n_pictures + _write_panoptic(views, images, document["categories"], out)
+    _write_panoptic(views, images, document["categories"], out)
 
 
 def categories_of(choice: Choice) -> list[dict[str, Any]]:
@@ -104,8 +103,8 @@ def _write_panoptic(
     images: list[dict[str, Any]],
     categories: list[dict[str, Any]],
     out: Path,
-) -> int:
-    """panoptic.json and panoptic/<house>/<view>.png; the number of files.
+) -> None:
+    """panoptic.json and panoptic/<house>/<view>.png.
 
     images, categories: those of the instances, view by view. A segment is an instance with a class,
     its id the instance's, in a pixel R + 256 G + 65536 B; what has no class is 0.
@@ -133,7 +132,6 @@ def _write_panoptic(
         ],
     }
     (out / "panoptic.json").write_text(json.dumps(document, separators=(",", ":")) + "\n", "utf-8")
-    return 1 + len(views)
 
 
 def _segment(row: dict[str, Any], category: int) -> dict[str, Any]:

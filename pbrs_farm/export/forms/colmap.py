@@ -19,14 +19,13 @@ _STEP_PX: Final = 16  # between the pixels of a view that give points
 _NO_POINT: Final = ("0.5 0.5 -1",)  # what a view sees that sees no surface: a pixel of no point
 
 
-def write_colmap(views: list[ChosenView], out: Path, _choice: Choice) -> int:
-    """<house>/images/<view>.png and sparse/0/{cameras,images,points3D}.txt; the number of files.
+def write_colmap(views: list[ChosenView], out: Path, _choice: Choice) -> None:
+    """<house>/images/<view>.png and sparse/0/{cameras,images,points3D}.txt.
 
     Poses are world to camera with OpenCV axes, in the home's world (metres, y up). Points are
     surfaces behind every 16th pixel, with its colour and that pixel as their track. Views of a rig have
     rigs.txt and frames.txt beside them, as COLMAP 3.12 and later read them.
     """
-    n_files = 0
     for house in dict.fromkeys(view.house.id for view in views):
         own = [view for view in views if view.house.id == house]
         (out / house / "images").mkdir(parents=True)
@@ -56,12 +55,9 @@ def write_colmap(views: list[ChosenView], out: Path, _choice: Choice) -> int:
         _write_lines(out / house / "sparse/0/images.txt", images)
         numbered = (f"{n} {point}\n" for n, point in enumerate(points, start=1))
         _write_lines(out / house / "sparse/0/points3D.txt", numbered)
-        n_files += len(own) + 3
         if any("rig" in view.facts for view in own):
             for name, lines in zip(("rigs", "frames"), _rig_lines(own, sensors), strict=True):
                 _write_lines(out / house / f"sparse/0/{name}.txt", lines)
-            n_files += 2
-    return n_files
 
 
 def _rig_lines(views: list[ChosenView], sensors: list[int]) -> tuple[list[str], list[str]]:

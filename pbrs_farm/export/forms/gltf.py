@@ -12,11 +12,10 @@ from pbrs_farm.export.home_glb import glb_of_pieces
 from pbrs_farm.export.home_pieces import ExportedHome, rooms_json
 
 
-def write_gltf(home: ExportedHome, folder: Path) -> int:
-    """<house id>.glb; the number of files, 1."""
+def write_gltf(home: ExportedHome, folder: Path) -> None:
+    """Write <house id>.glb."""
     data = glb_of_pieces(home.house, home.pieces, with_lamps=True, rooms=rooms_json(home.house))
     (folder / f"{home.house.id}.glb").write_bytes(data)
-    return 1
 
 
 FORM = HomeForm("gltf", write_gltf, "`<id>/<id>.glb`, which `pbrs-farm run` reads back")

@@ -30,8 +30,8 @@ from pbrs_farm.geometry.opened import moved_surface
 _BODY: Final = "body"
 
 
-def write_habitat(home: ExportedHome, folder: Path) -> int:
-    """The data set below folder; the number of files."""
+def write_habitat(home: ExportedHome, folder: Path) -> None:
+    """Write the data set below folder."""
     house, files = home.house, {}
     opening = [piece for piece in home.pieces if len(piece.links) > 1]
     still = [piece for piece in home.building if len(piece.links) == 1]
@@ -86,7 +86,6 @@ def write_habitat(home: ExportedHome, folder: Path) -> int:
     for name, data in files.items():
         (folder / name).parent.mkdir(exist_ok=True, parents=True)
         (folder / name).write_bytes(data)
-    return len(files)
 
 
 def _json(value: Any) -> bytes:

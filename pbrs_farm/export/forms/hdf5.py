@@ -15,8 +15,8 @@ from pbrs_farm.export.form import Convention, ViewForm
 from pbrs_farm.installation import install_command
 
 
-def write_hdf5(views: list[ChosenView], out: Path, _choice: Choice) -> int:
-    """<n>.hdf5 per view, n counted from 0, and index.jsonl; the number of files.
+def write_hdf5(views: list[ChosenView], out: Path, _choice: Choice) -> None:
+    """<n>.hdf5 per view, n counted from 0, and index.jsonl.
 
     colors (H, W, 3) uint8 (the first of PICTURES there is; every mode also by its name), depth
     (H, W) float32 planar metres (0 = nothing), normals (H, W, 3) float32 (n + 1) / 2 with OpenGL
@@ -38,7 +38,6 @@ def write_hdf5(views: list[ChosenView], out: Path, _choice: Choice) -> int:
         index.append(json.dumps(row))
     # Say which view each file holds.
     (out / "index.jsonl").write_text("\n".join(index) + "\n", "utf-8")
-    return len(views) + 1
 
 
 def _h5py() -> Any:

@@ -51,8 +51,8 @@ _SPLIT_FIELDS: Final = (
 )  # fmt: skip
 
 
-def write_hypersim(views: list[ChosenView], out: Path, choice: Choice) -> int:
-    """The layout above; the number of files.
+def write_hypersim(views: list[ChosenView], out: Path, choice: Choice) -> None:
+    """Write the layout above.
 
     A scene is a home as one pin-hole sees it, a camera a walk's eye or the views that are no frames.
     A unit is a metre, the world has z up. `depth_meters` is the distance along the ray, NaN where
@@ -60,18 +60,16 @@ def write_hypersim(views: list[ChosenView], out: Path, choice: Choice) -> int:
     """
     if choice.size is not None:
         raise BadInput("--size", "", "hypersim holds light, which is not resized")
-    n_files = 0
     tables: dict[str, list[dict[str, Any]]] = {
         name: [] for name in (hypersim.SPLIT_CSV, hypersim.CAMERAS_CSV, _INDEX)
     }
     for number, own in enumerate(_scenes(views)):
         scene = _scene_name(number)
-        n_files += _write_scene(out / scene, own, tables, scene)
+        _write_scene(out / scene, own, tables, scene)
     for name, rows in tables.items():
         _write_table(out / name, rows)
     credits = dict.fromkeys(v.house.attribution for v in views if v.house.attribution)
     (out / _CREDITS).write_text("".join(f"{line}\n" for line in credits), "utf-8")
-    return n_files + len(tables) + 1
 
 
 def _scene_name(number: int) -> str:
@@ -105,8 +103,8 @@ def _trajectories(views: Iterable[ChosenView]) -> list[list[ChosenView]]:
 
 def _write_scene(
     folder: Path, views: list[ChosenView], tables: Mapping[str, list[dict[str, Any]]], scene: str
-) -> int:
-    detail, n_files = folder / "_detail", 0
+) -> None:
+    detail = folder / "_detail"
     cameras = {f"cam_{k:02d}": own for k, own in enumerate(_trajectories(views))}
     for camera, own in cameras.items():
         for frame, view in enumerate(own):
@@ -118,22 +116,18 @@ def _write_scene(
                     file.write_bytes(array)
                 else:
                     hypersim.write_dataset(file, array)
-            n_files += len(files)
             at: dict[str, Any] = {"scene_name": scene, "camera_name": camera, "frame_id": frame}
             tables[_INDEX].append(at | {"house": view.house.id, "view": view.id})
             split = {"included_in_public_release": True, "exclude_reason": ""}
             tables[hypersim.SPLIT_CSV].append(at | split | {"split_partition_name": "train"})
         for name, array in _trajectory(own).items():
             hypersim.write_dataset(detail / camera / f"{name}.hdf5", array)
-            n_files += 1
     for name, array in _boxes(views).items():
         hypersim.write_dataset(detail / "mesh" / f"{name}.hdf5", array)
-        n_files += 1
     _write_table(detail / "metadata_cameras.csv", [{"camera_name": name} for name in cameras])
     row = {"parameter_name": "meters_per_asset_unit", "parameter_value": 1.0}
     _write_table(detail / "metadata_scene.csv", [row])
     tables[hypersim.CAMERAS_CSV].append(_parameters(scene, views[0]))
-    return n_files + 2
 
 
 def _trajectory(views: Sequence[ChosenView]) -> dict[str, NDArray[Any]]:
@@ -292,8 +286,8 @@ def _table(file: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(opened))
 
 
-def join_splits(out: Path, splits: tuple[str, ...], _choice: Choice) -> int:
-    """One root of all splits, as the data set has it, and the card. The number of files added."""
+def join_splits(out: Path, splits: tuple[str, ...], _choice: Choice) -> None:
+    """Join the splits to one root, as the data set has it, and write the card."""
     names = (hypersim.SPLIT_CSV, hypersim.CAMERAS_CSV, _INDEX)
     tables: dict[str, list[dict[str, Any]]] = {name: [] for name in names}
     credits: dict[str, None] = {}
@@ -323,7 +317,6 @@ def join_splits(out: Path, splits: tuple[str, ...], _choice: Choice) -> int:
     if splits:
         (out / _CREDITS).write_text("".join(f"{line}\n" for line in credits), "utf-8")
     (out / "README.md").write_text(_card(out), "utf-8")
-    return 1 - 4 * max(len(splits) - 1, 0)
 
 
 def _card(out: Path) -> str:

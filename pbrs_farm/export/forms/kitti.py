@@ -17,14 +17,13 @@ from pbrs_farm.images import png_from_array
 _SEEN: Final = 0  # of the layers of occlusion
 
 
-def write_kitti(views: list[ChosenView], out: Path, _choice: Choice) -> int:
-    """image_2/ (the left, or a rig's first camera) and image_3/ (right), disp_*_0/, flow_*/, calib/; the number of files.
+def write_kitti(views: list[ChosenView], out: Path, _choice: Choice) -> None:
+    """image_2/ (the left, or a rig's first camera) and image_3/ (right), disp_*_0/, flow_*/, calib/.
 
     <6 digits>_10.png is a frame, <6 digits>_11.png the next one of its sequence. `occ` has every
     surface, `noc` those that the other picture sees. index.txt: number, house, view. Whatever a
     view lacks is left out; BadInput where none has flow or disparity.
     """
-    n_files = 0
     rows: list[str] = []
     for house, frames in frames_by_house(views).items():
         for k, frame in enumerate(frames):
@@ -39,13 +38,11 @@ def write_kitti(views: list[ChosenView], out: Path, _choice: Choice) -> int:
                 target = out / name.format(number)
                 target.parent.mkdir(parents=True, exist_ok=True)
                 target.write_bytes(data)
-            n_files += len(files)
             rows.append(f"{number} {house} {frame.first.id}")
     if not rows:
         hint = "run with --stereo 0.065 --layers disparity occlusion_stereo flow_forward"
         raise BadInput("--to", "kitti", "no view has flow or disparity", hint=hint)
     (out / "index.txt").write_text("\n".join(rows) + "\n", "utf-8")
-    return n_files + 1
 
 
 def _pictures(frame: SequenceFrame, which: str) -> dict[str, bytes]:

@@ -32,8 +32,8 @@ _STRAIGHT_M: Final = 1e-3  # a corner that lies so near to the line of its neigh
 _FIT: Final = "panorama with a picture in a room that encloses it"
 
 
-def write_layoutnet(views: list[ChosenView], out: Path, _choice: Choice) -> int:
-    """img/ (1024 x 512) and label_cor/; the number of files.
+def write_layoutnet(views: list[ChosenView], out: Path, _choice: Choice) -> None:
+    """img/ (1024 x 512) and label_cor/.
 
     A label has two lines a corner, `x y_ceiling` and `x y_floor`, corner by corner to the right, the
     least x first; pixels count from the centre of the first one. Other views than panoramas (lens
@@ -53,7 +53,7 @@ def write_layoutnet(views: list[ChosenView], out: Path, _choice: Choice) -> int:
         lines = [f"{x:.3f} {y:.3f}\n" for x, y in corner_pixels(view, axes).reshape(-1, 2)]
         (out / "label_cor" / f"{name}.txt").write_text("".join(lines), "utf-8")
     left_out = [view for view in views if not _is_fit(view)]
-    return 2 * len(shown) + name_left_out(out, left_out, f"has no {_FIT}")
+    name_left_out(out, left_out, f"has no {_FIT}")
 
 
 def _is_fit(view: ChosenView) -> bool:

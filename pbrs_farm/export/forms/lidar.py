@@ -1,9 +1,9 @@
-"""Scans of laser scanners: a turn at each view's eye, as PLY and as PCD.
+"""Laser scans: one turn of a scanner at each view's eye, as PLY and as PCD.
 
     <house>/<view>.ply  <house>/<view>.pcd  <house>/poses.txt
 
-Effects: reads views and their house.glb, writes files. The scanner stands upright where the camera is and
-looks where it looks: of a walk there is a scan a frame. truth/lidar.py says what a beam does.
+Effects: reads views and their house.glb, writes files. The scanner is upright at the camera's eye and
+faces the camera's direction; a walk has a scan a frame. truth/lidar.py computes the beams.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from scipy.spatial.transform import Rotation
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import F64
-from pbrs_farm.core.errors import BadInput
-from pbrs_farm.core.shown_text import did_you_mean
+from pbrs_farm.core.options import option
+from pbrs_farm.core.record import Record
 from pbrs_farm.export.chosen_view import Choice, ChosenView
 from pbrs_farm.export.export_homes import stored_house
 from pbrs_farm.export.form import Convention, ViewForm
@@ -29,7 +29,7 @@ from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.run.house_cache import decoded_textures
 from pbrs_farm.truth.lidar import LIDARS, LidarScan, LidarSensor, lidar_scan
 
-# A return's fields: name in PLY, in PCD, type.
+# fields of a return: name in PLY, name in PCD, type
 _FIELDS: Final = (
     ("x", "x", "<f4"), ("y", "y", "<f4"), ("z", "z", "<f4"), ("intensity", "intensity", "<f4"),
     ("range", "range", "<f4"), ("range_true", "range_true", "<f4"),
@@ -41,34 +41,36 @@ _PLY_TYPES: Final = {"<f4": "float", "<u2": "ushort", "u1": "uchar"}
 _PCD_TYPES: Final = {"<f4": ("4", "F"), "<u2": ("2", "U"), "u1": ("1", "U")}
 
 
-def write_lidar(views: list[ChosenView], out: Path, choice: Choice) -> int:
-    """The files above, a scan by choice.lidar of each view; the number of files.
+class LidarOptions(Record):
+    """The options of the form."""
+
+    scanner: str = option("vlp16", "the scanner (default vlp16)", choices=tuple(LIDARS))
+
+
+def write_lidar(views: list[ChosenView], out: Path, choice: Choice) -> None:
+    """Write the files above, a scan of each view.
 
     Points are in the scanner's axes, metres: x forward, y left, z up. poses.txt has rows
-    `time x y z qx qy qz qw`, world from scanner (the home's world, y up), the time a frame's in
-    seconds, else the view's number; PCD repeats the pose as VIEWPOINT. Other cameras of a rig
-    than the first have none. BadInput for a scanner that is not known.
+    `time x y z qx qy qz qw`, world from scanner (the home's world, y up). The time is a frame's in
+    seconds, else the view's number; PCD repeats the pose as VIEWPOINT. A rig is scanned from its first
+    camera alone.
     """
-    sensor = LIDARS.get(choice.lidar)
-    if sensor is None:
-        hint = did_you_mean(choice.lidar, list(LIDARS))
-        raise BadInput("--lidar", choice.lidar, "no such scanner", hint=hint)
-    firsts = [view for view in views if not eye_of(view.facts)]
-    n_files = 0
-    for house_id in dict.fromkeys(view.house.id for view in firsts):
-        own = [view for view in firsts if view.house.id == house_id]
-        n_files += _write_scans(out / house_id, own, sensor, choice.lidar)
-    return n_files
+    scanner = choice.of(LidarOptions).scanner
+    first_views = [view for view in views if not eye_of(view.facts)]
+    for house_id in dict.fromkeys(view.house.id for view in first_views):
+        house_views = [view for view in first_views if view.house.id == house_id]
+        _write_scans(out / house_id, house_views, scanner)
 
 
-def _write_scans(folder: Path, views: list[ChosenView], sensor: LidarSensor, name: str) -> int:
+def _write_scans(folder: Path, views: list[ChosenView], scanner: str) -> None:
+    sensor = LIDARS[scanner]
     house = stored_house(views[0].entry.folder.parent.parent)
     caster, (textures, _unread) = Caster.of_house(house), decoded_textures(house)
     folder.mkdir(parents=True)
     rows = []
     for number, view in enumerate(views):
         pose = scanner_pose(view)
-        seed = keys.seed(house.id, view.id, "lidar", name)
+        seed = keys.seed(house.id, view.id, "lidar", scanner)
         scan = lidar_scan(caster, house, pose, sensor, textures, seed=seed)
         records = _records(scan)
         quaternion = Rotation.from_matrix(pose[:3, :3]).as_quat(canonical=True)
@@ -78,13 +80,12 @@ def _write_scans(folder: Path, views: list[ChosenView], sensor: LidarSensor, nam
         time = view.facts.get("time_s")
         rows.append(f"{number if time is None else time:.6f} {' '.join(words)}\n")
     (folder / "poses.txt").write_text("".join(rows), "utf-8")
-    return 2 * len(views) + 1
 
 
 def scanner_pose(view: ChosenView) -> F64:
-    """(4, 4) world from scanner: at the view's eye, upright, forward as the camera looks.
+    """(4, 4) world from scanner: at the view's eye, upright, forward in the camera's direction.
 
-    A camera that looks straight up or down has its picture's up for forward.
+    Of a camera that looks straight up or down, the picture's up is forward.
     """
     camera = pose_opencv(view)
     ahead = camera[:3, 2] * [1, 0, 1]
@@ -139,7 +140,7 @@ def _pcd(records: NDArray[Any], words: Iterable[str]) -> bytes:
 
 
 def scanners_table() -> str:
-    """The scanners as a Markdown table: that of docs/formats/lidar.md."""
+    """The Markdown table of scanners in docs/formats/lidar.md."""
     rows = [
         "| scanner | rings, degrees | beams a ring | range in m | noise |",
         "|---|---|---|---|---|",
@@ -156,11 +157,12 @@ def scanners_table() -> str:
 FORM = ViewForm(
     "lidar",
     write_lidar,
-    "a laser scan at each view's eye (`--lidar`: "
+    "a laser scan at each view's eye (`--scanner`: "
     + ", ".join(f"`{name}`" for name in LIDARS)
     + "):"
     " `<house>/<view>.ply` and `.pcd`, `<house>/poses.txt`; a return has place, range as measured and exact,"
     " intensity, ring, class, instance, normal, and what glass and mirrors it came by",
+    options=LidarOptions,
     convention=Convention(
         None,
         has_k=False,

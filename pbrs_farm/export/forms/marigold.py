@@ -36,8 +36,8 @@ _LISTS: Final = {
 }  # fmt: skip
 
 
-def write_marigold(views: list[ChosenView], out: Path, _choice: Choice) -> int:
-    """The files above; the number of them.
+def write_marigold(views: list[ChosenView], out: Path, _choice: Choice) -> None:
+    """Write the files above.
 
     A line is a sample, its paths count from the list's folder. Depth is uint16 PNG, mm along the
     axis, 0 = nothing or 65.535 m and more. Normals are float32 (H, W, 3), unit, x right, y up,
@@ -48,7 +48,6 @@ def write_marigold(views: list[ChosenView], out: Path, _choice: Choice) -> int:
     in left_out.txt; BadInput where all are.
     """
     lines: dict[str, list[str]] = {name: [] for name in _LISTS}
-    n_targets = 0  # files of intrinsic samples
     shown = [view for view in views if view.picture is not None]
     if not shown:
         raise BadInput("--to marigold", "", "no view has a picture", hint="run with --modes")
@@ -68,14 +67,11 @@ def write_marigold(views: list[ChosenView], out: Path, _choice: Choice) -> int:
             files = write(view, out)
             if files:
                 lines[name].append(f"{' '.join((rgb, *files))}\n")
-                n_targets += len(files)
-    written = {name: own for name, own in lines.items() if own}
-    for name, own in written.items():
-        (out / f"{_LISTS[name]}.txt").write_text("".join(own), "utf-8")
+    for name, samples in lines.items():
+        if samples:
+            (out / f"{_LISTS[name]}.txt").write_text("".join(samples), "utf-8")
     without = [view for view in views if view.picture is None]
-    n_targets += len(lines["depth"]) + len(lines["normal"])
-    n_files = len(shown) + n_targets + len(written)
-    return n_files + name_left_out(out, without, "has no picture")
+    name_left_out(out, without, "has no picture")
 
 
 def _write_lighting(view: ChosenView, out: Path) -> list[str]:
@@ -108,14 +104,13 @@ def _write_appearance(view: ChosenView, out: Path) -> list[str]:
     return files
 
 
-def name_lists_by_split(out: Path, splits: tuple[str, ...], _choice: Choice) -> int:
-    """Give the lists of each split its name, as Marigold's own preparation does; 0 new files."""
+def name_lists_by_split(out: Path, splits: tuple[str, ...], _choice: Choice) -> None:
+    """Rename the lists of each split, as Marigold's own preparation does."""
     for split in splits:
         for name in _LISTS.values():
             file = out / split / f"{name}.txt"
             if file.is_file():
                 file.rename(file.with_name(f"{name}_{split}.txt"))
-    return 0
 
 
 FORM = ViewForm(

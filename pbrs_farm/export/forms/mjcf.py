@@ -34,8 +34,8 @@ _ON_BOX_M: Final = 1e-4
 _Z_UP: Final = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
 
 
-def write_mjcf(home: ExportedHome, folder: Path) -> int:
-    """<house id>.xml, meshes/ and textures/; the number of files. Needs the module mujoco."""
+def write_mjcf(home: ExportedHome, folder: Path) -> None:
+    """<house id>.xml, meshes/ and textures/. Needs the module mujoco."""
     need("mujoco")
     model = _Model(home)
     for name, data in model.files.items():
@@ -49,7 +49,6 @@ def write_mjcf(home: ExportedHome, folder: Path) -> int:
         (folder / REMARKS).write_text(
             f"{home.house.id}: {len(fixed)} things found no rest and stand fixed: {', '.join(fixed[:5])}\n"
         )
-    return 1 + len(model.files) + bool(fixed)
 
 
 class _Model:

@@ -28,42 +28,34 @@ _MODELS: Final = {
 """What nerfstudio calls each lens model; a transforms.json has one."""
 
 
-def write_nerfstudio(views: list[ChosenView], out: Path, _choice: Choice) -> int:
-    """<house>/transforms.json, images/<view>.png and depth/<view>.png (mm); the number of files.
+def write_nerfstudio(views: list[ChosenView], out: Path, _choice: Choice) -> None:
+    """<house>/transforms.json, images/<view>.png and depth/<view>.png (mm).
 
     Poses are camera to world with OpenGL axes in a world with z up; applied_transform is the turn
     from the home's y up. Views without a picture are an error.
     """
-    n_files = 0
     for house in dict.fromkeys(view.house.id for view in views):
         own = [view for view in views if view.house.id == house]
-        frames = []
         models = {intrinsics_of(view.facts).lens.model for view in own}
         if len(models) > 1:
             text = f"has one lens model a house, these views have {' and '.join(sorted(models))}"
             raise BadInput("--to", "nerfstudio", text)
-        for view in own:
-            row, n = _frame(view, out / house)
-            frames.append(row)
-            n_files += n
         transforms = {
             "camera_model": _MODELS[intrinsics_of(own[0].facts).lens.model],
             "orientation_override": "none",
             "depth_unit_scale_factor": 0.001,
             "applied_transform": Z_UP_FROM_Y_UP[:3].tolist(),
-            "frames": frames,
+            "frames": [_frame(view, out / house) for view in own],
         }
         (out / house / "transforms.json").write_text(
             json.dumps(transforms, indent=1) + "\n", "utf-8"
         )
-        n_files += 1
-    return n_files
 
 
-def _frame(view: ChosenView, folder: Path) -> tuple[dict[str, Any], int]:
+def _frame(view: ChosenView, folder: Path) -> dict[str, Any]:
     # Write the picture and, where it is exported, the depth.
     require_lens(view, "nerfstudio", *_MODELS)
-    picture, n_files = required_picture(view, "nerfstudio"), 1
+    picture = required_picture(view, "nerfstudio")
     facts = view.facts
     pose = Z_UP_FROM_Y_UP @ np.array(facts["world_from_camera_opengl"], np.float64)
     k = np.array(facts["K"], np.float64)
@@ -80,13 +72,12 @@ def _frame(view: ChosenView, folder: Path) -> tuple[dict[str, Any], int]:
     if view.has("depth"):
         files["depth"] = view.data("depth")
         row["depth_file_path"] = f"depth/{view.id}.png"
-        n_files += 1
     if facts.get("time_s") is not None:
         row["time"] = facts["time_s"]
     for name, data in files.items():
         (folder / name).mkdir(parents=True, exist_ok=True)
         (folder / name / f"{view.id}.png").write_bytes(data)
-    return row, n_files
+    return row
 
 
 FORM = ViewForm(

@@ -24,8 +24,8 @@ _FARTHEST_MM: Final = 65535  # of depth.png: so far, or farther
 _TYPES: Final = {"float32": "float", "uint8": "uchar", "uint16": "ushort"}  # PLY's names
 
 
-def write_ply(views: list[ChosenView], out: Path, choice: Choice) -> int:
-    """<house>/<view>.ply of every view; the number of files.
+def write_ply(views: list[ChosenView], out: Path, choice: Choice) -> None:
+    """<house>/<view>.ply of every view.
 
     Points are those of the layer `position` where the view has it, else of `depth` and K. label is
     the NYU40 class, or that of choice.classes; comments name the classes. Raises BadInput for a
@@ -36,7 +36,6 @@ def write_ply(views: list[ChosenView], out: Path, choice: Choice) -> int:
         vertices = point_cloud(view)
         data = _header(view, choice, vertices) + vertices.tobytes()
         (out / view.house.id / f"{view.id}.ply").write_bytes(data)
-    return len(views)
 
 
 def point_cloud(view: ChosenView) -> NDArray[np.void]:

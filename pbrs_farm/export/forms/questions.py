@@ -35,11 +35,11 @@ _SCHEMA: Final = pa.schema([
 ])  # fmt: skip
 
 
-def write_questions(views: list[ChosenView], out: Path, choice: Choice) -> int:
+def write_questions(views: list[ChosenView], out: Path, choice: Choice) -> None:
     """Write questions, answers and references of views, and the pictures and films they are about.
 
     A walk is one film and its questions are about all of it; every other view is a picture. Views
-    without a picture, and models without a home, are left out. Returns the number of files; BadInput
+    without a picture, and models without a home, are left out. BadInput
     where a house is damaged, MachineFailed for walks without PyAV.
     """
     shown = [view for view in views if view.picture is not None]
@@ -56,7 +56,7 @@ def write_questions(views: list[ChosenView], out: Path, choice: Choice) -> int:
     remarks = _write_blind_scores(questions, out)
     (out / REMARKS).write_text("".join(f"{line}\n" for line in remarks), "utf-8")
     hidden = [view for view in views if view.picture is None]
-    return 7 + len(media) + name_left_out(out, hidden, "has no picture")
+    name_left_out(out, hidden, "has no picture")
 
 
 def _write_medium(clip: Clip, out: Path) -> str:

@@ -27,35 +27,32 @@ FILES: Final = {
 }
 
 
-def write_released(views: list[ChosenView], out: Path, _choice: Choice) -> int:
-    """Every view's files, camera_v2/<house>/room_camera*.txt and data_goodlist_v2.txt; the number.
+def write_released(views: list[ChosenView], out: Path, _choice: Choice) -> None:
+    """Every view's files, camera_v2/<house>/room_camera*.txt and data_goodlist_v2.txt.
 
     id is the view's number in its house, 0-based: its line in room_camera.txt.
     """
     houses: dict[str, list[ChosenView]] = defaultdict(list)
     for view in views:
         houses[view.house.id].append(view)
-    n_files, good = 0, []  # files written, lines of the list of good views
+    good = []  # lines of the list of good views
     for house, own in houses.items():
         for number, view in enumerate(own):
             place = {"house": house, "id": f"{number:06d}"}
             for layer, published in FILES.items():
                 if view.has(layer):
                     _write_file(out / published.format(**place), view.data(layer))
-                    n_files += 1
             good.append("{house}/{id}\n".format(**place))
-        n_files += _write_cameras(out / "camera_v2" / house, own)
+        _write_cameras(out / "camera_v2" / house, own)
     (out / "data_goodlist_v2.txt").write_text("".join(good), "utf-8")
-    return n_files + 1
 
 
-def _write_cameras(folder: Path, views: list[ChosenView]) -> int:
+def _write_cameras(folder: Path, views: list[ChosenView]) -> None:
     # A line of both camera files for each view, in the order of the views' numbers.
     folder.mkdir(parents=True)
     (folder / "room_camera.txt").write_text("".join(camera_line(v) for v in views), "utf-8")
     names = "".join(f"Room#{v.entry.room_id}_{v.facts.get('sector', 0)}\n" for v in views)
     (folder / "room_camera_name.txt").write_text(names, "utf-8")
-    return 2
 
 
 def _write_file(target: Path, data: bytes) -> None:

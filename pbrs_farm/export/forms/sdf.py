@@ -40,15 +40,14 @@ _STILL, _MOVING = 1, 2
 _RESERVED: Final = (_BUILDING, "world")
 
 
-def write_sdf(home: ExportedHome, folder: Path) -> int:
-    """<house id>.sdf and meshes/; the number of files."""
+def write_sdf(home: ExportedHome, folder: Path) -> None:
+    """<house id>.sdf and meshes/."""
     world = _World(home)
     (folder / "meshes").mkdir(exist_ok=True)
     for name, data in world.meshes.items():
         (folder / name).write_bytes(data)
     text = ET.tostring(world.document, encoding="utf-8", xml_declaration=True)
     (folder / f"{home.house.id}.sdf").write_bytes(text + b"\n")
-    return 1 + len(world.meshes)
 
 
 class _World:

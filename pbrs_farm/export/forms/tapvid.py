@@ -23,7 +23,7 @@ _FILE: Final = "tapvid.pkl"
 _PROTOCOL: Final = 4
 
 
-def write_tapvid(views: list[ChosenView], out: Path, _choice: Choice) -> int:
+def write_tapvid(views: list[ChosenView], out: Path, _choice: Choice) -> None:
     """tapvid.pkl: house id -> "video", "points" and "occluded", as readers of TAP-Vid's DAVIS file take it.
 
     video (T, H, W, 3) uint8; points (N, T, 2) float32, x and y as shares of the picture's width and
@@ -42,7 +42,7 @@ def write_tapvid(views: list[ChosenView], out: Path, _choice: Choice) -> int:
         hint = "pbrs-farm run HOME --cameras walk --tracks"
         raise BadInput("--to", "tapvid", "no view is a frame of a sequence", hint=hint)
     (out / _FILE).write_bytes(pickle.dumps(videos, _PROTOCOL))
-    return 1 + name_left_out(out, others, "is no frame of a film, or another camera's of a rig")
+    name_left_out(out, others, "is no frame of a film, or another camera's of a rig")
 
 
 def _video(frames: list[ChosenView]) -> dict[str, Any]:

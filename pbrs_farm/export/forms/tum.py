@@ -19,15 +19,15 @@ from pbrs_farm.images import png_from_array
 _STEPS_PER_M: Final = 5000  # of TUM's depth
 
 
-def write_tum(views: list[ChosenView], out: Path, _choice: Choice) -> int:
-    """<house>/rgb/, depth/, rgb.txt, depth.txt and groundtruth.txt; the number of files.
+def write_tum(views: list[ChosenView], out: Path, _choice: Choice) -> None:
+    """<house>/rgb/, depth/, rgb.txt, depth.txt and groundtruth.txt.
 
     groundtruth.txt has rows t x y z qx qy qz qw in the home's world (metres, y up), OpenCV axes:
     what `--trajectory` reads. Depth is 5000 a metre, 0 = nothing or beyond 13.1 m. What other
     cameras of a rig took has all five with `_<camera>` behind their names, `_right` of a stereo pair. Frames of a sequence alone: other views
     are named in left_out.txt; BadInput where there is none.
     """
-    n_files, written = 0, set[tuple[str, str]]()
+    written = set[tuple[str, str]]()
     for house, frames in frames_by_house(views).items():
         timed = [(f, f.time_s) for f in frames if f.time_s is not None]
         by_eye: dict[str, list[tuple[ChosenView, float]]] = {}
@@ -35,19 +35,17 @@ def write_tum(views: list[ChosenView], out: Path, _choice: Choice) -> int:
             for eye, view in {"": frame.first, **frame.others}.items():
                 by_eye.setdefault(eye, []).append((view, time))
         for eye, own in by_eye.items():
-            n_files += _write_trajectory(out / house, eye and f"_{eye}", own)
+            _write_trajectory(out / house, eye and f"_{eye}", own)
             written |= {(house, view.id) for view, _time in own}
-    if not n_files:
+    if not written:
         hint = "pbrs-farm run HOME --cameras walk"
         raise BadInput("--to", "tum", "no view is a frame of a sequence", hint=hint)
     others = [view for view in views if (view.house.id, view.id) not in written]
-    return n_files + name_left_out(out, others, "has no frame of a sequence that is exported")
+    name_left_out(out, others, "has no frame of a sequence that is exported")
 
 
-def _write_trajectory(folder: Path, side: str, timed: Sequence[tuple[ChosenView, float]]) -> int:
-    """What TUM's form holds of one camera that moves; the number of files."""
-    if not timed:
-        return 0
+def _write_trajectory(folder: Path, side: str, timed: Sequence[tuple[ChosenView, float]]) -> None:
+    """Write the pictures, depth and lists of one moving camera."""
     rows: dict[str, list[str]] = {"rgb": [], "depth": [], "groundtruth": []}
     for name in ("rgb", "depth"):
         (folder / f"{name}{side}").mkdir(parents=True)
@@ -61,7 +59,6 @@ def _write_trajectory(folder: Path, side: str, timed: Sequence[tuple[ChosenView,
         rows["groundtruth"].append(_trajectory_row(time, pose_opencv(view)))
     for name, lines in rows.items():
         (folder / f"{name}{side}.txt").write_text("\n".join(lines) + "\n", "utf-8")
-    return 2 * len(timed) + 3
 
 
 def _depth(view: ChosenView) -> bytes:

@@ -28,8 +28,8 @@ _MATERIALS: Final = "materials.mtl"
 _Z_UP: Final = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
 
 
-def write_urdf(home: ExportedHome, folder: Path) -> int:
-    """<house id>.urdf, meshes/ and textures/; the number of files."""
+def write_urdf(home: ExportedHome, folder: Path) -> None:
+    """<house id>.urdf, meshes/ and textures/."""
     document = _Document(home)
     for name, data in document.files.items():
         (folder / name).parent.mkdir(exist_ok=True)
@@ -37,7 +37,6 @@ def write_urdf(home: ExportedHome, folder: Path) -> int:
     ET.indent(document.root)
     text = ET.tostring(document.root, encoding="utf-8", xml_declaration=True)
     (folder / f"{home.house.id}.urdf").write_bytes(text + b"\n")
-    return 1 + len(document.files)
 
 
 class _Document:

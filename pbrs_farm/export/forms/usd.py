@@ -33,15 +33,14 @@ _Z_UP: Final = ((1, 0, 0, 0), (0, 0, 1, 0), (0, -1, 0, 0), (0, 0, 0, 1))
 _LEAST_RADIUS_M: Final = 0.005
 
 
-def write_usd(home: ExportedHome, folder: Path) -> int:
-    """<house id>.usdc and textures/; the number of files.
+def write_usd(home: ExportedHome, folder: Path) -> None:
+    """<house id>.usdc and textures/.
 
     Needs the module pxr. folder must exist.
     """
     need("pxr")
     textures = _write_textures(home.house, folder)
     _Stage(home, folder / f"{home.house.id}.usdc", textures).save()
-    return 1 + len(textures)
 
 
 def _write_textures(house: House, folder: Path) -> dict[str, str]:

@@ -12,8 +12,8 @@ from pbrs_farm.export.home_pieces import COLLIDES, ExportedHome
 from pbrs_farm.installation import need
 
 
-def write_usdz(home: ExportedHome, folder: Path) -> int:
-    """<house id>.usdz, which holds its textures; the number of files, 1.
+def write_usdz(home: ExportedHome, folder: Path) -> None:
+    """<house id>.usdz, which holds its textures.
 
     Written by way of a .usdc in a temporary folder. Needs the module pxr; MachineFailed where the
     package could not be written.
@@ -27,7 +27,6 @@ def write_usdz(home: ExportedHome, folder: Path) -> int:
         package = folder / f"{home.house.id}.usdz"
         if not UsdUtils.CreateNewUsdzPackage(str(stage), str(package)):
             raise MachineFailed(f"{package.name} could not be written")
-    return 1
 
 
 FORM = HomeForm(

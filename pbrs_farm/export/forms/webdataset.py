@@ -1,26 +1,33 @@
-"""WebDataset: tar shards of samples, equal bytes for equal views. Effects: reads views, writes files."""
+"""WebDataset: tar shards of samples, with equal bytes for equal views. Effects: reads views, writes files."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
+from pbrs_farm.core.options import option
+from pbrs_farm.core.record import Record
 from pbrs_farm.export.chosen_view import Choice, ChosenView
 from pbrs_farm.export.form import Convention, ViewForm
 from pbrs_farm.views.shard_tar import write_samples
 
 
-def write_webdataset(views: list[ChosenView], out: Path, choice: Choice) -> int:
-    """shard-<6 digits>.tar of choice.views_per_shard views each; the number of files.
+class WebDatasetOptions(Record):
+    """The options of the form."""
 
-    A sample's key is <house>__<view>; its parts are json (view.json) and every layer that is
-    exported, by name: "mlt_il_ol.png", "depth.png". No clock, no owner.
+    shard_size: int = option(500, "views a tar (default 500)", metavar="N", least=1)
+
+
+def write_webdataset(views: list[ChosenView], out: Path, choice: Choice) -> None:
+    """Write shard-<6 digits>.tar.
+
+    A sample's key is <house>__<view>; its parts are json (view.json) and every exported layer by name:
+    "mlt_il_ol.png", "depth.png". No clock, no owner.
     """
-    starts = range(0, len(views), choice.views_per_shard)
-    for number, start in enumerate(starts):
-        own = views[start : start + choice.views_per_shard]
-        samples = ((f"{view.house.id}__{view.id}", _sample_parts(view)) for view in own)
+    size = choice.of(WebDatasetOptions).shard_size
+    for number, start in enumerate(range(0, len(views), size)):
+        shard = views[start : start + size]
+        samples = ((f"{view.house.id}__{view.id}", _sample_parts(view)) for view in shard)
         write_samples(out / f"shard-{number:06d}.tar", samples)
-    return len(starts)
 
 
 def _sample_parts(view: ChosenView) -> dict[str, bytes]:
@@ -33,6 +40,7 @@ FORM = ViewForm(
     write_webdataset,
     "`shard-<6 digits>.tar`, 500 views each (`--shard-size`); key `<house>__<view>`, parts `json` and"
     " `<layer>.png` / `.exr`; equal views give equal bytes",
+    options=WebDatasetOptions,
     has_classes=True,
     convention=Convention(0.5, has_k=True, axes="as view.json", depth="as view.json"),
 )

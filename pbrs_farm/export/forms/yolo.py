@@ -16,25 +16,25 @@ from pbrs_farm.export.form import Convention, ViewForm, name_left_out
 _NO_BOX: Final = (0, WALL, FLOOR, CEILING)
 
 
-def write_yolo(views: list[ChosenView], out: Path, _choice: Choice) -> int:
-    """images/<house>__<view>.png and labels/<house>__<view>.txt; the number of files.
+def write_yolo(views: list[ChosenView], out: Path, _choice: Choice) -> None:
+    """images/<house>__<view>.png and labels/<house>__<view>.txt.
 
     A line is a box: class (NYU40 id - 1; of a user's table its place among the ids), centre x, y,
     width, height, as shares of the picture. Views without a picture are left out, and named in
     left_out.txt.
     """
-    return write_pictures_and_labels(views, out, _box_lines)
+    write_pictures_and_labels(views, out, _box_lines)
 
 
 def write_pictures_and_labels(
     views: list[ChosenView], out: Path, lines_of: Callable[[ChosenView], Iterable[str]]
-) -> int:
-    """images/ and labels/ with the lines of each picture; the number of files."""
+) -> None:
+    """images/ and labels/ with the lines of each picture."""
 
     def label(view: ChosenView) -> tuple[str, bytes]:
         return ".txt", "".join(lines_of(view)).encode()
 
-    return write_pictures_beside(views, out, "labels", label)
+    write_pictures_beside(views, out, "labels", label)
 
 
 def write_pictures_beside(
@@ -42,8 +42,8 @@ def write_pictures_beside(
     out: Path,
     folder: str,
     label_of: Callable[[ChosenView], tuple[str, bytes]],
-) -> int:
-    """images/<house>__<view>.png and <folder>/<house>__<view><suffix>; the number of files.
+) -> None:
+    """images/<house>__<view>.png and <folder>/<house>__<view><suffix>.
 
     label_of: the suffix and the bytes of a view's label. Views without a picture are left out, and
     named in left_out.txt.
@@ -57,7 +57,7 @@ def write_pictures_beside(
         (out / "images" / f"{name}.png").write_bytes(view.data(view.picture or ""))
         (out / folder / f"{name}{suffix}").write_bytes(data)
     without = [view for view in views if view.picture is None]
-    return 2 * len(shown) + name_left_out(out, without, "has no picture")
+    name_left_out(out, without, "has no picture")
 
 
 def _box_lines(view: ChosenView) -> Iterable[str]:
@@ -83,9 +83,9 @@ def numbered_objects(view: ChosenView) -> Iterable[tuple[int, dict[str, Any]]]:
             yield numbers[class_id], row
 
 
-def write_data_yaml(out: Path, splits: tuple[str, ...], choice: Choice) -> int:
-    """data.yaml of an export with these splits, or none, and the names of its classes; the number of files, 1."""
-    return write_yaml(out, splits, names_lines(choice))
+def write_data_yaml(out: Path, splits: tuple[str, ...], choice: Choice) -> None:
+    """data.yaml of an export with these splits, or none, and the names of its classes."""
+    write_yaml(out, splits, names_lines(choice))
 
 
 def names_lines(choice: Choice) -> list[str]:
@@ -96,8 +96,8 @@ def names_lines(choice: Choice) -> list[str]:
     return ["names:", *(f"  {k}: {name}" for k, name in enumerate(said))]
 
 
-def write_yaml(out: Path, splits: tuple[str, ...], fields: list[str]) -> int:
-    """data.yaml: the folders of these splits, or of none, and lines of other fields; the number of files, 1.
+def write_yaml(out: Path, splits: tuple[str, ...], fields: list[str]) -> None:
+    """data.yaml: the folders of these splits, or of none, and lines of other fields.
 
     Folders count from data.yaml's own. Ultralytics wants train and val: one that has no home is
     the other's, and a comment says so.
@@ -112,7 +112,6 @@ def write_yaml(out: Path, splits: tuple[str, ...], fields: list[str]) -> int:
     lines = [*remarks, *(f"{name}: {folders[name]}" for name in SPLITS if name in folders)]
     lines += fields
     (out / "data.yaml").write_text("\n".join(lines) + "\n", "utf-8")
-    return 1
 
 
 FORM = ViewForm(

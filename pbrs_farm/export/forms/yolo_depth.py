@@ -16,14 +16,14 @@ from pbrs_farm.images import png_from_array
 _FIELDS: Final = ["nc: 1", "names:", "  0: depth", "depth_scale: 1000"]
 
 
-def write_yolo_depth(views: list[ChosenView], out: Path, _choice: Choice) -> int:
-    """images/<house>__<view>.png and depth/<house>__<view>.png, or .npy; the number of files.
+def write_yolo_depth(views: list[ChosenView], out: Path, _choice: Choice) -> None:
+    """images/<house>__<view>.png and depth/<house>__<view>.png, or .npy.
 
     PNG: uint16, mm along the axis, 0 where there is nothing or it is 65.535 m away or more. NPY
     where depth_z is exported and depth is not: float32 metres, 0 = nothing. BadInput for a lens
     whose depth runs along the ray.
     """
-    return write_pictures_beside(views, out, "depth", _depth)
+    write_pictures_beside(views, out, "depth", _depth)
 
 
 def _depth(view: ChosenView) -> tuple[str, bytes]:
@@ -35,9 +35,9 @@ def _depth(view: ChosenView) -> tuple[str, bytes]:
     return ".png", png_from_array(depth_within_png(view))
 
 
-def write_depth_yaml(out: Path, splits: tuple[str, ...], _choice: Choice) -> int:
-    """data.yaml of an export with these splits, or none; the number of files, 1."""
-    return write_yaml(out, splits, _FIELDS)
+def write_depth_yaml(out: Path, splits: tuple[str, ...], _choice: Choice) -> None:
+    """data.yaml of an export with these splits, or none."""
+    write_yaml(out, splits, _FIELDS)
 
 
 FORM = ViewForm(

@@ -13,12 +13,12 @@ from pbrs_farm.export.forms.yolo import numbered_objects, write_data_yaml, write
 from pbrs_farm.export.masks import mask_polygons
 
 
-def write_yolo_seg(views: list[ChosenView], out: Path, _choice: Choice) -> int:
+def write_yolo_seg(views: list[ChosenView], out: Path, _choice: Choice) -> None:
     """As the form yolo; a line is a polygon: class, then x and y of each corner as shares.
 
     Every connected part of an item's visible mask is a polygon, see mask_polygons.
     """
-    return write_pictures_and_labels(views, out, _polygon_lines)
+    write_pictures_and_labels(views, out, _polygon_lines)
 
 
 def _polygon_lines(view: ChosenView) -> Iterable[str]:

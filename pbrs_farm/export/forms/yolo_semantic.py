@@ -19,8 +19,8 @@ from pbrs_farm.images import png_from_array
 _IGNORED: Final = 255  # of a mask: no loss, no metric
 
 
-def write_yolo_semantic(views: list[ChosenView], out: Path, choice: Choice) -> int:
-    """images/<house>__<view>.png and masks/<house>__<view>.png; the number of files.
+def write_yolo_semantic(views: list[ChosenView], out: Path, choice: Choice) -> None:
+    """images/<house>__<view>.png and masks/<house>__<view>.png.
 
     A mask is uint8: the class's number in data.yaml (NYU40 id - 1; of a user's table its place among
     the ids), 255 where nothing is or it has no class. BadInput for more than 255 classes.
@@ -34,12 +34,12 @@ def write_yolo_semantic(views: list[ChosenView], out: Path, choice: Choice) -> i
     def mask(view: ChosenView) -> tuple[str, bytes]:
         return ".png", png_from_array(number[view.array("semantic")])
 
-    return write_pictures_beside(views, out, "masks", mask)
+    write_pictures_beside(views, out, "masks", mask)
 
 
-def write_semantic_yaml(out: Path, splits: tuple[str, ...], choice: Choice) -> int:
-    """data.yaml of an export with these splits, or none; the number of files, 1."""
-    return write_yaml(out, splits, ["masks_dir: masks", *names_lines(choice)])
+def write_semantic_yaml(out: Path, splits: tuple[str, ...], choice: Choice) -> None:
+    """data.yaml of an export with these splits, or none."""
+    write_yaml(out, splits, ["masks_dir: masks", *names_lines(choice)])
 
 
 FORM = ViewForm(

@@ -14,7 +14,7 @@ import pyarrow.parquet as pq
 from pbrs_farm.core.checked_calls import checked_call
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.regular_files import digest_of_regular, new_folder
+from pbrs_farm.regular_files import digest_of_regular, files_below, new_folder
 from pbrs_farm.views.dataset_json import DATASET_JSON, Dataset, Shard, dataset_json
 from pbrs_farm.views.packing.croissant import croissant_json
 from pbrs_farm.views.packing.data_card import dataset_description, root_facts
@@ -68,17 +68,18 @@ def pack(
     views = replace(views, left_out=left_out)
     write = _write_shards if form == "shards" else _write_parquet_files
     with new_folder(Path(out)) as scratch:
-        n_files = write(views, source, packing, scratch, tell)
-        n_bytes = sum(file.stat().st_size for file in scratch.rglob("*") if file.is_file())
+        write(views, source, packing, scratch, tell)
+        files = files_below(scratch)
+        n_bytes = sum(file.stat().st_size for file in files)
     n_views: dict[str, int] = {}
     for plan in shard_plans(views.refs, packing, form):
         n_views[plan.split] = n_views.get(plan.split, 0) + len(plan.refs)
-    return Packed(n_views, n_files, n_bytes, left_out)
+    return Packed(n_views, len(files), n_bytes, left_out)
 
 
 def _write_shards(
     views: Views, source: StoredRoot, packing: Packing, out: Path, tell: Callable[[str], None]
-) -> int:
+) -> None:
     shards = []
     for plan in shard_plans(views.refs, packing):
         shards.append(_write_shard(source, plan, packing, out))
@@ -92,7 +93,6 @@ def _write_shards(
         dataset_json(dataset, dataset_description(packing, facts.credits))
     )
     (out / "README.md").write_text(card(views, packing, facts, form="shards"), encoding="utf-8")
-    return len(shards) + 2
 
 
 def _write_shard(source: StoredRoot, plan: ShardPlan, packing: Packing, out: Path) -> Shard:
@@ -105,7 +105,7 @@ def _write_shard(source: StoredRoot, plan: ShardPlan, packing: Packing, out: Pat
 
 def _write_parquet_files(
     views: Views, source: StoredRoot, packing: Packing, out: Path, tell: Callable[[str], None]
-) -> int:
+) -> None:
     files = []
     for plan in shard_plans(views.refs, packing, "parquet"):
         file = write_parquet(source, plan, packing, out)
@@ -115,4 +115,3 @@ def _write_parquet_files(
     (out / "README.md").write_text(card(views, packing, facts, form="parquet"), encoding="utf-8")
     columns = {field.name: croissant_kind(field.type) for field in pq.read_schema(files[0])}
     (out / "croissant.json").write_bytes(croissant_json(files, columns, facts))
-    return len(files) + 2

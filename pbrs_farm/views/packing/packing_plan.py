@@ -1,4 +1,4 @@
-"""What is packed and in which order: views by split, mixed by seed, cut into shards; no effects."""
+"""The content and order of packed shards: views by split, mixed by seed; no effects."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ _WHOLE_OF = {"shards": WHOLE, "parquet": "train"}  # `datasets` refuses a split 
 
 @dataclass(frozen=True, slots=True)
 class Packing:
-    """How views are packed. Raises BadInput for what cannot be.
+    """The layers, size, splits and encoding of packed views. Raises BadInput for impossible ones.
 
-    size: (width, height), None as rendered. shares: how large each split is, None for one of all.
-    colour: "png" keeps every bit, "jpeg" is a quarter as large.
+    size: (width, height), None as rendered. shares: of each split, None for a single split. colour:
+    "png" keeps every bit, "jpeg" is a quarter as large.
     """
 
     size: Size | None = None
@@ -68,18 +68,19 @@ class ShardPlan:
 def shard_plans(
     refs: tuple[ViewRef, ...], packing: Packing, form: str = "shards"
 ) -> Iterator[ShardPlan]:
-    """The shards of all splits; each view is in one, views of a home lie far apart.
+    """The shards of all splits; each view is in one, and views of a home are far apart.
 
-    What is not split is one split by itself: "all" of shards, "train" of Parquet.
+    Without shares there is one split: "all" of shards, "train" of Parquet.
     """
     whole = _WHOLE_OF[form]
     by_split: dict[str, list[ViewRef]] = {name: [] for name in (whole, *SPLITS)}
     for ref in refs:
         split = split_of_house(ref.house, packing.shares) if packing.shares else whole
         by_split[split].append(ref)
-    for split, own in by_split.items():
-        # Mix by an order that follows from the seed and the number of views.
-        mixed = [own[k] for k in np.random.default_rng(packing.seed).permutation(len(own))]
+    for split, split_refs in by_split.items():
+        # The order follows from the seed and the number of views.
+        order = np.random.default_rng(packing.seed).permutation(len(split_refs))
+        mixed = [split_refs[k] for k in order]
         starts = range(0, len(mixed), packing.views_per_shard)
         for number, start in enumerate(starts):
             part = tuple(mixed[start : start + packing.views_per_shard])

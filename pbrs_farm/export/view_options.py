@@ -1,15 +1,15 @@
-"""What of the views is exported: the options of `export`, and of a form in a set's file; no effects."""
+"""The options of `export` that all forms of views have; a form's own are in its module. No effects."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
+from pbrs_farm.core.options import option
 from pbrs_farm.core.record import Record
-from pbrs_farm.run.request import option
 
 
-class ExportOptions(Record):
-    """Which layers and modes, at which size, in whose classes."""
+class ViewOptions(Record):
+    """Layers, modes, size and classes of exported views."""
 
     layers: tuple[str, ...] = option(
         (), "labels by name (`pbrs-farm layers`), default all there are but radiance",
@@ -25,8 +25,3 @@ class ExportOptions(Record):
         "classes of your own: CSV with columns from,id,name (default NYU40)",
         metavar="FILE.csv",
     )
-    shard_size: int = option(500, "views a tar (webdataset)", metavar="N", least=1)
-    lidar: str = option(
-        "vlp16", "whose scans the form lidar has (default vlp16; docs/formats/lidar.md has them all)",
-        metavar="SCANNER",
-    )  # fmt: skip
