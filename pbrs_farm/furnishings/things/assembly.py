@@ -20,9 +20,15 @@ GENERATED = "generated#"  # before the family, in the id of a generated piece
 
 
 def standing_piece(
-    family: str, parts: Sequence[Part], *, group: str = "", nyu40: int = OTHERPROP,
-    place: Place = Place.SURFACE, textures: Iterable[Texture] = (), joints: Sequence[Joint] = (),
-) -> Model:  # fmt: skip
+    family: str,
+    parts: Sequence[Part],
+    *,
+    group: str = "",
+    nyu40: int = OTHERPROP,
+    place: Place = Place.SURFACE,
+    textures: Iterable[Texture] = (),
+    joints: Sequence[Joint] = (),
+) -> Model:
     """The parts as one piece, the middle of its base at the origin; one surface a material.
 
     What moves has surfaces of its own; joints: in the frame of the parts.
@@ -42,22 +48,34 @@ def standing_piece(
     moved = tuple(replace(s, positions=(s.positions - base).astype(np.float32)) for s in joined)
     width, height, depth = (float(v) for v in high - low)
     piece = Piece(
-        f"{GENERATED}{family}", family.replace("_", " ").capitalize(), group or family, place,
-        nyu40, (width, depth, height), library="generated",
-    )  # fmt: skip
+        f"{GENERATED}{family}",
+        family.replace("_", " ").capitalize(),
+        group or family,
+        place,
+        nyu40,
+        (width, depth, height),
+        library="generated",
+    )
     to_base = np.eye(4)
     to_base[:3, 3] = -base
     shape = Shape(
-        moved, tuple(materials), {t.id: t for t in textures},
+        moved,
+        tuple(materials),
+        {t.id: t for t in textures},
         joints=tuple(joint.placed(to_base) for joint in joints),
-    )  # fmt: skip
+    )
     return piece, shape
 
 
 def hanging_piece(
-    family: str, group: str, nyu40: int, parts: Sequence[Part], textures: Sequence[Texture] = (),
-    place: Place = Place.WALL, joints: Sequence[Joint] = (),
-) -> Model:  # fmt: skip
+    family: str,
+    group: str,
+    nyu40: int,
+    parts: Sequence[Part],
+    textures: Sequence[Texture] = (),
+    place: Place = Place.WALL,
+    joints: Sequence[Joint] = (),
+) -> Model:
     """A generated piece that hangs, and its shape: unlike what stands, it keeps its own origin."""
     materials = tuple(dict.fromkeys(m for _s, m in parts))
     surfaces = tuple(replace(s, material=materials.index(m)) for s, m in parts)

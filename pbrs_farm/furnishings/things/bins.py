@@ -5,46 +5,25 @@ from __future__ import annotations
 from itertools import product
 from typing import Final
 
-from numpy import cos, pi, sin
+from numpy import pi
 
 from pbrs_farm.core.catalogue import Place
 from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.dress.style import mix
-from pbrs_farm.furnishings.things.bodies import (
-    bevelled,
-    cylinder,
-    hoop,
-    loft,
-    revolve,
-    tube,
-    vessel,
-)
 from pbrs_farm.furnishings.things.boxes import rope_side
 from pbrs_farm.furnishings.things.maker import Maker, Size, family, thing
 from pbrs_farm.furnishings.things.materials import plain
-from pbrs_farm.furnishings.things.outlines import bent, d_shape, oval, rect, rings, scaled
+from pbrs_farm.furnishings.things.outlines import bent, d_shape, oval, polar, rect, rings, scaled
+
+# fmt: off
 
 _FORMS = 17
 # How much wider, deeper and higher a form of the catalogue is than 2 r and `tall`. Two for sorting have
 # a width of their own.
-_EXTENT: Final = {
-    0: (1.0, 1.0, 1.0),
-    1: (1.0, 1.0, 1.0),
-    2: (1.0, 1.0, 1.0),
-    3: (1.02, 1.25, 1.2),
-    4: (1.02, 1.25, 1.2),
-    5: (0.975, 0.825, 1.42),
-    6: (1.0, 0.75, 1.0),
-    7: (1.0, 1.0, 1.0),
-    8: (1.0, 1.0, 1.12),
-    10: (0.91, 0.76, 1.38),
-    11: (1.01, 0.76, 1.36),
-    12: (0.97, 0.97, 1.05),
-    13: (1.0, 1.0, 1.3),
-    14: (1.0, 1.0, 1.25),
-    15: (0.92, 0.66, 1.33),
-    16: (1.0, 1.0, 1.0),
-}
+_EXTENT: Final = {0: (1.0, 1.0, 1.0), 1: (1.0, 1.0, 1.0), 2: (1.0, 1.0, 1.0), 3: (1.02, 1.25, 1.2),
+    4: (1.02, 1.25, 1.2), 5: (0.975, 0.825, 1.42), 6: (1.0, 0.75, 1.0), 7: (1.0, 1.0, 1.0),
+    8: (1.0, 1.0, 1.12), 10: (0.91, 0.76, 1.38), 11: (1.01, 0.76, 1.36), 12: (0.97, 0.97, 1.05),
+    13: (1.0, 1.0, 1.3), 14: (1.0, 1.0, 1.25), 15: (0.92, 0.66, 1.33), 16: (1.0, 1.0, 1.0)}
 
 
 @thing(group="bin")
@@ -58,110 +37,102 @@ def bin_of(m: Maker, form: int, r: float, tall: float) -> None:
     material = m.metal if m.chance(0.3) else plain("bin", m.any_colour(), 0.5)
     match form:
         case 0 | 1:  # for paper
-            m.add(vessel([(0, 0), (r * 0.85, 0), (r, tall)], 0.003, n=20 if form == 0 else 28),
-                of=material)  # fmt: skip
+            m.vessel(
+                [(0, 0), (r * 0.85, 0), (r, tall)], 0.003, n=20 if form == 0 else 28, of=material
+            )
         case 2:  # of wire
             with m.of(m.metal):
-                m.add(cylinder(r * 0.85, 0, 0.004, n=20))
+                m.cylinder(r * 0.85, 0, 0.004, n=20)
                 for t in (0.3, 0.65, 1.0):
-                    m.add(hoop(oval(2 * r * (0.85 + 0.15 * t), 2 * r * (0.85 + 0.15 * t), n=22),
-                        t * tall, 0.003, n=5))  # fmt: skip
+                    m.hoop(oval(2 * r * (0.85 + 0.15 * t), 2 * r * (0.85 + 0.15 * t), n=22),
+                        t * tall, 0.003, n=5)
                 for k in range(22):
-                    m.add(tube([(0.84 * r * cos(0.2856 * k), 0.002, 0.84 * r * sin(0.2856 * k)),
-                        (r * cos(0.2856 * k), tall, r * sin(0.2856 * k))], 0.0015, n=4))  # fmt: skip
+                    m.tube([polar(0.84 * r, 0.002, 0.2856 * k), polar(r, tall, 0.2856 * k)], 0.0015,
+                        n=4)
         case 3 | 4:  # with a pedal
             h = tall * 1.2
-            m.add(revolve([(0, 0.012), (r * 0.98, 0.012), (r, 0.02), (r, h * 0.86), (0, h * 0.86)],
-                n=26), of=material)  # fmt: skip
-            m.add(cylinder(r * 1.02, 0, 0.0118, n=26),
-                of=plain("bin foot", (0.08, 0.08, 0.08), 0.6))  # fmt: skip
-            m.add(revolve(scaled(r, h, [(0, 0.8602), (1.02, 0.8602), (1.02, 0.89), (0.8, 0.97),
-                (0, 1)]), n=26), of=material if form == 3 else plain("lid", (0.1, 0.1, 0.1), 0.5))  # fmt: skip
-            m.add(bevelled((-0.03, 0.004, r * 0.9), (0.03, 0.018, r + 0.05), 0.003),
-                of=plain("pedal", (0.1, 0.1, 0.1), 0.5))  # fmt: skip
-            m.add(bevelled((-0.04, h * 0.82, -r - 0.015), (0.04, h * 0.9, -r * 0.9), 0.003),
-                of=plain("hinge", (0.1, 0.1, 0.1), 0.5))  # fmt: skip
+            m.revolve([(0, 0.012), (r * 0.98, 0.012), (r, 0.02), (r, h * 0.86), (0, h * 0.86)],
+                n=26, of=material)
+            m.cylinder(r * 1.02, 0, 0.0118, n=26, of=plain("bin foot", (0.08, 0.08, 0.08), 0.6))
+            m.revolve(scaled(r, h, [(0, 0.8602), (1.02, 0.8602), (1.02, 0.89), (0.8, 0.97),
+                (0, 1)]), n=26, of=material if form == 3 else plain("lid", (0.1, 0.1, 0.1), 0.5))
+            m.box(0.06, (0.004, 0.018), (r * 0.9, r + 0.05), 0.003,
+                of=plain("pedal", (0.1, 0.1, 0.1), 0.5))
+            m.box(0.08, (h * 0.82, h * 0.9), (-r - 0.015, -r * 0.9), 0.003,
+                of=plain("hinge", (0.1, 0.1, 0.1), 0.5))
         case 5:  # a lid that swings
-            m.add(loft(rings(rect, [(1.7 * r, 1.4 * r, 0.03, 0),
-                (1.9 * r, 1.6 * r, 0.04, tall * 1.2)])), of=material)  # fmt: skip
-            m.add(loft(rings(rect, [(1.95 * r, 1.65 * r, 0.04, tall * 1.2 + 0.0002),
-                (1.95 * r, 1.65 * r, 0.04, tall * 1.25), (1.5 * r, 1.2 * r, 0.03, tall * 1.42)])),
-                of=plain("lid", m.any_colour(), 0.5))  # fmt: skip
+            m.loft(rings(rect, [(1.7 * r, 1.4 * r, 0.03, 0), (1.9 * r, 1.6 * r, 0.04, tall * 1.2)]),
+                of=material)
+            m.loft(rings(rect, [(1.95 * r, 1.65 * r, 0.04, tall * 1.2 + 0.0002),
+                (1.95 * r, 1.65 * r, 0.04, tall * 1.25), (1.5 * r, 1.2 * r, 0.03, tall * 1.42)]),
+                of=plain("lid", m.any_colour(), 0.5))
         case 6:  # square
-            m.add(loft(rings(rect, [(1.7 * r, 1.2 * r, 0.02, 0), (2 * r, 1.5 * r, 0.02, tall),
-                (2 * r - 0.008, 1.5 * r - 0.008, 0.018, tall),
-                (1.7 * r - 0.006, 1.2 * r - 0.006, 0.018, 0.005)], n=3)), of=material)  # fmt: skip
+            m.loft(rings(rect, [(1.7 * r, 1.2 * r, 0.02, 0), (2 * r, 1.5 * r, 0.02, tall),
+                (2 * r - 0.008, 1.5 * r - 0.008, 0.018, tall), (1.7 * r - 0.006, 1.2 * r - 0.006,
+                0.018, 0.005)], n=3), of=material)
         case 7:  # of wicker
-            rope_side(m, 2 * r, 2 * r, 0.1, tall, 8, plain("wicker", mix((0.66, 0.52, 0.36),
-                m.any_colour(), m.pick(0.0, 0.3)), 0.9))  # fmt: skip
+            rope_side(m, 2 * r, 2 * r, 0.1, tall, 8, plain("wicker",
+                mix((0.66, 0.52, 0.36), m.any_colour(), m.pick(0.0, 0.3)), 0.9))
         case 8:  # of felt, with two straps
-            m.add(vessel([(0, 0), (r * 0.98, 0), (r, tall)], 0.006, n=24), of=plain("felt",
-                m.pick((0.3, 0.31, 0.33), (0.55, 0.53, 0.5), (0.35, 0.22, 0.13)), 0.95))  # fmt: skip
+            m.vessel([(0, 0), (r * 0.98, 0), (r, tall)], 0.006, n=24,
+                of=plain("felt", m.pick((0.3, 0.31, 0.33), (0.55, 0.53, 0.5), (0.35, 0.22, 0.13)),
+                0.95))
             for x in (-1.0, 1.0):
-                m.add(tube(bent([(x * r * 0.97, tall * 0.9, -0.04), (x * r, tall * 1.12, -0.03),
+                m.tube(bent([(x * r * 0.97, tall * 0.9, -0.04), (x * r, tall * 1.12, -0.03),
                     (x * r, tall * 1.12, 0.03), (x * r * 0.97, tall * 0.9, 0.04)], 0.02, n=3),
-                    0.005, n=6), of=plain("strap", (0.35, 0.22, 0.13), 0.6))  # fmt: skip
+                    0.005, n=6, of=plain("strap", (0.35, 0.22, 0.13), 0.6))
         case 9:  # two for sorting
             for x in (-0.115, 0.115):
-                m.add(bevelled((x - 0.11, 0, -0.14), (x + 0.11, tall * 1.25, 0.14), 0.008),
-                    of=plain("bin", m.pick((0.3, 0.32, 0.33), (0.9, 0.9, 0.89)), 0.5))  # fmt: skip
-                m.add(bevelled((x - 0.112, tall * 1.2502, -0.142), (x + 0.112, tall * 1.32, 0.142),
-                    0.006), of=plain("lid", m.pick((0.2, 0.4, 0.25), (0.2, 0.3, 0.5),
-                    (0.75, 0.6, 0.15), (0.25, 0.25, 0.26)), 0.5))  # fmt: skip
+                m.box(0.22, tall * 1.25, 0.28, 0.008, x=x, of=plain("bin",
+                    m.pick((0.3, 0.32, 0.33), (0.9, 0.9, 0.89)), 0.5))
+                m.box(0.224, (tall * 1.2502, tall * 1.32), 0.284, 0.006, x=x,
+                    of=plain("lid", m.pick((0.2, 0.4, 0.25), (0.2, 0.3, 0.5), (0.75, 0.6, 0.15),
+                    (0.25, 0.25, 0.26)), 0.5))
         case 10:  # a lid that opens by a touch, over a tall square body
-            m.add(loft(rings(rect, [(1.8 * r, 1.5 * r, 0.02, 0), (1.8 * r, 1.5 * r, 0.02, tall * 1.3)],
-                n=3)), of=material)  # fmt: skip
-            m.add(loft(rings(rect, [(1.82 * r, 1.52 * r, 0.02, tall * 1.3 + 0.0002),
-                (1.82 * r, 1.52 * r, 0.02, tall * 1.36), (1.7 * r, 1.4 * r, 0.02, tall * 1.38)], n=3)),
-                of=plain("lid", m.pick((0.1, 0.1, 0.1), (0.9, 0.9, 0.88)), 0.4))  # fmt: skip
+            m.loft(rings(rect, [(1.8 * r, 1.5 * r, 0.02, 0), (1.8 * r, 1.5 * r, 0.02, tall * 1.3)],
+                n=3), of=material)
+            m.loft(rings(rect, [(1.82 * r, 1.52 * r, 0.02, tall * 1.3 + 0.0002),
+                (1.82 * r, 1.52 * r, 0.02, tall * 1.36), (1.7 * r, 1.4 * r, 0.02, tall * 1.38)],
+                n=3), of=plain("lid", m.pick((0.1, 0.1, 0.1), (0.9, 0.9, 0.88)), 0.4))
         case 11:  # half round, to stand at a wall
-            m.add(loft([(d_shape(1.9 * r, 1.4 * r, back=-0.7 * r), 0.0),
-                (d_shape(2 * r, 1.5 * r, back=-0.75 * r), tall * 1.2)]), of=material)  # fmt: skip
-            m.add(loft([(d_shape(2.02 * r, 1.52 * r, back=-0.76 * r), tall * 1.2 + 0.0002),
+            m.loft([(d_shape(1.9 * r, 1.4 * r, back=-0.7 * r), 0.0),
+                (d_shape(2 * r, 1.5 * r, back=-0.75 * r), tall * 1.2)], of=material)
+            m.loft([(d_shape(2.02 * r, 1.52 * r, back=-0.76 * r), tall * 1.2 + 0.0002),
                 (d_shape(2.02 * r, 1.52 * r, back=-0.76 * r), tall * 1.26),
-                (d_shape(1.7 * r, 1.2 * r, back=-0.6 * r), tall * 1.36)]),
-                of=plain("lid", (0.12, 0.12, 0.12), 0.45))  # fmt: skip
+                (d_shape(1.7 * r, 1.2 * r, back=-0.6 * r), tall * 1.36)],
+                of=plain("lid", (0.12, 0.12, 0.12), 0.45))
         case 12:  # of slats round a bag
-            m.add(cylinder(0.86 * r, 0.01, tall, n=20), of=plain("bag", (0.86, 0.84, 0.78), 0.95))
+            m.cylinder(0.86 * r, 0.01, tall, n=20, of=plain("bag", (0.86, 0.84, 0.78), 0.95))
             with m.of(m.timber):
                 for k in range(16):
-                    m.add(bevelled((-0.014, 0, 0.9 * r), (0.014, tall * 1.05, 0.9 * r + 0.008), 0.002),
-                        turn=rotation_y(pi / 8 * k))  # fmt: skip
+                    m.box(0.028, tall * 1.05, 0.008, 0.002, against=0.9 * r,
+                        turn=rotation_y(pi / 8 * k))
                 for y in (0.1, 0.9):
-                    m.add(hoop(oval(1.8 * r, 1.8 * r, n=20), y * tall, 0.006, n=5))
+                    m.hoop(oval(1.8 * r, 1.8 * r, n=20), y * tall, 0.006, n=5)
         case 13:  # a bucket with a handle
-            m.add(vessel([(0, 0), (r * 0.7, 0), (r * 0.96, tall * 0.92), (r, tall * 0.92), (r, tall)],
-                0.003, n=26), of=material)  # fmt: skip
-            m.add(tube(bent([(-r, tall * 0.94, 0), (-0.8 * r, tall * 1.3, 0), (0.8 * r, tall * 1.3, 0),
-                (r, tall * 0.94, 0)], 0.1, n=5), 0.004, n=6), of=m.metal)  # fmt: skip
+            m.vessel([(0, 0), (r * 0.7, 0), (r * 0.96, tall * 0.92), (r, tall * 0.92), (r, tall)],
+                0.003, n=26, of=material)
+            m.tube(bent([(-r, tall * 0.94, 0), (-0.8 * r, tall * 1.3, 0), (0.8 * r, tall * 1.3, 0),
+                (r, tall * 0.94, 0)], 0.1, n=5), 0.004, n=6, of=m.metal)
         case 14:  # a ball's form with a hole
-            m.add(revolve(scaled(r, tall * 1.25, [(0, 0), (0.6, 0), (0.95, 0.3), (1, 0.55), (0.85, 0.85),
-                (0.6, 1), (0.56, 0.99), (0.8, 0.84), (0.94, 0.55), (0.9, 0.3), (0.55, 0.03), (0, 0.03)]),
-                n=30), of=material)  # fmt: skip
+            m.revolve(scaled(r, tall * 1.25, [(0, 0), (0.6, 0), (0.95, 0.3), (1, 0.55),
+                (0.85, 0.85), (0.6, 1), (0.56, 0.99), (0.8, 0.84), (0.94, 0.55), (0.9, 0.3),
+                (0.55, 0.03), (0, 0.03)]), n=30, of=material)
         case 15:  # a bag in a frame on crossed legs
             with m.of(m.pick(m.timber, m.metal)):
                 for z, s in product((-0.5, 0.5), (-1.0, 1.0)):
-                    m.add(
-                        tube(
-                            [(-s * 0.85 * r, 0.008, z * r), (s * 0.85 * r, tall * 1.3, z * r)],
-                            0.008,
-                            n=7,
-                        )
-                    )
+                    m.tube([(-s * 0.85 * r, 0.008, z * r), (s * 0.85 * r, tall * 1.3, z * r)],
+                        0.008, n=7)
                 for x in (-0.85, 0.85):
-                    m.add(
-                        tube(
-                            [(x * r, tall * 1.3, -0.6 * r), (x * r, tall * 1.3, 0.6 * r)],
-                            0.009,
-                            n=7,
-                        )
-                    )
-            m.add(loft(rings(rect, [(1.0 * r, 0.8 * r, 0.03, 0.18 * tall), (1.62 * r, 0.92 * r, 0.04, tall * 1.28)],
-                n=3)), of=plain("bag", m.any_colour(), 0.95))  # fmt: skip
+                    m.rod(x * r, tall * 1.3, (-0.6 * r, 0.6 * r), 0.009, n=7)
+            m.loft(rings(rect, [(1.0 * r, 0.8 * r, 0.03, 0.18 * tall),
+                (1.62 * r, 0.92 * r, 0.04, tall * 1.28)], n=3), of=plain("bag", m.any_colour(),
+                0.95))
         case 16:  # a drum of folded sheet: facets
             n = m.pick(6, 8, 12)
-            m.add(loft(rings(oval, [(1.6 * r, 1.6 * r, 0), (2 * r, 2 * r, tall), (2 * r - 0.008, 2 * r - 0.008, tall),
-                (1.6 * r - 0.008, 1.6 * r - 0.008, 0.006)], n=n), sharp=20.0), of=material)  # fmt: skip
+            m.loft(rings(oval, [(1.6 * r, 1.6 * r, 0), (2 * r, 2 * r, tall),
+                (2 * r - 0.008, 2 * r - 0.008, tall), (1.6 * r - 0.008, 1.6 * r - 0.008, 0.006)],
+                n=n), sharp=20.0, of=material)
 
 
 def _drawn_size(m: Maker) -> Size:
@@ -174,9 +145,6 @@ def _drawn_size(m: Maker) -> Size:
 def standing_bin(m: Maker, size: Size) -> None:
     """A bin of the catalogue, in one of the forms that are as deep by their width."""
     w, d, h = size
-    fitting = [
-        (form, w / extent[0] / 2, h / extent[2])
-        for form, extent in _EXTENT.items()
-        if abs(extent[1] / extent[0] - d / w) < 0.02
-    ]
+    fitting = [(form, w / extent[0] / 2, h / extent[2]) for form,
+        extent in _EXTENT.items() if abs(extent[1] / extent[0] - d / w) < 0.02]
     bin_of(m, *m.pick(*fitting))

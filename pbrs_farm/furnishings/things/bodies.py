@@ -118,10 +118,13 @@ def rounded(low: Sequence[float], high: Sequence[float], r: float, *, n: int = 2
             both = np.concatenate([grid[:, [0, 1, 2]], grid[:, [0, 2, 3]]])
             faces.append(both if side > 0 else both[:, ::-1])
     return Surface(
-        "rounded", np.concatenate(points).astype(np.float32),
-        np.concatenate(faces).astype(np.int32), 0, None,
+        "rounded",
+        np.concatenate(points).astype(np.float32),
+        np.concatenate(faces).astype(np.int32),
+        0,
+        None,
         np.concatenate(normals).astype(np.float32),
-    )  # fmt: skip
+    )
 
 
 def revolve(profile: Profile | F64, *, n: int = 16) -> Surface:
@@ -220,9 +223,17 @@ def loft(rings: Sequence[tuple[Outline, float]], *, sharp: float = 50.0) -> Surf
 
 
 def board(
-    w: float, d: float, low: float, high: float, corner: float = 0.0, edge: float = 0.003, *,
-    x: float = 0.0, z: float = 0.0, n: int = 4,
-) -> Surface:  # fmt: skip
+    w: float,
+    d: float,
+    low: float,
+    high: float,
+    corner: float = 0.0,
+    edge: float = 0.003,
+    *,
+    x: float = 0.0,
+    z: float = 0.0,
+    n: int = 4,
+) -> Surface:
     """A board with round corners in plan and edges cut by `edge`: tops of tables, seats, lids."""
     e = min(edge, 0.45 * (high - low))
     small = rect(w - 2 * e, d - 2 * e, max(corner - e, 0.0005), x=x, z=z, n=n)
@@ -231,9 +242,17 @@ def board(
 
 
 def disc(
-    w: float, d: float, low: float, high: float, edge: float = 0.003, *, x: float = 0.0,
-    z: float = 0.0, n: int = 32, power: float = 2.0,
-) -> Surface:  # fmt: skip
+    w: float,
+    d: float,
+    low: float,
+    high: float,
+    edge: float = 0.003,
+    *,
+    x: float = 0.0,
+    z: float = 0.0,
+    n: int = 32,
+    power: float = 2.0,
+) -> Surface:
     """A round or oval board with its edges cut by `edge`."""
     e = min(edge, 0.45 * (high - low))
     small = oval(w - 2 * e, d - 2 * e, x=x, z=z, n=n, power=power)
@@ -373,6 +392,10 @@ def creased(name: str, points: F64, faces: I32, sharp_rad: float) -> Surface:
         key = (key << 15) + (column + (1 << 14))
     _, first, number = np.unique(key, return_index=True, return_inverse=True)
     return Surface(
-        name, points[vertex[first]].astype(np.float32),
-        number.reshape(-1, 3).astype(np.int32), 0, None, normals[first].astype(np.float32),
-    )  # fmt: skip
+        name,
+        points[vertex[first]].astype(np.float32),
+        number.reshape(-1, 3).astype(np.int32),
+        0,
+        None,
+        normals[first].astype(np.float32),
+    )

@@ -13,6 +13,8 @@ from pbrs_farm.core.house import Material, Texture
 from pbrs_farm.dress.style import COLOURS, Rgb, Style, shade
 from pbrs_farm.furnishings.things.materials import any_colour
 
+# fmt: off
+
 _EDGE_PX = 1024
 _COLUMNS, _ROWS = 30, 3
 _SPINE_W, _SPINE_H, _PAGES_H = 34, 180, 20
@@ -22,12 +24,10 @@ N_COVERS = 14  # cells that have a front cover; the first ones
 N_CELLS = _COLUMNS * _ROWS
 
 Box4 = tuple[float, float, float, float]  # u0, v0, u1, v1; v up
-_SYLLABLES = (
-    "an", "ar", "be", "bor", "ca", "da", "del", "den", "el", "en", "er", "es", "fa", "fin", "ga",
-    "gar", "hel", "in", "is", "jo", "ka", "la", "len", "lo", "ma", "mar", "mi", "mor", "na", "nor",
-    "o", "or", "pa", "per", "ra", "ren", "ri", "ro", "sa", "sen", "so", "ta", "ter", "ti", "tor",
-    "u", "va", "ven", "vi", "wal", "win", "ya",
-)  # fmt: skip
+_SYLLABLES = ("an", "ar", "be", "bor", "ca", "da", "del", "den", "el", "en", "er", "es", "fa",
+    "fin", "ga", "gar", "hel", "in", "is", "jo", "ka", "la", "len", "lo", "ma", "mar", "mi", "mor",
+    "na", "nor", "o", "or", "pa", "per", "ra", "ren", "ri", "ro", "sa", "sen", "so", "ta", "ter",
+    "ti", "tor", "u", "va", "ven", "vi", "wal", "win", "ya")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -127,10 +127,8 @@ def _title(rng: np.random.Generator) -> str:
     return " ".join(words)
 
 
-def _draw_spine(
-    image: Image.Image, draw: ImageDraw.ImageDraw, cell: int, colour: Rgb,
-    ink: tuple[int, int, int], title: str, rng: np.random.Generator,
-) -> None:  # fmt: skip
+def _draw_spine(image: Image.Image, draw: ImageDraw.ImageDraw, cell: int, colour: Rgb,
+    ink: tuple[int, int, int], title: str, rng: np.random.Generator) -> None:
     x, y = _corner(cell)
     draw.rectangle((x, y, x + _SPINE_W - 1, y + _SPINE_H - 1), _bytes(colour))
     # Bands, a label or a publisher's mark.
@@ -158,10 +156,8 @@ def _draw_spine(
         )
 
 
-def _draw_front(
-    image: Image.Image, cell: int, colour: Rgb, ink: tuple[int, int, int], title: str,
-    rng: np.random.Generator,
-) -> None:  # fmt: skip
+def _draw_front(image: Image.Image, cell: int, colour: Rgb, ink: tuple[int, int, int], title: str,
+    rng: np.random.Generator) -> None:
     x, y = (cell % 7) * (_COVER_W + 2), _COVERS_TOP + (cell // 7) * _COVER_H
     front = Image.new("RGB", (_COVER_W + 2, _COVER_H), _bytes(colour))
     draw = ImageDraw.Draw(front)

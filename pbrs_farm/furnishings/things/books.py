@@ -15,6 +15,8 @@ from pbrs_farm.furnishings.things.assembly import Model, Part, standing_piece, t
 from pbrs_farm.furnishings.things.book_covers import N_CELLS, N_COVERS, Box4, Covers
 from pbrs_farm.geometry.solids import box
 
+# fmt: off
+
 _BOARD_M = 0.0025
 _GAP_M = 0.0004  # between neighbours, so that no faces coincide
 
@@ -53,10 +55,8 @@ def run_of_books(
         surface = _upright(covers, int(rng.integers(N_CELLS)), min(0.015, length), most * 0.9, 0.12)
         parts.append((surface, covers.material))
         last = most * 0.9
-    return (
-        standing_piece("books", parts, group="book", nyu40=BOOKS, textures=(covers.texture,)),
-        last,
-    )
+    return (standing_piece("books", parts, group="book", nyu40=BOOKS, textures=(covers.texture,)),
+        last)
 
 
 def leaning_book(rng: np.random.Generator, covers: Covers, height: float, depth: float) -> Model:
@@ -70,15 +70,13 @@ def leaning_book(rng: np.random.Generator, covers: Covers, height: float, depth:
     lean = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1.0]])
     part = transformed(transformed(surface, np.eye(3), (thick / 2, 0, 0)), lean)
     return standing_piece("leaning_book", [(part, covers.material)], group="book", nyu40=BOOKS,
-                textures=(covers.texture,))  # fmt: skip
+        textures=(covers.texture,))
 
 
 def stack_of_books(rng: np.random.Generator, covers: Covers, n: int, most: float = 1.0) -> Model:
     """n lying books, the larger below, each a little turned; at most `most` wide."""
-    tall = sorted(
-        (float(min(np.clip(rng.normal(0.23, 0.035), 0.15, 0.31), most)) for _ in range(n)),
-        reverse=True,
-    )
+    tall = sorted((float(min(np.clip(rng.normal(0.23, 0.035), 0.15, 0.31),
+        most)) for _ in range(n)), reverse=True)
     parts: list[Part] = []
     y = 0.0
     for k, length in enumerate(tall):
@@ -92,7 +90,7 @@ def stack_of_books(rng: np.random.Generator, covers: Covers, n: int, most: float
             parts.append((transformed(lying, turn, (0, y, 0)), covers.material))
         y += thick + _GAP_M
     return standing_piece("stack_of_books" if n > 1 else "book", parts, group="book", nyu40=BOOKS,
-                textures=(covers.texture,))  # fmt: skip
+        textures=(covers.texture,))
 
 
 def magazines(rng: np.random.Generator, covers: Covers, n: int) -> Model:
@@ -118,10 +116,10 @@ def open_book(rng: np.random.Generator, covers: Covers) -> Model:
     parts: list[Part] = []
     for side in (-1.0, 1.0):
         board = box("board", np.array([side * wide / 2, 0.00125, 0]),
-                    np.array([wide / 2, 0.00125, tall / 2]), 0)  # fmt: skip
+            np.array([wide / 2, 0.00125, tall / 2]), 0)
         parts.append((_mapped(board, {}, covers.board(cell)), covers.material))
         pages = box("pages", np.array([side * (wide / 2 - 0.002), 0.0085, 0]),
-                    np.array([wide / 2 - 0.004, 0.006, tall / 2 - 0.004]), 0)  # fmt: skip
+            np.array([wide / 2 - 0.004, 0.006, tall / 2 - 0.004]), 0)
         parts.append((_mapped(pages, {}, covers.paper(cell)), covers.material))
     return standing_piece("open_book", parts, group="book", nyu40=BOOKS, textures=(covers.texture,))
 
@@ -143,24 +141,17 @@ def _bound(covers: Covers, cell: int, thick: float, tall: float, deep: float) ->
         return box("book", (low + high) / 2, (high - low) / 2, 0)
 
     t, h, d = thick / 2, tall, deep / 2
-    return [
-        _mapped(part((t - b, t), (0, h), (-d, d)), {1: covers.front(cell)}, plain),
+    return [_mapped(part((t - b, t), (0, h), (-d, d)), {1: covers.front(cell)}, plain),
         _mapped(part((-t, -t + b), (0, h), (-d, d)), {}, plain),
         _mapped(part((-t + b, t - b), (0, h), (d - b, d)), {5: covers.spine(cell)}, plain),
         _mapped(part((-t + b, t - b), (0.003, h - 0.003), (-d + 0.004, d - b)), {},
-                covers.paper(cell)),
-    ]  # fmt: skip
+        covers.paper(cell))]
 
 
 # Texture corners of a box's quads left, right, bottom, top, back, front: see primitives.box_quads.
-_UPRIGHT = {
-    0: ((0, 0), (1, 0), (1, 1), (0, 1)),
-    1: ((1, 0), (1, 1), (0, 1), (0, 0)),
-    2: ((0, 0), (1, 0), (1, 1), (0, 1)),
-    3: ((0, 1), (0, 0), (1, 0), (1, 1)),
-    4: ((1, 0), (1, 1), (0, 1), (0, 0)),
-    5: ((0, 0), (1, 0), (1, 1), (0, 1)),
-}
+_UPRIGHT = {0: ((0, 0), (1, 0), (1, 1), (0, 1)), 1: ((1, 0), (1, 1), (0, 1), (0, 0)),
+    2: ((0, 0), (1, 0), (1, 1), (0, 1)), 3: ((0, 1), (0, 0), (1, 0), (1, 1)),
+    4: ((1, 0), (1, 1), (0, 1), (0, 0)), 5: ((0, 0), (1, 0), (1, 1), (0, 1))}
 
 
 def _mapped(surface: Surface, sides: Mapping[int, Box4], rest: Box4) -> Surface:

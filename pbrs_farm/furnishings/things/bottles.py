@@ -10,48 +10,49 @@ import numpy as np
 from pbrs_farm.core.frames import LYING_ALONG_Z, rotation_x, rotation_y, rotation_z
 from pbrs_farm.core.house import Material
 from pbrs_farm.dress.style import shade
-from pbrs_farm.furnishings.things.bodies import (
-    bevelled,
-    cylinder,
-    frustum,
-    hoop,
-    loft,
-    revolve,
-    slab,
-    sphere,
-    stretched,
-    tube,
-    vessel,
-)
+from pbrs_farm.furnishings.things.bodies import sphere, stretched
 from pbrs_farm.furnishings.things.maker import Maker, thing
 from pbrs_farm.furnishings.things.materials import glass, plain
 from pbrs_farm.furnishings.things.outlines import bent, fluted, oval, rect, rings, scaled
+
+# fmt: off
 
 _Shape = tuple[tuple[float, float], ...]
 
 # Of each body: half its width and its height in metres, its outside up to the mouth in shares of these,
 # and between which heights its side is straight enough for a label.
-_BODIES: Final[dict[str, tuple[float, float, _Shape, tuple[float, float]]]] = {
-    "claret": (0.037, 0.3, ((0.95, 0.0), (1.0, 0.015), (1.0, 0.6), (0.92, 0.66), (0.42, 0.74), (0.36, 0.98)), (0.12, 0.55)),
-    "burgundy": (0.041, 0.29, ((0.95, 0.0), (1.0, 0.02), (1.0, 0.4), (0.88, 0.52), (0.6, 0.66), (0.36, 0.78), (0.34, 0.97)), (0.08, 0.38)),
-    "hock": (0.037, 0.34, ((0.95, 0.0), (1.0, 0.02), (1.0, 0.35), (0.72, 0.58), (0.44, 0.76), (0.36, 0.97)), (0.08, 0.33)),
-    "champagne": (0.044, 0.31, ((0.9, 0.0), (1.0, 0.03), (1.0, 0.42), (0.8, 0.58), (0.45, 0.74), (0.33, 0.86), (0.36, 0.87), (0.34, 0.97)), (0.1, 0.38)),
-    "long neck": (0.031, 0.23, ((0.96, 0.0), (1.0, 0.02), (1.0, 0.5), (0.85, 0.6), (0.48, 0.74), (0.42, 0.94)), (0.14, 0.46)),
-    "steinie": (0.033, 0.18, ((0.95, 0.0), (1.0, 0.02), (1.0, 0.55), (0.88, 0.66), (0.5, 0.78), (0.42, 0.95)), (0.12, 0.5)),
-    "cola": (0.03, 0.2, ((0.92, 0.0), (1.0, 0.08), (0.86, 0.2), (0.98, 0.38), (1.0, 0.48), (0.78, 0.64), (0.44, 0.8), (0.4, 0.95)), (0.34, 0.5)),
-    "milk": (0.04, 0.22, ((0.95, 0.0), (1.0, 0.02), (1.0, 0.58), (0.9, 0.66), (0.62, 0.8), (0.6, 0.93), (0.68, 0.94), (0.68, 1.0)), (0.15, 0.5)),
-    "oil": (0.028, 0.28, ((0.96, 0.0), (1.0, 0.015), (1.0, 0.7), (0.94, 0.74), (0.46, 0.8), (0.42, 0.97)), (0.2, 0.6)),
-    "decanter": (0.062, 0.23, ((0.75, 0.0), (1.0, 0.08), (1.0, 0.2), (0.6, 0.42), (0.28, 0.56), (0.22, 0.8), (0.3, 0.96)), (0.06, 0.2)),
-    "onion": (0.05, 0.2, ((0.6, 0.0), (0.95, 0.15), (1.0, 0.28), (0.85, 0.45), (0.4, 0.6), (0.26, 0.72), (0.25, 0.95)), (0.2, 0.34)),
-    "whisky": (0.043, 0.24, ((0.97, 0.0), (1.0, 0.02), (1.0, 0.62), (0.96, 0.68), (0.5, 0.74), (0.36, 0.76), (0.35, 0.95)), (0.1, 0.56)),
-    "gin": (0.042, 0.2, ((0.95, 0.0), (1.0, 0.03), (1.0, 0.7), (0.9, 0.76), (0.34, 0.8), (0.34, 0.95)), (0.12, 0.64)),
-    "bell": (0.052, 0.22, ((1.0, 0.0), (1.0, 0.06), (0.86, 0.35), (0.5, 0.6), (0.28, 0.72), (0.26, 0.95)), (0.06, 0.2)),
-    "liqueur": (0.036, 0.25, ((0.8, 0.0), (0.84, 0.03), (1.0, 0.5), (0.9, 0.6), (0.4, 0.68), (0.34, 0.95)), (0.2, 0.45)),
-    "soda": (0.035, 0.27, ((0.92, 0.0), (1.0, 0.03), (1.0, 0.22), (0.94, 0.24), (0.94, 0.3), (1.0, 0.32), (1.0, 0.55), (0.5, 0.82), (0.38, 0.84), (0.38, 0.94)), (0.34, 0.54)),
-    "flask": (0.04, 0.2, ((0.95, 0.0), (1.0, 0.05), (1.0, 0.5), (0.85, 0.68), (0.45, 0.8), (0.45, 0.97)), (0.1, 0.48)),
-    "carboy": (0.055, 0.25, ((0.92, 0.0), (1.0, 0.04), (1.0, 0.45), (0.9, 0.6), (0.55, 0.72), (0.3, 0.78), (0.3, 0.96)), (0.12, 0.44)),
-}  # fmt: skip
-_LIQUIDS: Final = ((0.35, 0.05, 0.08), (0.75, 0.6, 0.15), (0.4, 0.2, 0.05), (0.8, 0.82, 0.8), (0.5, 0.45, 0.12), (0.75, 0.3, 0.2))  # fmt: skip
+_BODIES: Final[dict[str, tuple[float, float, _Shape, tuple[float, float]]]] = {"claret": (0.037,
+    0.3, ((0.95, 0.0), (1.0, 0.015), (1.0, 0.6), (0.92, 0.66), (0.42, 0.74), (0.36, 0.98)),
+    (0.12, 0.55)), "burgundy": (0.041, 0.29, ((0.95, 0.0), (1.0, 0.02), (1.0, 0.4), (0.88, 0.52),
+    (0.6, 0.66), (0.36, 0.78), (0.34, 0.97)), (0.08, 0.38)),
+    "hock": (0.037, 0.34, ((0.95, 0.0), (1.0, 0.02), (1.0, 0.35), (0.72, 0.58), (0.44, 0.76),
+    (0.36, 0.97)), (0.08, 0.33)), "champagne": (0.044, 0.31,
+    ((0.9, 0.0), (1.0, 0.03), (1.0, 0.42), (0.8, 0.58), (0.45, 0.74), (0.33, 0.86), (0.36, 0.87),
+    (0.34, 0.97)), (0.1, 0.38)), "long neck": (0.031, 0.23,
+    ((0.96, 0.0), (1.0, 0.02), (1.0, 0.5), (0.85, 0.6), (0.48, 0.74), (0.42, 0.94)), (0.14, 0.46)),
+    "steinie": (0.033, 0.18, ((0.95, 0.0), (1.0, 0.02), (1.0, 0.55), (0.88, 0.66), (0.5, 0.78),
+    (0.42, 0.95)), (0.12, 0.5)), "cola": (0.03, 0.2, ((0.92, 0.0), (1.0, 0.08), (0.86, 0.2),
+    (0.98, 0.38), (1.0, 0.48), (0.78, 0.64), (0.44, 0.8), (0.4, 0.95)), (0.34, 0.5)),
+    "milk": (0.04, 0.22, ((0.95, 0.0), (1.0, 0.02), (1.0, 0.58), (0.9, 0.66), (0.62, 0.8),
+    (0.6, 0.93), (0.68, 0.94), (0.68, 1.0)), (0.15, 0.5)),
+    "oil": (0.028, 0.28, ((0.96, 0.0), (1.0, 0.015), (1.0, 0.7), (0.94, 0.74), (0.46, 0.8),
+    (0.42, 0.97)), (0.2, 0.6)), "decanter": (0.062, 0.23, ((0.75, 0.0), (1.0, 0.08), (1.0, 0.2),
+    (0.6, 0.42), (0.28, 0.56), (0.22, 0.8), (0.3, 0.96)), (0.06, 0.2)),
+    "onion": (0.05, 0.2, ((0.6, 0.0), (0.95, 0.15), (1.0, 0.28), (0.85, 0.45), (0.4, 0.6),
+    (0.26, 0.72), (0.25, 0.95)), (0.2, 0.34)), "whisky": (0.043, 0.24,
+    ((0.97, 0.0), (1.0, 0.02), (1.0, 0.62), (0.96, 0.68), (0.5, 0.74), (0.36, 0.76), (0.35, 0.95)),
+    (0.1, 0.56)), "gin": (0.042, 0.2, ((0.95, 0.0), (1.0, 0.03), (1.0, 0.7), (0.9, 0.76),
+    (0.34, 0.8), (0.34, 0.95)), (0.12, 0.64)), "bell": (0.052, 0.22,
+    ((1.0, 0.0), (1.0, 0.06), (0.86, 0.35), (0.5, 0.6), (0.28, 0.72), (0.26, 0.95)), (0.06, 0.2)),
+    "liqueur": (0.036, 0.25, ((0.8, 0.0), (0.84, 0.03), (1.0, 0.5), (0.9, 0.6), (0.4, 0.68),
+    (0.34, 0.95)), (0.2, 0.45)), "soda": (0.035, 0.27, ((0.92, 0.0), (1.0, 0.03), (1.0, 0.22),
+    (0.94, 0.24), (0.94, 0.3), (1.0, 0.32), (1.0, 0.55), (0.5, 0.82), (0.38, 0.84), (0.38, 0.94)),
+    (0.34, 0.54)), "flask": (0.04, 0.2, ((0.95, 0.0), (1.0, 0.05), (1.0, 0.5), (0.85, 0.68),
+    (0.45, 0.8), (0.45, 0.97)), (0.1, 0.48)), "carboy": (0.055, 0.25,
+    ((0.92, 0.0), (1.0, 0.04), (1.0, 0.45), (0.9, 0.6), (0.55, 0.72), (0.3, 0.78), (0.3, 0.96)),
+    (0.12, 0.44))}
+_LIQUIDS: Final = ((0.35, 0.05, 0.08), (0.75, 0.6, 0.15), (0.4, 0.2, 0.05), (0.8, 0.82, 0.8),
+    (0.5, 0.45, 0.12), (0.75, 0.3, 0.2))
 
 
 @thing(group="bottle")
@@ -67,57 +68,54 @@ def bottle(m: Maker) -> None:
     r, tall = m.uniform(0.03, 0.041), m.uniform(0.22, 0.32)
     match m.integers(0, 7):
         case 0:  # water: waves in its side
-            m.add(revolve([(0, 0), (r * 0.9, 0), (r, 0.01), (r, 0.05), (r * 0.93, 0.06), (r, 0.07),
+            m.revolve([(0, 0), (r * 0.9, 0), (r, 0.01), (r, 0.05), (r * 0.93, 0.06), (r, 0.07),
                 (r * 0.93, 0.08), (r, 0.09), (r, tall * 0.65), (r * 0.4, tall * 0.88),
-                (0.013, tall * 0.9), (0.013, tall * 0.94), (0, tall * 0.94)], n=18),
-                of=glass((0.85, 0.93, 0.97), 0.25))  # fmt: skip
+                (0.013, tall * 0.9), (0.013, tall * 0.94), (0, tall * 0.94)], n=18,
+                of=glass((0.85, 0.93, 0.97), 0.25))
             sleeve(m, r, 0.1, tall * 0.58, plain("label", m.any_colour(), 0.5))
-            m.add(cylinder(0.015, tall * 0.9402, tall, n=14), of=plain("cap", m.any_colour(), 0.4))
+            m.cylinder(0.015, tall * 0.9402, tall, n=14, of=plain("cap", m.any_colour(), 0.4))
         case 1:  # square, with a stopper
-            m.add(loft(rings(rect, [(0.075, 0.075, 0.01, 0), (0.078, 0.078, 0.012, 0.13),
+            m.loft(rings(rect, [(0.075, 0.075, 0.01, 0), (0.078, 0.078, 0.012, 0.13),
                 (0.05, 0.05, 0.014, 0.15), (0.03, 0.03, 0.0145, 0.16), (0.03, 0.03, 0.0145, 0.19)],
-                n=3)), of=glass((0.9, 0.85, 0.75), 0.35))  # fmt: skip
-            m.add(revolve([(0, 0.1902), (0.02, 0.1902), (0.024, 0.2), (0.018, 0.225), (0, 0.23)],
-                n=14), of=glass())  # fmt: skip
-            m.add(loft(rings(rect, [(0.068, 0.068, 0.008, 0.004), (0.07, 0.07, 0.01, 0.08)], n=3)),
-                of=plain("spirit", (0.5, 0.25, 0.07), 0.1))  # fmt: skip
+                n=3), of=glass((0.9, 0.85, 0.75), 0.35))
+            m.revolve([(0, 0.1902), (0.02, 0.1902), (0.024, 0.2), (0.018, 0.225), (0, 0.23)], n=14,
+                of=glass())
+            m.loft(rings(rect, [(0.068, 0.068, 0.008, 0.004), (0.07, 0.07, 0.01, 0.08)], n=3),
+                of=plain("spirit", (0.5, 0.25, 0.07), 0.1))
         case 2:  # juice or milk in a carton with a gable
-            m.add(loft(rings(rect, [(0.07, 0.07, 0.002, 0), (0.07, 0.07, 0.002, 0.195),
-                (0.07, 0.006, 0.002, 0.23), (0.07, 0.003, 0.0012, 0.25)], n=1), sharp=20.0),
-                of=plain("carton", m.any_colour(), 0.5))  # fmt: skip
-            m.add(slab((-0.034, 0.05, 0.035), (0.034, 0.15, 0.0356)),
-                of=plain("print", (0.93, 0.92, 0.88), 0.5))  # fmt: skip
-            m.add(cylinder(0.012, 0, 0.012, n=12), turn=rotation_x(0.7), at=(0, 0.21, 0.019),
-                of=plain("cap", m.any_colour(), 0.4))  # fmt: skip
+            m.loft(rings(rect, [(0.07, 0.07, 0.002, 0), (0.07, 0.07, 0.002, 0.195),
+                (0.07, 0.006, 0.002, 0.23), (0.07, 0.003, 0.0012, 0.25)], n=1), sharp=20.0,
+                of=plain("carton", m.any_colour(), 0.5))
+            m.box(0.068, (0.05, 0.15), (0.035, 0.0356), of=plain("print", (0.93, 0.92, 0.88), 0.5))
+            m.cylinder(0.012, 0, 0.012, n=12, turn=rotation_x(0.7), at=(0, 0.21, 0.019),
+                of=plain("cap", m.any_colour(), 0.4))
         case 3:  # a thermos
-            m.add(revolve([(0, 0), (0.04, 0), (0.042, 0.006), (0.042, 0.2), (0.034, 0.225),
-                (0, 0.225)], n=22), of=m.pick(m.metal, plain("flask", m.any_colour(), 0.35)))  # fmt: skip
-            m.add(revolve([(0, 0.2252), (0.034, 0.2252), (0.032, 0.27), (0, 0.272)], n=20),
-                of=plain("cup", (0.12, 0.12, 0.12), 0.5))  # fmt: skip
-            m.add(tube(bent([(0.04, 0.19, 0), (0.075, 0.185, 0), (0.075, 0.06, 0),
-                (0.04, 0.055, 0)], 0.02, n=3), 0.006, n=6),
-                of=plain("grip", (0.12, 0.12, 0.12), 0.5))  # fmt: skip
+            m.revolve([(0, 0), (0.04, 0), (0.042, 0.006), (0.042, 0.2), (0.034, 0.225), (0, 0.225)],
+                n=22, of=m.pick(m.metal, plain("flask", m.any_colour(), 0.35)))
+            m.revolve([(0, 0.2252), (0.034, 0.2252), (0.032, 0.27), (0, 0.272)], n=20,
+                of=plain("cup", (0.12, 0.12, 0.12), 0.5))
+            m.tube(bent([(0.04, 0.19, 0), (0.075, 0.185, 0), (0.075, 0.06, 0), (0.04, 0.055, 0)],
+                0.02, n=3), 0.006, n=6, of=plain("grip", (0.12, 0.12, 0.12), 0.5))
         case 4:  # sauce: squat with a narrow cap
-            m.add(loft(rings(oval, [(0.062, 0.045, 0), (0.068, 0.05, 0.01), (0.064, 0.046, 0.1),
-                (0.036, 0.032, 0.145), (0.034, 0.03, 0.15)], n=20)), of=plain("bottle",
-                m.pick((0.65, 0.09, 0.06), (0.85, 0.65, 0.12), (0.93, 0.92, 0.86),
-                (0.25, 0.14, 0.06)), 0.3))  # fmt: skip
-            m.add(revolve([(0, 0.1502), (0.0175, 0.1502), (0.016, 0.17), (0.006, 0.175),
-                (0.003, 0.2), (0, 0.2)], n=14), of=plain("cap", (0.93, 0.93, 0.92), 0.4))  # fmt: skip
+            m.loft(rings(oval, [(0.062, 0.045, 0), (0.068, 0.05, 0.01), (0.064, 0.046, 0.1),
+                (0.036, 0.032, 0.145), (0.034, 0.03, 0.15)], n=20),
+                of=plain("bottle", m.pick((0.65, 0.09, 0.06), (0.85, 0.65, 0.12),
+                (0.93, 0.92, 0.86), (0.25, 0.14, 0.06)), 0.3))
+            m.revolve([(0, 0.1502), (0.0175, 0.1502), (0.016, 0.17), (0.006, 0.175), (0.003, 0.2),
+                (0, 0.2)], n=14, of=plain("cap", (0.93, 0.93, 0.92), 0.4))
         case 5:  # two that stand together
             for x in (-0.045, 0.045):
                 with m.moved(at=(x, 0, 0)):
-                    m.add(revolve([(0, 0), (0.032, 0), (0.033, 0.15), (0.026, 0.18), (0.012, 0.2),
-                        (0.012, 0.25), (0, 0.25)], n=14), of=plain("bottle",
-                        m.pick((0.1, 0.2, 0.08), (0.5, 0.4, 0.1), (0.25, 0.1, 0.06)), 0.1))  # fmt: skip
-                    m.add(cylinder(0.014, 0.2502, 0.27, n=12), of=cap)
+                    m.revolve([(0, 0), (0.032, 0), (0.033, 0.15), (0.026, 0.18), (0.012, 0.2),
+                        (0.012, 0.25), (0, 0.25)], n=14, of=plain("bottle",
+                        m.pick((0.1, 0.2, 0.08), (0.5, 0.4, 0.1), (0.25, 0.1, 0.06)), 0.1))
+                    m.cylinder(0.014, 0.2502, 0.27, n=12, of=cap)
         case 6:  # a round flask in a bast cover
-            m.add(revolve([(0, 0.004), (0.03, 0.004), (0.062, 0.05), (0.055, 0.1), (0.02, 0.15),
-                (0.012, 0.18), (0.013, 0.25), (0, 0.25)], n=20),
-                of=plain("bottle", (0.1, 0.2, 0.08), 0.08))  # fmt: skip
-            m.add(revolve([(0, 0), (0.034, 0), (0.066, 0.05), (0.058, 0.1), (0.053, 0.1),
-                (0.061, 0.05), (0.03, 0.003), (0, 0.003)], n=20),
-                of=plain("bast", (0.7, 0.58, 0.38), 0.9))  # fmt: skip
+            m.revolve([(0, 0.004), (0.03, 0.004), (0.062, 0.05), (0.055, 0.1), (0.02, 0.15),
+                (0.012, 0.18), (0.013, 0.25), (0, 0.25)], n=20, of=plain("bottle", (0.1, 0.2, 0.08),
+                0.08))
+            m.revolve([(0, 0), (0.034, 0), (0.066, 0.05), (0.058, 0.1), (0.053, 0.1), (0.061, 0.05),
+                (0.03, 0.003), (0, 0.003)], n=20, of=plain("bast", (0.7, 0.58, 0.38), 0.9))
 
 
 def _composed(m: Maker) -> None:
@@ -132,19 +130,20 @@ def _composed(m: Maker) -> None:
     n = m.pick(18, 18, 20)
     is_clear = m.chance(0.35)
     side = glass(tint, 0.3) if is_clear else plain("bottle", tint, 0.08)
-    facets = m.pick(4, 6, 8) if name in ("oil", "gin", "whisky", "decanter", "flask") and m.chance(0.45) else 0  # fmt: skip
+    facets = (m.pick(4, 6, 8) if name in ("oil", "gin", "whisky", "decanter",
+        "flask") and m.chance(0.45) else 0)
     if facets:
-        m.add(loft([(oval(2 * x, 2 * x, n=facets), y) for x, y in profile], sharp=25.0), of=side)
+        m.loft([(oval(2 * x, 2 * x, n=facets), y) for x, y in profile], sharp=25.0, of=side)
     else:
-        m.add(revolve([(0.0, 0.0), *profile, (0.0, profile[-1][1])], n=n), of=side)
+        m.revolve([(0.0, 0.0), *profile, (0.0, profile[-1][1])], n=n, of=side)
     if is_clear:
         # What is in it ends below the shoulder, or lower.
         level = m.uniform(0.5, 1.0) * straight[1] * tall
         inner = 0.68 if facets else 0.93
         inside = [(inner * x, max(y, 0.004)) for x, y in profile if y < level]
         last = float(np.interp(level, [y for _, y in profile], [x for x, _ in profile]))
-        m.add(revolve([(0.0, 0.004), *inside[1:], (inner * last, level), (0.0, level)], n=14),
-            of=plain("liquid", m.pick(*_LIQUIDS), 0.1))  # fmt: skip
+        m.revolve([(0.0, 0.004), *inside[1:], (inner * last, level), (0.0, level)], n=14,
+            of=plain("liquid", m.pick(*_LIQUIDS), 0.1))
     _close(m, profile[-1][0], profile[-1][1], tall)
     if not facets:
         _label(m, profile, (straight[0] * tall, straight[1] * tall), n)
@@ -157,31 +156,38 @@ def _close(m: Maker, mouth: float, top: float, tall: float) -> None:
     cork = plain("cork", (0.7, 0.55, 0.38), 0.9)
     match m.integers(0, 10):
         case 0:  # a cork that stands out
-            m.add(frustum((0.8 * q, y), (0.86 * q, y + 0.012), n=12), of=cork)
+            m.frustum((0.8 * q, y), (0.86 * q, y + 0.012), n=12, of=cork)
         case 1:  # a stopper of wood on a cork
-            m.add(revolve([(0.0, y), (0.8 * q, y), (0.8 * q, y + 0.004), (1.25 * q, y + 0.005), (1.25 * q, y + 0.02),
-                (1.1 * q, y + 0.024), (0.0, y + 0.025)], n=16), of=m.pick(m.timber, m.dark_timber))  # fmt: skip
+            m.revolve([(0.0, y), (0.8 * q, y), (0.8 * q, y + 0.004), (1.25 * q, y + 0.005),
+                (1.25 * q, y + 0.02), (1.1 * q, y + 0.024), (0.0, y + 0.025)],
+                of=m.pick(m.timber, m.dark_timber))
         case 2:  # a screw cap, ribbed
-            m.add(loft(rings(fluted, [(2.4 * q, 12, 0.06, y - 0.014), (2.4 * q, 12, 0.06, y + 0.003)]), sharp=70.0), of=cap)  # fmt: skip
+            m.loft(rings(fluted, [(2.4 * q, 12, 0.06, y - 0.014), (2.4 * q, 12, 0.06, y + 0.003)]),
+                sharp=70.0, of=cap)
         case 3:  # a crown cap
-            m.add(revolve([(0.0, y - 0.004), (1.3 * q, y - 0.004), (1.08 * q, y + 0.002), (0.0, y + 0.003)], n=21), of=cap)  # fmt: skip
+            m.revolve([(0.0, y - 0.004), (1.3 * q, y - 0.004), (1.08 * q, y + 0.002),
+                (0.0, y + 0.003)], n=21, of=cap)
         case 4:  # a capsule of foil down the neck
             low = y - min(0.16 * tall, 0.045)
-            m.add(revolve([(0.0, low), (1.06 * q + 0.0012, low), (1.04 * q + 0.001, y + 0.001), (0.0, y + 0.001)], n=18), of=cap)  # fmt: skip
+            m.revolve([(0.0, low), (1.06 * q + 0.0012, low), (1.04 * q + 0.001, y + 0.001),
+                (0.0, y + 0.001)], n=18, of=cap)
         case 5:  # a pourer
-            m.add(frustum((1.1 * q, y), (0.9 * q, y + 0.008), n=14), of=cork)
-            m.add(tube(bent([(0.0, y + 0.006, 0.0), (0.0, y + 0.03, 0.0), (0.018, y + 0.055, 0.0)], 0.012, n=3), 0.004, n=7, end=0.0025), of=m.metal)  # fmt: skip
+            m.frustum((1.1 * q, y), (0.9 * q, y + 0.008), n=14, of=cork)
+            m.tube(bent([(0.0, y + 0.006, 0.0), (0.0, y + 0.03, 0.0), (0.018, y + 0.055, 0.0)],
+                0.012, n=3), 0.004, n=7, end=0.0025, of=m.metal)
         case 6:  # a swing top
-            m.add(frustum((1.15 * q, y), (0.9 * q, y + 0.014), n=14), of=plain("stopper", (0.9, 0.89, 0.86), 0.3))  # fmt: skip
+            m.frustum((1.15 * q, y), (0.9 * q, y + 0.014), n=14,
+                of=plain("stopper", (0.9, 0.89, 0.86), 0.3))
             for x in (-1.0, 1.0):
-                m.add(tube([(x * (q + 0.002), y - 0.03, 0), (x * (q + 0.005), y + 0.008, 0)], 0.0012, n=5), of=m.metal)  # fmt: skip
+                m.tube([(x * (q + 0.002), y - 0.03, 0), (x * (q + 0.005), y + 0.008, 0)], 0.0012,
+                    n=5, of=m.metal)
         case 7:  # a ball of glass
-            m.add(revolve([(0.0, y), (0.8 * q, y), (0.7 * q, y + 0.004), (1.5 * q, y + 0.4 * q), (1.9 * q, y + 1.9 * q),
-                (1.3 * q, y + 3.2 * q), (0.0, y + 3.6 * q)], n=16), of=glass())  # fmt: skip
+            m.revolve([(0.0, y), (0.8 * q, y), (0.7 * q, y + 0.004), (1.5 * q, y + 0.4 * q),
+                (1.9 * q, y + 1.9 * q), (1.3 * q, y + 3.2 * q), (0.0, y + 3.6 * q)], of=glass())
         case 8:  # a pump
-            m.add(frustum((1.25 * q, y - 0.008), (1.1 * q, y + 0.012), n=16), of=cap)
-            m.add(tube([(0.0, y + 0.01, 0.0), (0.0, y + 0.045, 0.0)], 0.004, n=7), of=cap)
-            m.add(bevelled((-0.01, y + 0.0452, -0.01), (0.036, y + 0.056, 0.01), 0.003), of=cap)
+            m.frustum((1.25 * q, y - 0.008), (1.1 * q, y + 0.012), of=cap)
+            m.rod(0.0, (y + 0.01, y + 0.045), 0.0, 0.004, n=7, of=cap)
+            m.box(0.046, 0.0108, 0.02, 0.003, x=0.013, on=y + 0.0452, of=cap)
         case _:  # open
             pass
 
@@ -203,7 +209,7 @@ def _label(
         side = [float(np.interp(y, ys, xs)) for y in stops]
         outer = [(x + 0.0005, y) for x, y in zip(side, stops, strict=True)]
         inner = [(x - 0.001, y) for x, y in zip(side, stops, strict=True)]
-        m.add(revolve([inner[0], *outer, *inner[::-1]], n=n), of=of)
+        m.revolve([inner[0], *outer, *inner[::-1]], n=n, of=of)
 
     match m.integers(0, 6):
         case 0 | 1:
@@ -225,8 +231,7 @@ def _label(
 def sleeve(m: Maker, r: float, low: float, high: float, paper: Material) -> None:
     """A label round a bottle of radius r, 0.4 mm proud of it."""
     inner, outer = r - 0.001, r + 0.0004
-    m.add(revolve([(inner, low), (outer, low), (outer, high), (inner, high), (inner, low)]),
-        of=paper)  # fmt: skip
+    m.revolve([(inner, low), (outer, low), (outer, high), (inner, high), (inner, low)], of=paper)
 
 
 @thing(group="kitchen_tool")
@@ -236,105 +241,101 @@ def jar(m: Maker) -> None:
     With a lid, a cork, a swing top, of tin, square, with a label, a set of three, a spice rack, a pot of honey.
     """
     form, r, tall = m.integers(0, 13), m.uniform(0.035, 0.055), m.uniform(0.09, 0.2)
-    grain = m.pick((0.35, 0.2, 0.1), (0.85, 0.75, 0.5), (0.9, 0.88, 0.82), (0.6, 0.3, 0.12),
-        (0.4, 0.45, 0.2))  # fmt: skip
+    grain = m.pick(
+        (0.35, 0.2, 0.1), (0.85, 0.75, 0.5), (0.9, 0.88, 0.82), (0.6, 0.3, 0.12), (0.4, 0.45, 0.2)
+    )
     side = m.china() if m.chance(0.5) else plain("filled jar", grain, 0.15)
     lid = plain("wood lid", m.wood, 0.5) if m.chance(0.5) else m.metal
     match form:
         case 0 | 1:  # with a lid
-            m.add(revolve([(0, 0), (r * 0.95, 0), (r, 0.006), (r, tall - 0.02),
-                (r * 0.9, tall - 0.012), (0, tall - 0.012)]), of=side)  # fmt: skip
-            m.add(revolve([(0, tall - 0.0118), (r * 0.93, tall - 0.0118), (r * 0.93, tall),
-                (0, tall + 0.001)]), of=lid)  # fmt: skip
+            m.revolve([(0, 0), (r * 0.95, 0), (r, 0.006), (r, tall - 0.02), (r * 0.9, tall - 0.012),
+                (0, tall - 0.012)], of=side)
+            m.revolve([(0, tall - 0.0118), (r * 0.93, tall - 0.0118), (r * 0.93, tall),
+                (0, tall + 0.001)], of=lid)
             if form == 1:
-                m.add(slab((-0.022, tall * 0.35, r - 0.004), (0.022, tall * 0.6, r + 0.0008)),
-                    of=plain("label", (0.92, 0.91, 0.87), 0.8))  # fmt: skip
+                m.box(0.044, (tall * 0.35, tall * 0.6), 0.0048, against=r - 0.004,
+                    of=plain("label", (0.92, 0.91, 0.87), 0.8))
         case 2 | 3:  # glass with what is in it, and a cork
-            m.add(revolve(scaled(r, tall, [(0, 0), (1, 0), (1, 0.8), (0.8, 0.88), (0.8, 0.92),
-                (0, 0.92)]), n=18), of=glass())  # fmt: skip
+            m.revolve(scaled(r, tall, [(0, 0), (1, 0), (1, 0.8), (0.8, 0.88), (0.8, 0.92),
+                (0, 0.92)]), n=18, of=glass())
             full = tall * m.uniform(0.4, 0.7)
-            m.add(revolve([(0, 0.003), (r - 0.004, 0.003), (r - 0.004, full), (0, full + 0.1 * r)],
-                n=16), of=plain("grain", grain, 0.9))  # fmt: skip
+            m.revolve([(0, 0.003), (r - 0.004, 0.003), (r - 0.004, full), (0, full + 0.1 * r)],
+                of=plain("grain", grain, 0.9))
             if form == 2:
-                m.add(frustum((r * 0.78, tall * 0.9202), (r * 0.82, tall), n=16),
-                    of=plain("cork", (0.72, 0.57, 0.4), 0.9))  # fmt: skip
+                m.frustum((r * 0.78, tall * 0.9202), (r * 0.82, tall),
+                    of=plain("cork", (0.72, 0.57, 0.4), 0.9))
             else:
-                m.add(revolve(scaled(r, tall,
-                    [(0, 0.9202), (0.9, 0.9202), (0.85, 0.97), (0, 0.98)]), n=16), of=glass())  # fmt: skip
-                m.add(tube(bent([(r * 0.85, tall * 0.86, 0), (r * 1.1, tall * 0.93, 0),
-                    (r * 0.85, tall * 0.985, 0)], 0.01, n=2), 0.0015, n=5), of=m.metal)  # fmt: skip
-                m.add(hoop(oval(1.7 * r, 1.7 * r, n=18), tall * 0.87, 0.002, n=5), of=m.metal)
+                m.revolve(scaled(r, tall, [(0, 0.9202), (0.9, 0.9202), (0.85, 0.97), (0, 0.98)]),
+                    of=glass())
+                m.tube(bent([(r * 0.85, tall * 0.86, 0), (r * 1.1, tall * 0.93, 0),
+                    (r * 0.85, tall * 0.985, 0)], 0.01, n=2), 0.0015, n=5, of=m.metal)
+                m.hoop(oval(1.7 * r, 1.7 * r, n=18), tall * 0.87, 0.002, n=5, of=m.metal)
         case 4:  # tin
             paint_of = plain("tin", m.any_colour(), 0.3)
-            m.add(cylinder(r, 0, tall * 0.85, n=22), of=paint_of)
-            m.add(revolve([(0, tall * 0.8502), (r + 0.002, tall * 0.8502), (r + 0.002, tall * 0.97),
-                (r * 0.9, tall), (0, tall)], n=22), of=m.pick(paint_of, m.metal))  # fmt: skip
-            m.add(slab((-0.025, tall * 0.25, r - 0.006), (0.025, tall * 0.6, r + 0.0006)),
-                of=plain("label", (0.92, 0.91, 0.87), 0.6))  # fmt: skip
+            m.cylinder(r, 0, tall * 0.85, n=22, of=paint_of)
+            m.revolve([(0, tall * 0.8502), (r + 0.002, tall * 0.8502), (r + 0.002, tall * 0.97),
+                (r * 0.9, tall), (0, tall)], n=22, of=m.pick(paint_of, m.metal))
+            m.box(0.05, (tall * 0.25, tall * 0.6), 0.0066, against=r - 0.006,
+                of=plain("label", (0.92, 0.91, 0.87), 0.6))
         case 5:  # square
-            m.add(loft(rings(rect, [(1.8 * r, 1.8 * r, 0.008, 0),
-                (1.8 * r, 1.8 * r, 0.008, tall * 0.85)], n=2)), of=side)  # fmt: skip
-            m.add(loft(rings(rect, [(1.8 * r, 1.8 * r, 0.008, tall * 0.8502),
-                (1.8 * r, 1.8 * r, 0.008, tall)], n=2)), of=lid)  # fmt: skip
+            m.loft(rings(rect, [(1.8 * r, 1.8 * r, 0.008, 0), (1.8 * r, 1.8 * r, 0.008,
+                tall * 0.85)], n=2), of=side)
+            m.loft(rings(rect, [(1.8 * r, 1.8 * r, 0.008, tall * 0.8502),
+                (1.8 * r, 1.8 * r, 0.008, tall)], n=2), of=lid)
         case 6:  # a set in a row
             for k, s in enumerate((1.0, 0.86, 0.72)):
                 with m.moved(at=(k * 2.05 * r, 0, 0)):
-                    m.add(revolve([(0, 0), (r * 0.95 * s, 0), (r * s, 0.006),
-                        (r * s, (tall - 0.02) * s), (0, (tall - 0.02) * s)], n=16), of=side)  # fmt: skip
-                    m.add(revolve([(0, (tall - 0.02) * s + 0.0002),
-                        (r * s, (tall - 0.02) * s + 0.0002), (r * s, tall * s - 0.004),
-                        (0.008, tall * s - 0.002), (0.01, tall * s + 0.008), (0, tall * s + 0.009)],
-                        n=16), of=lid)  # fmt: skip
+                    m.revolve([(0, 0), (r * 0.95 * s, 0), (r * s, 0.006),
+                        (r * s, (tall - 0.02) * s), (0, (tall - 0.02) * s)], of=side)
+                    m.revolve([(0, (tall - 0.02) * s + 0.0002), (r * s, (tall - 0.02) * s + 0.0002),
+                        (r * s, tall * s - 0.004), (0.008, tall * s - 0.002),
+                        (0.01, tall * s + 0.008), (0, tall * s + 0.009)], of=lid)
         case 7:  # spices in a little rack
             board_of = plain("rack wood", m.wood, 0.5)
             with m.of(board_of):
-                m.add(slab((-0.13, 0, -0.03), (0.13, 0.008, 0.03)))
-                for x in (-0.13, 0.122):
-                    m.add(slab((x, 0.008, -0.03), (x + 0.008, 0.09, 0.03)))
-                m.add(slab((-0.122, 0.035, 0.024), (0.122, 0.05, 0.03)))
+                m.box(0.26, 0.008, 0.06)
+                m.box(0.008, (0.008, 0.09), 0.06, left=-0.13, mirrored="x")
+                m.box(0.244, (0.035, 0.05), (0.024, 0.03))
             for k in range(5):
                 with m.moved(at=(-0.1 + 0.05 * k, 0.0082, 0)):
-                    m.add(cylinder(0.021, 0, 0.06, n=12), of=plain("spice",
+                    m.cylinder(0.021, 0, 0.06, n=12, of=plain("spice",
                         m.pick((0.5, 0.15, 0.05), (0.3, 0.35, 0.12), (0.75, 0.55, 0.12),
-                        (0.15, 0.1, 0.07)), 0.3))  # fmt: skip
-                    m.add(cylinder(0.021, 0.0602, 0.076, n=12), of=lid)
+                        (0.15, 0.1, 0.07)), 0.3))
+                    m.cylinder(0.021, 0.0602, 0.076, n=12, of=lid)
         case 8:  # a pot of honey or jam with a cloth
-            m.add(revolve([(0, 0), (0.034, 0), (0.037, 0.008), (0.037, 0.07), (0.03, 0.08),
-                (0, 0.08)], n=18), of=plain("jam", m.pick((0.4, 0.03, 0.06), (0.75, 0.42, 0.06),
-                (0.8, 0.3, 0.05)), 0.12))  # fmt: skip
-            m.add(revolve([(0, 0.0802), (0.033, 0.0802), (0.045, 0.072), (0.046, 0.074),
-                (0.034, 0.096), (0, 0.097)], n=18), of=plain("cloth", m.any_colour(), 0.95))  # fmt: skip
+            m.revolve([(0, 0), (0.034, 0), (0.037, 0.008), (0.037, 0.07), (0.03, 0.08), (0, 0.08)],
+                n=18, of=plain("jam", m.pick((0.4, 0.03, 0.06), (0.75, 0.42, 0.06),
+                (0.8, 0.3, 0.05)), 0.12))
+            m.revolve([(0, 0.0802), (0.033, 0.0802), (0.045, 0.072), (0.046, 0.074), (0.034, 0.096),
+                (0, 0.097)], n=18, of=plain("cloth", m.any_colour(), 0.95))
         case 9:  # utensils in a pot
-            m.add(vessel([(0, 0), (0.05, 0), (0.055, 0.14)], 0.004, n=20), of=m.china())
+            m.vessel([(0, 0), (0.05, 0), (0.055, 0.14)], 0.004, n=20, of=m.china())
             for k in range(m.integers(3, 7)):
                 around = m.moved(turn=rotation_y(1.2 * k + m.uniform(0, 0.4)))
                 spoon, black = plain("spoon wood", m.wood, 0.6), plain("grip", (0.1, 0.1, 0.1), 0.5)
                 leaning = m.moved(turn=rotation_z(-0.13), at=(0.008, 0.0055, 0))
                 with m.of(m.pick(spoon, m.metal, black)), around, leaning:
-                    m.add(tube([(0, 0, 0), (0, 0.24, 0)], 0.004, n=6))
+                    m.rod(0, (0, 0.24), 0, 0.004, n=6)
                     if m.chance(0.6):
                         bowl = stretched(sphere((0, 0, 0), 1.0, n=10), (0.024, 0.036, 0.006))
                         m.add(bowl, at=(0, 0.265, 0))
                     else:
-                        m.add(bevelled((-0.026, 0.23, -0.002), (0.026, 0.31, 0.002), 0.001))
+                        m.box(0.052, (0.23, 0.31), 0.004, 0.001)
         case 10:  # a block with knives
-            m.add(loft([(rect(0.1, 0.16, 0.006, n=2), 0),
-                (rect(0.1, 0.14, 0.006, z=-0.03, n=2), 0.2)], sharp=25.0),
-                of=plain("block wood", m.wood, 0.5))  # fmt: skip
+            m.loft([(rect(0.1, 0.16, 0.006, n=2), 0), (rect(0.1, 0.14, 0.006, z=-0.03, n=2), 0.2)],
+                sharp=25.0, of=plain("block wood", m.wood, 0.5))
             for k in range(5):
-                m.add(bevelled((-0.04 + 0.02 * k - 0.006, 0.195, -0.05 + 0.012 * (k % 2)),
-                    (-0.04 + 0.02 * k + 0.006, 0.29, -0.02 + 0.012 * (k % 2)), 0.003),
-                    of=plain("grip", (0.08, 0.08, 0.08), 0.4))  # fmt: skip
+                m.box(0.012, (0.195, 0.29), 0.03, 0.003, left=0.02 * k - 0.046,
+                    z=0.012 * (k % 2) - 0.035, of=plain("grip", (0.08, 0.08, 0.08), 0.4))
         case 11:  # boards that lean on each other
             for k in range(m.integers(1, 4)):
                 with m.moved(turn=rotation_x(-0.12), at=(0.02 * k, 0, 0.026 * k)):
-                    m.add(bevelled((-0.13 + 0.03 * k, 0, 0),
-                        (0.13 - 0.02 * k, 0.34 - 0.06 * k, 0.016), 0.004), of=plain("board wood",
-                        shade(m.wood, m.uniform(0.75, 1.2)), 0.6))  # fmt: skip
+                    m.box((-0.13 + 0.03 * k, 0.13 - 0.02 * k), 0.34 - 0.06 * k, (0, 0.016), 0.004,
+                        of=plain("board wood", shade(m.wood, m.uniform(0.75, 1.2)), 0.6))
         case 12:  # a kitchen scale
             paint_of = plain("scale", m.any_colour(), 0.35)
-            m.add(bevelled((-0.09, 0, -0.07), (0.09, 0.05, 0.07), 0.012), of=paint_of)
-            m.add(revolve([(0, 0), (0.012, 0), (0.012, 0.02), (0.1, 0.03), (0.11, 0.045),
-                (0.107, 0.046), (0.09, 0.034), (0, 0.034)], n=26), at=(0, 0.049, 0), of=m.metal)  # fmt: skip
-            m.add(frustum((0.035, 0), (0.033, 0.004), n=20), turn=LYING_ALONG_Z,
-                at=(0, 0.025, 0.0695), of=plain("dial", (0.93, 0.92, 0.88), 0.4))  # fmt: skip
+            m.box(0.18, 0.05, 0.14, 0.012, of=paint_of)
+            m.revolve([(0, 0), (0.012, 0), (0.012, 0.02), (0.1, 0.03), (0.11, 0.045),
+                (0.107, 0.046), (0.09, 0.034), (0, 0.034)], n=26, at=(0, 0.049, 0), of=m.metal)
+            m.frustum((0.035, 0), (0.033, 0.004), n=20, turn=LYING_ALONG_Z, at=(0, 0.025, 0.0695),
+                of=plain("dial", (0.93, 0.92, 0.88), 0.4))

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from numpy import cos, pi, sin
 
-from pbrs_farm.furnishings.things.bodies import cylinder, hoop, loft, revolve, tube, vessel
 from pbrs_farm.furnishings.things.food import apple
 from pbrs_farm.furnishings.things.maker import Maker, thing
 from pbrs_farm.furnishings.things.materials import plain
-from pbrs_farm.furnishings.things.outlines import bent, fluted, oval, rect, rings, scaled
+from pbrs_farm.furnishings.things.outlines import bent, fluted, oval, polar, rect, rings, scaled
+
+# fmt: off
 
 
 @thing(group="bowl")
@@ -20,52 +21,50 @@ def bowl(m: Maker) -> None:
     with m.of(material):
         match form:
             case 0 | 1:  # on a low foot
-                m.add(vessel([(0, 0), (r * 0.45, 0), (r * 0.47, 0.006), (r * 0.78, tall * 0.45),
-                    (r, tall)], 0.005, n=20))  # fmt: skip
+                m.vessel([(0, 0), (r * 0.45, 0), (r * 0.47, 0.006), (r * 0.78, tall * 0.45),
+                    (r, tall)], 0.005, n=20)
             case 2:  # on a stem
-                m.add(vessel([(0, 0), (r * 0.5, 0), (r * 0.45, 0.01), (r * 0.14, 0.03),
+                m.vessel([(0, 0), (r * 0.5, 0), (r * 0.45, 0.01), (r * 0.14, 0.03),
                     (r * 0.14, 0.4 * tall + 0.02), (r * 0.6, 0.6 * tall + 0.03), (r, tall + 0.04)],
-                    0.005, n=22))  # fmt: skip
+                    0.005, n=22)
             case 3:  # square
-                m.add(loft(rings(rect, [(1.1 * r, 1.1 * r, 0.02, 0), (2 * r, 2 * r, 0.03, tall),
+                m.loft(rings(rect, [(1.1 * r, 1.1 * r, 0.02, 0), (2 * r, 2 * r, 0.03, tall),
                     (2 * r - 0.012, 2 * r - 0.012, 0.026, tall), (1.1 * r, 1.1 * r, 0.02, 0.008)],
-                    n=3)))  # fmt: skip
+                    n=3))
             case 4:  # fluted
                 k = m.integers(8, 15)
-                m.add(loft(rings(fluted, [(1.0 * r, k, 0.05, 0), (1.6 * r, k, 0.08, tall * 0.45),
+                m.loft(rings(fluted, [(1.0 * r, k, 0.05, 0), (1.6 * r, k, 0.08, tall * 0.45),
                     (2 * r, k, 0.1, tall), (2 * r - 0.01, k, 0.1, tall),
-                    (1.5 * r, k, 0.08, tall * 0.45), (0.9 * r, k, 0.05, 0.008)]), sharp=70.0))  # fmt: skip
+                    (1.5 * r, k, 0.08, tall * 0.45), (0.9 * r, k, 0.05, 0.008)]), sharp=70.0)
             case 5:  # shallow
-                m.add(vessel([(0, 0), (r * 0.7, 0), (r * 1.1, 0.02), (r * 1.3, 0.045)], 0.004,
-                    n=26))  # fmt: skip
+                m.vessel([(0, 0), (r * 0.7, 0), (r * 1.1, 0.02), (r * 1.3, 0.045)], 0.004, n=26)
             case 6:  # oval
-                m.add(loft(rings(oval, [(1.2 * r, 0.8 * r, 0), (2.3 * r, 1.5 * r, tall * 0.6),
+                m.loft(rings(oval, [(1.2 * r, 0.8 * r, 0), (2.3 * r, 1.5 * r, tall * 0.6),
                     (2.6 * r, 1.7 * r, tall), (2.6 * r - 0.012, 1.7 * r - 0.012, tall),
-                    (2.2 * r, 1.4 * r, tall * 0.6), (1.1 * r, 0.7 * r, 0.008)], n=22)))  # fmt: skip
+                    (2.2 * r, 1.4 * r, tall * 0.6), (1.1 * r, 0.7 * r, 0.008)], n=22))
             case 7:  # some in each other
                 for k in range(m.integers(2, 5)):
-                    m.add(vessel([(0, 0), (r * 0.42, 0), (r * 0.44, 0.006), (r * 0.7, tall * 0.45),
-                        (r * 0.82, tall * 0.8)], 0.004, n=16), at=(0, 0.018 * k, 0))  # fmt: skip
+                    m.vessel([(0, 0), (r * 0.42, 0), (r * 0.44, 0.006), (r * 0.7, tall * 0.45),
+                        (r * 0.82, tall * 0.8)], 0.004, at=(0, 0.018 * k, 0))
             case 9:  # drawn in at its rim
-                m.add(vessel(scaled(r, tall, [(0, 0), (0.6, 0), (0.95, 0.3), (1, 0.65), (0.8, 1)]),
-                    0.006, n=22))  # fmt: skip
+                m.vessel(scaled(r, tall, [(0, 0), (0.6, 0), (0.95, 0.3), (1, 0.65), (0.8, 1)]),
+                    0.006, n=22)
             case 10:  # two grips
-                m.add(vessel(scaled(r, tall, [(0, 0), (0.5, 0), (0.85, 0.4), (1, 1)]), 0.006, n=20))
+                m.vessel(scaled(r, tall, [(0, 0), (0.5, 0), (0.85, 0.4), (1, 1)]), 0.006, n=20)
                 for x in (-1.0, 1.0):
-                    m.add(tube(bent([(x * r * 0.97, tall * 0.92, -0.03),
+                    m.tube(bent([(x * r * 0.97, tall * 0.92, -0.03),
                         (x * (r + 0.03), tall * 0.95, -0.025), (x * (r + 0.03), tall * 0.95, 0.025),
-                        (x * r * 0.97, tall * 0.92, 0.03)], 0.015, n=3), 0.006, n=6))  # fmt: skip
+                        (x * r * 0.97, tall * 0.92, 0.03)], 0.015, n=3), 0.006, n=6)
     # Of wire.
     if form == 8:
         with m.of(m.metal):
             for t in (0.0, 0.33, 0.66, 1.0):
-                m.add(hoop(oval(2 * r * (0.45 + 0.55 * t ** 0.5), 2 * r * (0.45 + 0.55 * t ** 0.5),
-                    n=20), 0.003 + t * (tall - 0.003), 0.003 if t in (0.0, 1.0) else 0.0015, n=5))  # fmt: skip
+                m.hoop(oval(2 * r * (0.45 + 0.55 * t**0.5), 2 * r * (0.45 + 0.55 * t**0.5), n=20),
+                    0.003 + t * (tall - 0.003), 0.003 if t in (0.0, 1.0) else 0.0015, n=5)
             for k in range(10):
-                m.add(tube([(r * 0.45 * cos(0.628 * k), 0.003, r * 0.45 * sin(0.628 * k)),
-                    (r * 0.83 * cos(0.628 * k), 0.4 * tall, r * 0.83 * sin(0.628 * k)),
-                    (r * cos(0.628 * k), tall, r * sin(0.628 * k))], 0.0018, n=5))  # fmt: skip
-            m.add(cylinder(r * 0.45, 0, 0.003, n=18))
+                m.tube([polar(r * 0.45, 0.003, 0.628 * k), polar(r * 0.83, 0.4 * tall, 0.628 * k),
+                    polar(r, tall, 0.628 * k)], 0.0018, n=5)
+            m.cylinder(r * 0.45, 0, 0.003, n=18)
     # Apples and oranges in a ring, one on top.
     if r > 0.1 and form in (0, 1, 3, 9, 10) and m.chance(0.7):
         radius, n = min(0.034, r * 0.3), m.integers(3, 6)
@@ -85,44 +84,42 @@ def plant_pot(m: Maker) -> None:
     form, r = m.integers(0, 9), m.uniform(0.06, 0.1)
     tall = r * m.uniform(1.4, 1.9)
     material, soil = (plain("pot", (0.66, 0.36, 0.24) if m.chance(0.4) else m.any_colour(), 0.8),
-        plain("earth", (0.16, 0.11, 0.08), 0.95))  # fmt: skip
+        plain("earth", (0.16, 0.11, 0.08), 0.95))
     with m.of(material):
         match form:
             case 0:  # tapered
-                m.add(vessel([(0, 0), (r * 0.72, 0), (r, tall)], 0.006, n=20))
+                m.vessel([(0, 0), (r * 0.72, 0), (r, tall)], 0.006, n=20)
             case 1:  # with a rim
-                m.add(vessel(scaled(r, tall, [(0, 0), (0.7, 0), (0.9, 0.75), (0.98, 0.75), (1, 1)]),
-                    0.006, n=20))  # fmt: skip
+                m.vessel(scaled(r, tall, [(0, 0), (0.7, 0), (0.9, 0.75), (0.98, 0.75), (1, 1)]),
+                    0.006, n=20)
             case 2:  # straight
-                m.add(vessel([(0, 0), (r * 0.93, 0), (r, 0.008), (r, tall)], 0.005, n=24))
+                m.vessel([(0, 0), (r * 0.93, 0), (r, 0.008), (r, tall)], 0.005, n=24)
             case 3:  # square
-                m.add(loft(rings(rect, [(1.5 * r, 1.5 * r, 0.008, 0),
-                    (1.9 * r, 1.9 * r, 0.01, tall), (1.9 * r - 0.014, 1.9 * r - 0.014, 0.008, tall),
-                    (1.5 * r - 0.01, 1.5 * r - 0.01, 0.006, 0.01)], n=2)))  # fmt: skip
+                m.loft(rings(rect, [(1.5 * r, 1.5 * r, 0.008, 0), (1.9 * r, 1.9 * r, 0.01, tall),
+                    (1.9 * r - 0.014, 1.9 * r - 0.014, 0.008, tall),
+                    (1.5 * r - 0.01, 1.5 * r - 0.01, 0.006, 0.01)], n=2))
             case 4:  # on a saucer
-                m.add(vessel([(0, 0.0102), (r * 0.68, 0.0102), (r * 0.95, tall)], 0.006, n=20))
-                m.add(revolve([(0, 0), (r * 0.8, 0), (r, 0.018), (r * 0.97, 0.02), (r * 0.8, 0.01),
-                    (0, 0.01)], n=22))  # fmt: skip
+                m.vessel([(0, 0.0102), (r * 0.68, 0.0102), (r * 0.95, tall)], 0.006, n=20)
+                m.revolve([(0, 0), (r * 0.8, 0), (r, 0.018), (r * 0.97, 0.02), (r * 0.8, 0.01),
+                    (0, 0.01)], n=22)
             case 5:  # on three legs
-                m.add(vessel([(0, 0.08), (r * 0.9, 0.08), (r, 0.09), (r, 0.08 + tall)], 0.005,
-                    n=24))  # fmt: skip
+                m.vessel([(0, 0.08), (r * 0.9, 0.08), (r, 0.09), (r, 0.08 + tall)], 0.005, n=24)
                 for k in range(3):
-                    m.add(tube([(r * 1.0 * cos(2.1 * k), 0, r * 1.0 * sin(2.1 * k)),
-                        (r * 0.75 * cos(2.1 * k), 0.1, r * 0.75 * sin(2.1 * k))], 0.008, n=7),
-                        of=plain("leg wood", m.wood, 0.5))  # fmt: skip
+                    m.tube([polar(r * 1.0, 0, 2.1 * k), polar(r * 0.75, 0.1, 2.1 * k)], 0.008, n=7,
+                        of=plain("leg wood", m.wood, 0.5))
             case 6:  # ribbed
-                m.add(loft(rings(fluted, [(1.5 * r, 14, 0.06, 0), (2 * r, 14, 0.06, tall),
-                    (2 * r - 0.014, 14, 0.06, tall), (1.45 * r, 14, 0.06, 0.01)]), sharp=70.0))  # fmt: skip
+                m.loft(rings(fluted, [(1.5 * r, 14, 0.06, 0), (2 * r, 14, 0.06, tall),
+                    (2 * r - 0.014, 14, 0.06, tall), (1.45 * r, 14, 0.06, 0.01)]), sharp=70.0)
             case 7:  # round
-                m.add(vessel(scaled(r, tall, [(0, 0), (0.5, 0), (1.05, 0.35), (1.1, 0.55),
-                    (0.9, 0.8)]), 0.006, n=22))  # fmt: skip
+                m.vessel(scaled(r, tall, [(0, 0), (0.5, 0), (1.05, 0.35), (1.1, 0.55), (0.9, 0.8)]),
+                    0.006, n=22)
             case 8:  # of zinc, two grips
-                m.add(vessel(scaled(r, tall, [(0, 0), (0.75, 0), (0.97, 0.95), (1.02, 0.95),
-                    (1.02, 1)]), 0.003, n=22), of=m.metal)  # fmt: skip
+                m.vessel(scaled(r, tall, [(0, 0), (0.75, 0), (0.97, 0.95), (1.02, 0.95),
+                    (1.02, 1)]), 0.003, n=22, of=m.metal)
                 for x in (-1.0, 1.0):
-                    m.add(tube(bent([(x * r * 0.93, tall * 0.7, -0.02),
+                    m.tube(bent([(x * r * 0.93, tall * 0.7, -0.02),
                         (x * (r + 0.02), tall * 0.72, -0.015), (x * (r + 0.02), tall * 0.72, 0.015),
-                        (x * r * 0.93, tall * 0.7, 0.02)], 0.01, n=2), 0.003, n=5), of=m.metal)  # fmt: skip
+                        (x * r * 0.93, tall * 0.7, 0.02)], 0.01, n=2), 0.003, n=5, of=m.metal)
     y, low = ((0.08 if form == 5 else 0.0) + tall * (0.6 if form == 7 else 0.82),
-        0.086 if form == 5 else 0.02)  # fmt: skip
-    m.add(revolve([(0, low), (0.55 * r, low), (r * 0.78, y), (0, y + 0.004)], n=18), of=soil)
+        0.086 if form == 5 else 0.02)
+    m.revolve([(0, low), (0.55 * r, low), (r * 0.78, y), (0, y + 0.004)], n=18, of=soil)

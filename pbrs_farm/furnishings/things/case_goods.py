@@ -25,12 +25,13 @@ from pbrs_farm.core.classes import (
 from pbrs_farm.core.frames import LYING_ALONG_Z
 from pbrs_farm.core.house import Material
 from pbrs_farm.dress.style import Rgb
-from pbrs_farm.furnishings.things.bodies import frustum, revolve, slab
-from pbrs_farm.furnishings.things.cloth import bulged
 from pbrs_farm.furnishings.things.joints import drawer_box, hollow, is_drawer, opens, shelves
-from pbrs_farm.furnishings.things.maker import Maker, Pair, Size, Thing, thing
+from pbrs_farm.furnishings.things.maker import Maker, Size, Thing, thing
 from pbrs_farm.furnishings.things.materials import plain
 from pbrs_farm.furnishings.things.outlines import spaced
+from pbrs_farm.furnishings.things.shapes import Pair
+
+# fmt: off
 
 _BOARD_M: Final = 0.018
 
@@ -62,16 +63,16 @@ def bookcase(m: Maker, boards: Boards, size: Size) -> None:
     has_doors = h > 1.5 and m.chance(0.25)
     plinth = m.uniform(0.05, 0.09)
     with m.of(boards.body):
-        m.add(slab((-hw + 0.018, 0.0, hd - 0.04), (hw - 0.018, plinth, hd - 0.025)))
+        m.box(w - 0.036, plinth, 0.015, against=hd - 0.04)
         if has_doors or m.chance(0.75):
-            m.add(slab((-hw + 0.018, plinth, -hd), (hw - 0.018, h - 0.018, -hd + 0.006)))
+            m.box(w - 0.036, (plinth, h - 0.018), 0.006, against=-hd)
         # Shelves are as far apart as large books need, evenly; longer ones sag and get an upright.
         n = max(2, round((h - plinth) / m.uniform(0.28, 0.37)))
         levels = spaced(plinth, h - 0.018, n + 1)
         for y in levels:
-            m.add(slab((-hw + 0.018, y, -hd + 0.006), (hw - 0.018, y + 0.018, hd - 0.002)))
+            m.box(w - 0.036, 0.018, (-hd + 0.006, hd - 0.002), on=y)
         for low, high in pairwise(levels) if w > 0.95 else ():
-            m.add(slab((-0.009, low + 0.018, -hd + 0.006), (0.009, high, hd - 0.004)))
+            m.box(0.018, (low + 0.018, high), (-hd + 0.006, hd - 0.004))
     if has_doors:
         doors(m, boards, (-hw, hw), (levels[0], levels[2] + 0.018), hd, 2 if w > 0.55 else 1, -hd)
 
@@ -82,22 +83,21 @@ def cube_shelf(m: Maker, boards: Boards, size: Size) -> None:
     columns = max(1, int(size[0] / 0.36))
     rows = min(max(1, int(size[1] / 0.36)), 5 if columns > 1 else 4)
     inner, outer, d = 0.34, 0.045, 0.38
-    hd = d / 2
     w, h = (columns * inner + (columns - 1) * 0.018 + 2 * outer,
-        rows * inner + (rows - 1) * 0.018 + 2 * outer)  # fmt: skip
+        rows * inner + (rows - 1) * 0.018 + 2 * outer)
     hw = w / 2
     with m.of(boards.body):
-        m.add(slab((-hw, 0.0, -hd), (hw, outer, hd)))
-        m.add(slab((-hw, h - outer, -hd), (hw, h, hd)))
-        m.add(slab((-hw, outer, -hd), (-(hw - outer), h - outer, hd)))
-        m.add(slab((hw - outer, outer, -hd), (hw, h - outer, hd)))
+        m.box(w, outer, d)
+        m.box(w, (h - outer, h), d)
+        m.box(outer, (outer, h - outer), d, left=-hw)
+        m.box((hw - outer, hw), (outer, h - outer), d)
         for k in range(1, columns):
             x = -hw + outer + k * (inner + 0.018) - 0.018
-            m.add(slab((x, outer, -hd + 0.002), (x + 0.018, h - outer, hd - 0.002)))
+            m.box(0.018, (outer, h - outer), d - 0.004, left=x)
         # Shelves run from upright to upright.
         for i, k in product(range(1, rows), range(columns)):
             x, y = -hw + outer + k * (inner + 0.018), outer + i * (inner + 0.018) - 0.018
-            m.add(slab((x, y, -hd + 0.002), (x + inner, y + 0.018, hd - 0.002)))
+            m.box(inner, 0.018, d - 0.004, left=x, on=y)
 
 
 @thing(group="shelves", nyu40=SHELVES, place=Place.FLOOR)
@@ -107,12 +107,11 @@ def rack(m: Maker, boards: Boards, size: Size) -> None:
     hw, hd = w / 2, d / 2
     post, thick = 0.022, 0.024
     for x, z in product((-(hw - post / 2), hw - post / 2), (-(hd - post / 2), hd - post / 2)):
-        m.add(slab((x - post / 2, 0.0, z - post / 2), (x + post / 2, h, z + post / 2)), of=m.metal)
+        m.box(post, h, post, x=x, z=z, of=m.metal)
     for y in spaced(0.09, h - thick - 0.004, max(3, round(h / m.uniform(0.34, 0.42)))):
-        m.add(slab((-hw + post, y, -hd + 0.004), (hw - post, y + thick, hd - 0.004)),
-            of=boards.body)  # fmt: skip
+        m.box(w - 2 * post, thick, d - 0.008, on=y, of=boards.body)
         for a, b in ((-(hw - 0.004), -(hw - post)), (hw - post, hw - 0.004)):
-            m.add(slab((a, y, -hd + post), (b, y + thick, hd - post)), of=m.metal)
+            m.box((a, b), thick, d - 2 * post, on=y, of=m.metal)
 
 
 @thing(group="dresser", nyu40=DRESSER, place=Place.FLOOR)
@@ -157,10 +156,10 @@ def tall_cabinet(m: Maker, boards: Boards, size: Size) -> None:
     low, high = 0.4 * h, 0.62 * h
     sides(m, boards, size)
     with m.of(boards.body):
-        m.add(slab((-hw + 0.018, 0.06, -hd), (hw - 0.018, h - 0.018, -hd + 0.006)))
-        m.add(slab((-hw + 0.018, 0.0, hd - 0.03), (hw - 0.018, 0.06, hd - 0.015)))
+        m.box(w - 0.036, (0.06, h - 0.018), 0.006, against=-hd)
+        m.box(w - 0.036, 0.06, 0.015, against=hd - 0.03)
         for y in (0.06, low, (low + high) / 2, high, h - 0.018):
-            m.add(slab((-hw + 0.018, y, -hd + 0.006), (hw - 0.018, y + 0.018, hd - 0.002)))
+            m.box(w - 0.036, 0.018, (-hd + 0.006, hd - 0.002), on=y)
     for span in ((0.06, low + 0.018), (high, h)):
         doors(m, boards, (-hw, hw), span, hd, 1, -hd)
 
@@ -169,7 +168,7 @@ def tall_cabinet(m: Maker, boards: Boards, size: Size) -> None:
 def shoe_cabinet(m: Maker, boards: Boards, size: Size) -> None:
     """A flat cupboard with flaps one above another."""
     cupboard(m, boards, size, False,
-        [("flap",) * max(2, round(size[1] / 0.42))] * (2 if size[0] > 0.85 else 1))  # fmt: skip
+        [("flap",) * max(2, round(size[1] / 0.42))] * (2 if size[0] > 0.85 else 1))
 
 
 @thing(group="coffee_table", nyu40=TABLE, place=Place.FLOOR)
@@ -179,8 +178,7 @@ def console(m: Maker, boards: Boards, size: Size) -> None:
     table(m, boards, size, m.uniform(0.03, 0.045))
     if m.chance(0.6):
         y = m.uniform(0.12, 0.2)
-        m.add(slab((-w / 2 + 0.03, y, -d / 2 + 0.025), (w / 2 - 0.03, y + 0.018, d / 2 - 0.025)),
-            of=boards.body)  # fmt: skip
+        m.box(w - 0.06, 0.018, d - 0.05, on=y, of=boards.body)
 
 
 @thing(group="desk", nyu40=DESK, place=Place.FLOOR)
@@ -196,7 +194,7 @@ def desk(m: Maker, boards: Boards, size: Size) -> None:
         hollow(m, (x0, x1), (low, high), (-d / 2 + 0.03, d / 2 - 0.04), _BOARD_M, boards.body)
         column_of_fronts(m, boards, (x0, x1), (low, high), d / 2 - 0.04,
             ("drawer",) * max(1, round((high - low) / 0.19)), m.chance(0.4), True,
-            Space((x0 + _BOARD_M, x1 - _BOARD_M), -d / 2 + 0.038))  # fmt: skip
+            Space((x0 + _BOARD_M, x1 - _BOARD_M), -d / 2 + 0.038))
 
 
 @thing(group="chair", nyu40=CHAIR, place=Place.FLOOR)
@@ -207,12 +205,12 @@ def desk_chair(m: Maker, boards: Boards) -> None:
     with m.of(boards.body):
         for x, front in product((-(hw - leg / 2), hw - leg / 2), (True, False)):
             z, high = hd - leg / 2 if front else -hd + leg / 2, seat - 0.022 if front else h
-            m.add(slab((x - leg / 2, 0.0, z - leg / 2), (x + leg / 2, high, z + leg / 2)))
-        m.add(slab((-hw + leg, seat - 0.022, -hd + 0.003), (hw - leg, seat, hd)))
+            m.box(leg, high, leg, x=x, z=z)
+        m.box(w - 2 * leg, (seat - 0.022, seat), (-hd + 0.003, hd))
         for a, b in ((-hw, -(hw - leg)), (hw - leg, hw)):
-            m.add(slab((a, seat - 0.022, -hd + leg), (b, seat, hd)))
+            m.box((a, b), (seat - 0.022, seat), (-hd + leg, hd))
         for y in (h - 0.09, h - 0.24):
-            m.add(slab((-hw + leg, y, -hd + 0.006), (hw - leg, y + 0.07, -hd + 0.024)))
+            m.box(w - 2 * leg, 0.07, 0.018, on=y, against=-hd + 0.006)
 
 
 @thing(group="ottoman", nyu40=CHAIR, place=Place.FLOOR)
@@ -220,34 +218,33 @@ def bench(m: Maker, boards: Boards, size: Size) -> None:
     """A bench for two with a cushion on it."""
     w, h, d = size
     table(m, boards, (w, h - 0.05, d), 0.045)
-    m.add(bulged((w - 0.02, 0.05, d - 0.02), n=8, edge=0.6, bulge=8.0), at=(0.0, h - 0.0255, 0.0),
-        of=plain("bench cushion", boards.cloth, 0.95))  # fmt: skip
+    m.bulged((w - 0.02, 0.05, d - 0.02), n=8, edge=0.6, bulge=8.0, at=(0.0, h - 0.0255, 0.0),
+        of=plain("bench cushion", boards.cloth, 0.95))
 
 
 def sides(m: Maker, boards: Boards, size: Size) -> None:
     """Two uprights from the floor to the top."""
     w, h, d = size
-    m.add(slab((-w / 2, 0.0, -d / 2), (-w / 2 + 0.018, h, d / 2)), of=boards.body)
-    m.add(slab((w / 2 - 0.018, 0.0, -d / 2), (w / 2, h, d / 2)), of=boards.body)
+    m.box(0.018, h, d, left=-w / 2, of=boards.body)
+    m.box(0.018, h, d, left=w / 2 - 0.018, of=boards.body)
 
 
 def table(m: Maker, boards: Boards, size: Size, leg: float) -> None:
     """A top on four legs with rails under it."""
     w, h, d = size
     thick, x, z = 0.025, w / 2 - 0.01 - leg / 2, d / 2 - 0.01 - leg / 2
-    m.add(slab((-w / 2, h - thick, -d / 2), (w / 2, h, d / 2)), of=boards.top)
+    m.box(w, (h - thick, h), d, of=boards.top)
     with m.of(boards.body):
         for a, c in product((-x, x), (-z, z)):
-            m.add(slab((a - leg / 2, 0.0, c - leg / 2), (a + leg / 2, h - thick, c + leg / 2)))
+            m.box(leg, h - thick, leg, x=a, z=c)
         to_x, to_z = w / 2 - 0.01 - leg, d / 2 - 0.01 - leg
-        for c in (-z, z):
-            m.add(slab((-to_x, h - thick - 0.06, c - 0.009), (to_x, h - thick, c + 0.009)))
-        for a in (-x, x):
-            m.add(slab((a - 0.009, h - thick - 0.06, -to_z), (a + 0.009, h - thick, to_z)))
+        m.box(2 * to_x, 0.06, 0.018, on=h - thick - 0.06, z=-z, mirrored="z")
+        m.box(0.018, 0.06, 2 * to_z, x=-x, on=h - thick - 0.06, mirrored="x")
 
 
-def cupboard(m: Maker, boards: Boards, size: Size, may_have_legs: bool,
-    columns: Sequence[Sequence[str]]) -> None:  # fmt: skip
+def cupboard(
+    m: Maker, boards: Boards, size: Size, may_have_legs: bool, columns: Sequence[Sequence[str]]
+) -> None:
     """A closed box behind columns of fronts, which are named from the top downwards."""
     w, h, d = size
     foot = carcass(m, boards, size, may_have_legs)
@@ -257,10 +254,9 @@ def cupboard(m: Maker, boards: Boards, size: Size, may_have_legs: bool,
         a, b, t = -w / 2 + k * step, -w / 2 + (k + 1) * step, _BOARD_M
         space = (a + (t / 2 if k else t), b - (t / 2 if k < len(columns) - 1 else t))
         if k:
-            m.add(slab((a - t / 2, foot + t, back), (a + t / 2, h - 0.026, d / 2 - 0.018)),
-                of=boards.body)  # fmt: skip
+            m.box(t, (foot + t, h - 0.026), (back, d / 2 - 0.018), x=a, of=boards.body)
         column_of_fronts(m, boards, (a, b), (foot, h - 0.026), d / 2 - 0.018, kinds, has_knobs,
-            k % 2 == 0, Space(space, back, rail=m.metal if k % 2 == 0 else None))  # fmt: skip
+            k % 2 == 0, Space(space, back, rail=m.metal if k % 2 == 0 else None))
 
 
 def carcass(m: Maker, boards: Boards, size: Size, may_have_legs: bool) -> float:
@@ -274,17 +270,17 @@ def carcass(m: Maker, boards: Boards, size: Size, may_have_legs: bool) -> float:
     has_legs = may_have_legs and m.chance(0.55)
     foot = m.uniform(0.09, 0.16) if has_legs else m.uniform(0.04, 0.07)
     hollow(m, (-hw, hw), (foot, h - thick), (-hd, hd - 0.018), _BOARD_M, boards.body)
-    m.add(slab((-hw - 0.004, h - thick, -hd), (hw + 0.004, h, hd + 0.006)), of=boards.top)
+    m.box(w + 0.008, (h - thick, h), (-hd, hd + 0.006), of=boards.top)
     if not has_legs:
-        m.add(slab((-hw + 0.01, 0.0, -hd), (hw - 0.01, foot, hd - 0.05)), of=boards.body)
+        m.box(w - 0.02, foot, (-hd, hd - 0.05), of=boards.body)
     else:
         for x, z in product((-hw + 0.06, hw - 0.06), (-hd + 0.05, hd - 0.08)):
-            m.add(frustum((0.013, 0.0), (0.022, foot), n=12), at=(x, 0.0, z), of=boards.top)
+            m.frustum((0.013, 0.0), (0.022, foot), n=12, at=(x, 0.0, z), of=boards.top)
     return float(np.float32(foot))
 
 
 def column_of_fronts(m: Maker, boards: Boards, x: Pair, y: Pair, z: float, kinds: Sequence[str],
-    has_knobs: bool, opens_left: bool, space: Space) -> None:  # fmt: skip
+    has_knobs: bool, opens_left: bool, space: Space) -> None:
     """Fronts from the top downwards before z; a door is 3.2 times as high as a drawer."""
     total, below = 0.0, 0.0
     for kind in kinds:
@@ -293,7 +289,7 @@ def column_of_fronts(m: Maker, boards: Boards, x: Pair, y: Pair, z: float, kinds
         above = below
         below += 3.2 if kind == "door" and len(kinds) > 1 else 1.0
         front(m, boards, x, (y[1] - (y[1] - y[0]) * (below / total),
-            y[1] - (y[1] - y[0]) * (above / total)), z, kind, has_knobs, opens_left, space)  # fmt: skip
+            y[1] - (y[1] - y[0]) * (above / total)), z, kind, has_knobs, opens_left, space)
 
 
 def doors(m: Maker, boards: Boards, x: Pair, y: Pair, z: float, n: int, back: float) -> None:
@@ -301,11 +297,11 @@ def doors(m: Maker, boards: Boards, x: Pair, y: Pair, z: float, n: int, back: fl
     has_knobs, space = m.chance(0.4), Space(x, back, is_filled=True)
     for k in range(n):
         front(m, boards, (x[0] + (x[1] - x[0]) * k / n, x[0] + (x[1] - x[0]) * (k + 1) / n), y, z,
-            "door", has_knobs, k % 2 == 0, space)  # fmt: skip
+            "door", has_knobs, k % 2 == 0, space)
 
 
 def front(m: Maker, boards: Boards, x: Pair, y: Pair, z: float, kind: str, has_knobs: bool,
-    opens_left: bool, space: Space) -> None:  # fmt: skip
+    opens_left: bool, space: Space) -> None:
     """A door, drawer or flap that opens, with what is behind it."""
     with opens(m, kind, x, y, z + 0.0165, space.back, opens_left):
         face(m, boards, x, y, z, kind, has_knobs, opens_left)
@@ -316,13 +312,13 @@ def front(m: Maker, boards: Boards, x: Pair, y: Pair, z: float, kind: str, has_k
 
 
 def face(m: Maker, boards: Boards, x: Pair, y: Pair, z: float, kind: str, has_knobs: bool,
-    opens_left: bool) -> None:  # fmt: skip
+    opens_left: bool) -> None:
     """A front 16 mm thick, 2 mm from its neighbours, and what opens it.
 
     That stands at the side of a door that has no hinges, and lies across a drawer.
     """
-    m.add(slab((x[0] + 0.002, y[0] + 0.002, z + 0.0005), (x[1] - 0.002, y[1] - 0.002, z + 0.0165)),
-        of=boards.front)  # fmt: skip
+    m.box((x[0] + 0.002, x[1] - 0.002), (y[0] + 0.002, y[1] - 0.002), 0.016, against=z + 0.0005,
+        of=boards.front)
     z, wide, tall, middle = z + 0.0165, x[1] - x[0], y[1] - y[0], (x[0] + x[1]) / 2
     if kind == "door":
         a, long = x[1] - 0.035 if opens_left else x[0] + 0.035, min(0.16, 0.3 * tall)
@@ -343,25 +339,21 @@ def face(m: Maker, boards: Boards, x: Pair, y: Pair, z: float, kind: str, has_kn
 
 def knob(m: Maker, x: float, y: float, z: float) -> None:
     """A round knob on a front at z."""
-    m.add(revolve([(0.0, 0.0), (0.006, 0.0), (0.006, 0.012), (0.014, 0.016), (0.012, 0.026),
-        (0.0, 0.028)], n=12), turn=LYING_ALONG_Z, at=(x, y, z), of=m.metal)  # fmt: skip
+    m.revolve([(0.0, 0.0), (0.006, 0.0), (0.006, 0.012), (0.014, 0.016), (0.012, 0.026),
+        (0.0, 0.028)], n=12, turn=LYING_ALONG_Z, at=(x, y, z), of=m.metal)
 
 
 def bar(m: Maker, low: Pair, high: Pair, z: float) -> None:
     """A bar on two short feet."""
-    m.add(slab((low[0], low[1], z + 0.018), (high[0], high[1], z + 0.028)), of=m.metal)
+    m.box((low[0], high[0]), (low[1], high[1]), 0.01, against=z + 0.018, of=m.metal)
     wide, tall = high[0] - low[0], high[1] - low[1]
     for end in (0.1, 0.9):
         x, y = (low[0] + wide * (end if wide > tall else 0.5),
-            low[1] + tall * (0.5 if wide > tall else end))  # fmt: skip
-        m.add(slab((x - 0.004, y - 0.004, z), (x + 0.004, y + 0.004, z + 0.018)), of=m.metal)
+            low[1] + tall * (0.5 if wide > tall else end))
+        m.box(0.008, 0.008, 0.018, x=x, on=y - 0.004, against=z, of=m.metal)
 
 
-CASE_GOODS: Final[Mapping[str, Thing[[Boards, Size]]]] = {
-    one.name: one
-    for one in (
-        bookcase, cube_shelf, rack, chest, nightstand, sideboard, wardrobe, tall_cabinet,
-        shoe_cabinet, console, desk, bench,
-    )
-}  # fmt: skip
+CASE_GOODS: Final[Mapping[str, Thing[[Boards, Size]]]] = {one.name: one for one in (bookcase,
+    cube_shelf, rack, chest, nightstand, sideboard, wardrobe, tall_cabinet, shoe_cabinet, console,
+    desk, bench)}
 """What furniture.toml may name as a model; desk_chair has one size."""

@@ -6,19 +6,11 @@ from itertools import product
 
 from pbrs_farm.core.frames import LYING_ALONG_Z, rotation_x, rotation_z
 from pbrs_farm.core.house import Material
-from pbrs_farm.furnishings.things.bodies import (
-    bevelled,
-    cylinder,
-    frustum,
-    loft,
-    revolve,
-    slab,
-    sphere,
-    tube,
-)
 from pbrs_farm.furnishings.things.maker import Maker, thing
 from pbrs_farm.furnishings.things.materials import glass, plain
 from pbrs_farm.furnishings.things.outlines import bent, rect, rings
+
+# fmt: off
 
 
 @thing(group="clock", called="alarm_clock")
@@ -29,103 +21,100 @@ def clock(m: Maker) -> None:
     grain = plain("clock wood", m.wood, 0.45)
     match form:
         case 0:  # digital
-            m.add(bevelled((-0.07, 0, -0.025), (0.07, 0.07, 0.025), 0.004), of=material)
-            m.add(slab((-0.055, 0.015, 0.025), (0.055, 0.055, 0.0255)),
-                of=plain("display", (0.05, 0.06, 0.05), 0.1))  # fmt: skip
+            m.box(0.14, 0.07, 0.05, 0.004, of=material)
+            m.box(
+                0.11, (0.015, 0.055), (0.025, 0.0255), of=plain("display", (0.05, 0.06, 0.05), 0.1)
+            )
         case 1:  # round, on a foot
             with m.moved(at=(0, 0.062, 0)):
                 clock_face(m, 0.055, material)
-            m.add(slab((-0.035, 0, -0.02), (0.035, 0.012, 0.02)), of=material)
+            m.box(0.07, 0.012, 0.04, of=material)
         case 2:  # two bells
             with m.moved(at=(0, 0.07, 0)):
                 clock_face(m, 0.055, material)
             with m.of(material):
                 for x in (-1.0, 1.0):
-                    m.add(revolve([(0, 0), (0.022, 0), (0.019, 0.012), (0, 0.02)], n=14),
-                        turn=rotation_z(-x * 0.6), at=(x * 0.033, 0.126, 0))  # fmt: skip
-                    m.add(tube([(x * 0.025, 0.03, 0), (x * 0.04, 0.0, 0)], 0.004, n=6))
-                m.add(tube(bent([(-0.03, 0.125, 0), (-0.02, 0.165, 0), (0.02, 0.165, 0),
-                    (0.03, 0.125, 0)], 0.02, n=3), 0.003, n=6))  # fmt: skip
+                    m.revolve([(0, 0), (0.022, 0), (0.019, 0.012), (0, 0.02)], n=14,
+                        turn=rotation_z(-x * 0.6), at=(x * 0.033, 0.126, 0))
+                    m.tube([(x * 0.025, 0.03, 0), (x * 0.04, 0.0, 0)], 0.004, n=6)
+                m.tube(bent([(-0.03, 0.125, 0), (-0.02, 0.165, 0), (0.02, 0.165, 0),
+                    (0.03, 0.125, 0)], 0.02, n=3), 0.003, n=6)
         case 3:  # a wedge
-            m.add(loft([(rect(0.16, 0.08, 0.004, n=2), 0),
-                (rect(0.16, 0.03, 0.004, z=-0.022, n=2), 0.075)], sharp=25.0), of=grain)  # fmt: skip
-            m.add(slab((-0.06, -0.02, 0), (0.06, 0.02, 0.0006)), turn=rotation_x(-0.56),
-                at=(0, 0.038, 0.0168), of=plain("display", (0.05, 0.06, 0.05), 0.1))  # fmt: skip
+            m.loft([(rect(0.16, 0.08, 0.004, n=2), 0), (rect(0.16, 0.03, 0.004, z=-0.022, n=2),
+                0.075)], sharp=25.0, of=grain)
+            m.box(0.12, (-0.02, 0.02), (0, 0.0006), turn=rotation_x(-0.56), at=(0, 0.038, 0.0168),
+                of=plain("display", (0.05, 0.06, 0.05), 0.1))
         case 4:  # for a mantel
-            m.add(bevelled((-0.13, 0, -0.045), (0.13, 0.02, 0.045), 0.003), of=grain)
-            m.add(loft(rings(rect, [(0.2, 0.07, 0.004, 0.0201), (0.19, 0.066, 0.004, 0.12),
-                (0.12, 0.06, 0.004, 0.18), (0.04, 0.05, 0.004, 0.2)], n=2), sharp=25.0), of=grain)  # fmt: skip
+            m.box(0.26, 0.02, 0.09, 0.003, of=grain)
+            m.loft(rings(rect, [(0.2, 0.07, 0.004, 0.0201), (0.19, 0.066, 0.004, 0.12),
+                (0.12, 0.06, 0.004, 0.18), (0.04, 0.05, 0.004, 0.2)], n=2), sharp=25.0, of=grain)
             with m.moved(at=(0, 0.1, 0.022)):
                 clock_face(m, 0.05, m.metal)
         case 5:  # under a glass dome
-            m.add(frustum((0.07, 0), (0.068, 0.015), n=24), of=grain)
-            m.add(revolve([(0, 0.0152), (0.06, 0.0152), (0.06, 0.16), (0.04, 0.2), (0, 0.215)],
-                n=22), of=glass())  # fmt: skip
+            m.frustum((0.07, 0), (0.068, 0.015), n=24, of=grain)
+            m.revolve([(0, 0.0152), (0.06, 0.0152), (0.06, 0.16), (0.04, 0.2), (0, 0.215)], n=22,
+                of=glass())
             with m.moved(at=(0, 0.12, 0)):
                 clock_face(m, 0.04, m.metal)
             for x in (-0.03, 0.03):
-                m.add(tube([(x, 0.014, 0), (x, 0.12, 0)], 0.004, n=8), of=m.metal)
-            m.add(cylinder(0.022, 0.03, 0.045, n=14), of=m.metal)
+                m.rod(x, (0.014, 0.12), 0, 0.004, of=m.metal)
+            m.cylinder(0.022, 0.03, 0.045, n=14, of=m.metal)
         case 6:  # a cube
-            m.add(bevelled((-0.035, 0, -0.035), (0.035, 0.07, 0.035), 0.003), of=grain)
-            m.add(slab((-0.025, 0.02, 0.035), (0.025, 0.05, 0.0355)),
-                of=plain("display", (0.1, 0.12, 0.1), 0.1))  # fmt: skip
+            m.box(0.07, 0.07, 0.07, 0.003, of=grain)
+            m.box(0.05, (0.02, 0.05), (0.035, 0.0355), of=plain("display", (0.1, 0.12, 0.1), 0.1))
         case 7:  # flaps with numbers
-            m.add(bevelled((-0.1, 0, -0.035), (0.1, 0.085, 0.035), 0.008), of=material)
+            m.box(0.2, 0.085, 0.07, 0.008, of=material)
             for x in (-0.045, 0.045):
-                m.add(bevelled((x - 0.038, 0.012, 0.034), (x + 0.038, 0.041, 0.04), 0.002),
-                    of=plain("flap", (0.08, 0.08, 0.08), 0.4))  # fmt: skip
-                m.add(bevelled((x - 0.038, 0.0425, 0.034), (x + 0.038, 0.072, 0.04), 0.002),
-                    of=plain("flap", (0.08, 0.08, 0.08), 0.4))  # fmt: skip
+                m.box(0.076, (0.012, 0.041), (0.034, 0.04), 0.002, x=x,
+                    of=plain("flap", (0.08, 0.08, 0.08), 0.4))
+                m.box(0.076, (0.0425, 0.072), (0.034, 0.04), 0.002, x=x,
+                    of=plain("flap", (0.08, 0.08, 0.08), 0.4))
         case 8:  # a ball
-            m.add(sphere((0, 0.055, 0), 0.055, n=20), of=material)
+            m.sphere((0, 0.055, 0), 0.055, n=20, of=material)
             with m.moved(at=(0, 0.058, 0.03)):
                 clock_face(m, 0.042, material)
-            m.add(frustum((0.03, 0), (0.022, 0.012), n=16), of=grain)
+            m.frustum((0.03, 0), (0.022, 0.012), of=grain)
         case 9:  # a carriage clock with a grip
             with m.of(m.metal):
-                m.add(bevelled((-0.045, 0, -0.04), (0.045, 0.015, 0.04), 0.003))
-                m.add(bevelled((-0.045, 0.115, -0.04), (0.045, 0.13, 0.04), 0.003))
+                m.box(0.09, 0.015, 0.08, 0.003)
+                m.box(0.09, (0.115, 0.13), 0.08, 0.003)
                 for x, z in product((-0.039, 0.039), (-0.034, 0.034)):
-                    m.add(tube([(x, 0.012, z), (x, 0.118, z)], 0.005, n=8))
-                m.add(tube(bent([(-0.03, 0.128, 0), (-0.03, 0.165, 0), (0.03, 0.165, 0),
-                    (0.03, 0.128, 0)], 0.015, n=3), 0.004, n=6))  # fmt: skip
-            m.add(bevelled((-0.034, 0.015, -0.03), (0.034, 0.115, 0.026), 0.002),
-                of=plain("case", (0.9, 0.88, 0.82), 0.4))  # fmt: skip
+                    m.rod(x, (0.012, 0.118), z, 0.005)
+                m.tube(bent([(-0.03, 0.128, 0), (-0.03, 0.165, 0), (0.03, 0.165, 0),
+                    (0.03, 0.128, 0)], 0.015, n=3), 0.004, n=6)
+            m.box(0.068, (0.015, 0.115), (-0.03, 0.026), 0.002,
+                of=plain("case", (0.9, 0.88, 0.82), 0.4))
             with m.moved(at=(0, 0.068, 0.0075)):
                 clock_face(m, 0.03, m.metal)
         case 10:  # an arch of wood
-            m.add(tube([(0, 0.08, -0.03), (0, 0.08, 0.03)], 0.075, n=24), of=grain)
-            m.add(bevelled((-0.075, 0.0, -0.03), (0.075, 0.08, 0.03), 0.002), of=grain)
+            m.rod(0, 0.08, (-0.03, 0.03), 0.075, n=24, of=grain)
+            m.box(0.15, 0.08, 0.06, 0.002, of=grain)
             with m.moved(at=(0, 0.085, 0.0125)):
                 clock_face(m, 0.05, material)
         case 11:  # a radio with its display
-            m.add(bevelled((-0.12, 0.004, -0.05), (0.12, 0.11, 0.05), 0.01),
-                of=m.pick(grain, material))  # fmt: skip
-            m.add(bevelled((-0.11, 0.02, 0.049), (0.02, 0.1, 0.053), 0.002),
-                of=plain("grille", (0.2, 0.2, 0.21), 0.9))  # fmt: skip
-            m.add(slab((0.035, 0.06, 0.05), (0.11, 0.1, 0.0506)),
-                of=plain("display", (0.05, 0.06, 0.05), 0.1))  # fmt: skip
-            m.add(revolve([(0, 0), (0.016, 0), (0.014, 0.012), (0, 0.013)], n=16),
-                turn=LYING_ALONG_Z, at=(0.072, 0.035, 0.0495), of=m.metal)  # fmt: skip
+            m.box(0.24, (0.004, 0.11), 0.1, 0.01, of=m.pick(grain, material))
+            m.box((-0.11, 0.02), (0.02, 0.1), (0.049, 0.053), 0.002,
+                of=plain("grille", (0.2, 0.2, 0.21), 0.9))
+            m.box((0.035, 0.11), (0.06, 0.1), (0.05, 0.0506), of=plain("display",
+                (0.05, 0.06, 0.05), 0.1))
+            m.revolve([(0, 0), (0.016, 0), (0.014, 0.012), (0, 0.013)], turn=LYING_ALONG_Z,
+                at=(0.072, 0.035, 0.0495), of=m.metal)
             for x, z in product((-0.1, 0.1), (-0.035, 0.035)):
-                m.add(tube([(x, 0, z), (x, 0.006, z)], 0.008, n=8),
-                    of=plain("foot", (0.1, 0.1, 0.1), 0.8))  # fmt: skip
+                m.rod(x, (0, 0.006), z, 0.008, of=plain("foot", (0.1, 0.1, 0.1), 0.8))
         case 12:  # a slice of stone or glass
-            m.add(bevelled((-0.08, 0.0, -0.012), (0.08, 0.11, 0.012), 0.003),
-                of=m.pick(glass((0.85, 0.93, 0.92), 0.35), plain("slate", (0.2, 0.21, 0.22), 0.7)))  # fmt: skip
+            m.box(0.16, 0.11, 0.024, 0.003, of=m.pick(glass((0.85, 0.93, 0.92), 0.35),
+                plain("slate", (0.2, 0.21, 0.22), 0.7)))
             with m.moved(at=(0, 0.06, -0.0055)):
                 clock_face(m, 0.04, m.metal)
-            m.add(bevelled((-0.06, 0.0, -0.04), (0.06, 0.01, 0.04), 0.002), of=m.metal)
+            m.box(0.12, 0.01, 0.08, 0.002, of=m.metal)
 
 
 def clock_face(m: Maker, r: float, material: Material) -> None:
     """A case, a dial and two hands, facing +z about the origin."""
-    m.add(revolve([(0, -0.02), (r * 0.9, -0.02), (r, 0), (r * 0.9, 0.02), (r * 0.85, 0.021),
-        (0, 0.021)], n=24), turn=LYING_ALONG_Z, of=material)  # fmt: skip
-    m.add(revolve([(0, 0.0211), (r * 0.8, 0.0211), (0, 0.022)], n=24), turn=LYING_ALONG_Z,
-        of=plain("dial", m.pick((0.93, 0.93, 0.9), (0.9, 0.86, 0.76), (0.1, 0.1, 0.1)), 0.5))  # fmt: skip
+    m.revolve([(0, -0.02), (r * 0.9, -0.02), (r, 0), (r * 0.9, 0.02), (r * 0.85, 0.021),
+        (0, 0.021)], n=24, turn=LYING_ALONG_Z, of=material)
+    m.revolve([(0, 0.0211), (r * 0.8, 0.0211), (0, 0.022)], n=24, turn=LYING_ALONG_Z,
+        of=plain("dial", m.pick((0.93, 0.93, 0.9), (0.9, 0.86, 0.76), (0.1, 0.1, 0.1)), 0.5))
     for long in (0.45, 0.7):
-        m.add(slab((-0.0015, -0.005, 0.0222), (0.0015, long * r, 0.0228)),
-            turn=rotation_z(m.uniform(0, 6)), of=plain("hand",
-            (0.3, 0.1, 0.08) if m.chance(0.2) else (0.25, 0.25, 0.26), 0.4))  # fmt: skip
+        m.box(0.003, (-0.005, long * r), (0.0222, 0.0228), turn=rotation_z(m.uniform(0, 6)),
+            of=plain("hand", (0.3, 0.1, 0.08) if m.chance(0.2) else (0.25, 0.25, 0.26), 0.4))

@@ -73,28 +73,38 @@ def sheet(grid: F64, thick: float) -> Surface:
     rows, columns = grid.shape[:2]
     upper, lower = grid + normal * thick / 2, grid - normal * thick / 2
     i = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
-    first = np.concatenate([
-        np.stack([i, i + 1, i + columns + 1], -1), np.stack([i, i + columns + 1, i + columns], -1),
-    ])  # fmt: skip
+    first = np.concatenate(
+        [np.stack([i, i + 1, i + columns + 1], -1), np.stack([i, i + columns + 1, i + columns], -1)]
+    )
     n = rows * columns
     last = n - columns
-    rim = np.concatenate([
-        np.arange(columns - 1), np.arange(rows - 1) * columns + columns - 1,
-        last + np.arange(columns - 1, 0, -1), np.arange(rows - 1, 0, -1) * columns,
-    ])  # fmt: skip
+    rim = np.concatenate(
+        [
+            np.arange(columns - 1),
+            np.arange(rows - 1) * columns + columns - 1,
+            last + np.arange(columns - 1, 0, -1),
+            np.arange(rows - 1, 0, -1) * columns,
+        ]
+    )
     after = np.roll(rim, -1)
-    sides = np.concatenate([
-        np.stack([rim, rim + n, after + n], -1), np.stack([rim, after + n, after], -1),
-    ])  # fmt: skip
+    sides = np.concatenate(
+        [np.stack([rim, rim + n, after + n], -1), np.stack([rim, after + n, after], -1)]
+    )
     points = np.concatenate([upper.reshape(-1, 3), lower.reshape(-1, 3)])
     faces = np.concatenate([first, first[:, ::-1] + n, sides])
     return creased("sheet", points, faces, np.radians(75))
 
 
 def draped(
-    w: float, d: float, drop: float, thick: float, *, folds: float = 0.012, wave: float = 1.0,
+    w: float,
+    d: float,
+    drop: float,
+    thick: float,
+    *,
+    folds: float = 0.012,
+    wave: float = 1.0,
     n: int = 14,
-) -> Surface:  # fmt: skip
+) -> Surface:
     """A cover over the left, right and front edge of what is w wide and d deep about the origin.
 
     Its top is at y = 0, drop hangs down; folds: how deep they are at the hem; wave: how many.
@@ -137,9 +147,14 @@ def tub(w: float, d: float, y: float, low: float, high: float, t: float, *, n: i
         mid = (outer + inner) / 2
         e = min(0.35 * t, 0.2 * (tall - y))
         lifted = [
-            (outer, y), (outer, tall - e), (outer * 0.75 + mid * 0.25, tall - 0.3 * e), (mid, tall),
-            (inner * 0.75 + mid * 0.25, tall - 0.3 * e), (inner, tall - e), (inner, y),
-        ]  # fmt: skip
+            (outer, y),
+            (outer, tall - e),
+            (outer * 0.75 + mid * 0.25, tall - 0.3 * e),
+            (mid, tall),
+            (inner * 0.75 + mid * 0.25, tall - 0.3 * e),
+            (inner, tall - e),
+            (inner, y),
+        ]
         rings.append(np.array([p + np.array([0.0, h, 0.0]) for p, h in lifted]))
     places = np.stack(rings)
     k = places.shape[1]
@@ -161,12 +176,20 @@ def chair_shell(w: float, d: float, seat: float, high: float, thick: float) -> S
     rows, columns = 15, 9
     u = np.linspace(-1, 1, columns)
     # Along: from the front edge down over the seat and up the back.
-    z = np.r_[d / 2 - 0.01, np.linspace(d / 2 - 0.04, -d / 2 + 0.16, 6), -d / 2 + 0.1,
-              np.linspace(-d / 2 + 0.065, -d / 2 + thick / 2 + 0.003, 7)]  # fmt: skip
+    z = np.r_[
+        d / 2 - 0.01,
+        np.linspace(d / 2 - 0.04, -d / 2 + 0.16, 6),
+        -d / 2 + 0.1,
+        np.linspace(-d / 2 + 0.065, -d / 2 + thick / 2 + 0.003, 7),
+    ]
     top = high - thick / 2 - 0.002
     low = seat - thick / 2
-    y = np.r_[low - 0.025, np.full(6, low) - 0.012 * np.sin(np.linspace(0, np.pi, 6)), low + 0.03,
-              np.linspace(low + 0.09, top, 7)]  # fmt: skip
+    y = np.r_[
+        low - 0.025,
+        np.full(6, low) - 0.012 * np.sin(np.linspace(0, np.pi, 6)),
+        low + 0.03,
+        np.linspace(low + 0.09, top, 7),
+    ]
     half = w / 2 - thick / 2 - 0.001
     taper = np.r_[0.86, 0.93, np.ones(7), np.linspace(0.99, 0.72, 6)]
     grid = np.empty((rows, columns, 3))

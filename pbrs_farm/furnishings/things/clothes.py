@@ -9,20 +9,13 @@ import numpy as np
 from pbrs_farm.core.classes import BAG, CLOTHES
 from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import Surface
-from pbrs_farm.furnishings.things.bodies import (
-    bevelled,
-    loft,
-    revolve,
-    rounded,
-    slab,
-    stretched,
-    tube,
-)
+from pbrs_farm.furnishings.things.bodies import revolve, stretched
 from pbrs_farm.furnishings.things.boxes import tray
-from pbrs_farm.furnishings.things.cloth import bulged
 from pbrs_farm.furnishings.things.maker import Maker, thing
 from pbrs_farm.furnishings.things.materials import plain
 from pbrs_farm.furnishings.things.outlines import bent, oval, rect, rings, spaced
+
+# fmt: off
 
 
 @thing(group="shoes", nyu40=CLOTHES)
@@ -33,7 +26,7 @@ def shoes(m: Maker) -> None:
     """
     form, size_of = m.integers(0, 9), m.uniform(0.92, 1.08)
     upper = plain("shoe", m.any_colour() if m.chance(0.5) else m.pick((0.14, 0.11, 0.1),
-        (0.06, 0.06, 0.065), (0.35, 0.22, 0.13)), 0.6)  # fmt: skip
+        (0.06, 0.06, 0.065), (0.35, 0.22, 0.13)), 0.6)
     sole = plain("sole", (0.85, 0.84, 0.8) if m.chance(0.5) else (0.1, 0.09, 0.08), 0.8)
     dome = revolve([(0, 0), (0.48, 0), (0.47, 0.3), (0.4, 0.65), (0.25, 0.9), (0, 1)], n=14)
     foot = revolve([(0, 0), (0.5, 0), (0.52, 0.6), (0.5, 1), (0, 1)], n=14)
@@ -48,111 +41,102 @@ def shoes(m: Maker) -> None:
             match form:
                 case 0 | 4 | 6 | 8:  # low, with laces
                     m.add(raised_heel(stretched(dome, (wide * 0.97, 0.085 * q, long))),
-                        at=(0, y, 0), of=upper)  # fmt: skip
+                        at=(0, y, 0), of=upper)
                     for k in range(4):
                         if form in (4, 8):
-                            m.add(tube([(-0.018, y + 0.052 * q - 0.006 * k, 0.012 + 0.02 * k),
-                                (0.018, y + 0.052 * q - 0.006 * k, 0.012 + 0.02 * k)], 0.0035, n=5),
-                                of=sole)  # fmt: skip
+                            m.rod((-0.018, 0.018), y + 0.052 * q - 0.006 * k, 0.012 + 0.02 * k,
+                                0.0035, n=5, of=sole)
                     if form == 8:
-                        m.add(bevelled((-0.02, y + 0.03, -long / 2 + 0.002),
-                            (0.02, y + 0.09, -long / 2 + 0.012), 0.002), of=sole)  # fmt: skip
+                        m.box(0.04, 0.06, 0.01, 0.002, on=y + 0.03, z=0.007 - long / 2, of=sole)
                 case 1 | 2:  # boots
                     m.add(raised_heel(stretched(dome, (wide * 0.97, 0.08 * q, long))), at=(0, y, 0),
-                        of=upper)  # fmt: skip
+                        of=upper)
                     h = 0.15 if form == 1 else 0.32
-                    m.add(loft([(oval(0.075, 0.1, z=-0.07), 0.03),
-                        (oval(0.078, 0.1, z=-0.075), 0.5 * h), (oval(0.095, 0.12, z=-0.075), h),
-                        (oval(0.085, 0.11, z=-0.075), h), (oval(0.07, 0.09, z=-0.075), 0.55 * h)]),
-                        of=upper)  # fmt: skip
+                    m.loft([(oval(0.075, 0.1, z=-0.07), 0.03), (oval(0.078, 0.1, z=-0.075),
+                        0.5 * h), (oval(0.095, 0.12, z=-0.075), h),
+                        (oval(0.085, 0.11, z=-0.075), h), (oval(0.07, 0.09, z=-0.075), 0.55 * h)],
+                        of=upper)
                 case 3:  # slippers
                     m.add(stretched(dome, (wide * 0.98, 0.06 * q, 0.16 * q)), at=(0, y, 0.05 * q),
-                        of=upper)  # fmt: skip
-                    m.add(bulged((wide * 0.9, 0.014, long * 0.9), n=5, edge=0.6, bulge=4.0),
-                        at=(0, y + 0.004, 0), of=plain("lining", (0.85, 0.82, 0.76), 0.98))  # fmt: skip
+                        of=upper)
+                    m.bulged((wide * 0.9, 0.014, long * 0.9), n=5, edge=0.6, bulge=4.0,
+                        at=(0, y + 0.004, 0), of=plain("lining", (0.85, 0.82, 0.76), 0.98))
                 case 5:  # heels
-                    m.add(loft([(oval(0.07, 0.13, z=0.06), 0.0), (oval(0.075, 0.13, z=0.06), 0.012),
-                        (oval(0.06, 0.11, z=0.05), 0.035), (oval(0.03, 0.06, z=0.04), 0.04)]),
-                        of=upper)  # fmt: skip
-                    m.add(tube([(0, 0.02, 0.02), (0, 0.075, -0.085)], 0.022, n=8), of=upper)
-                    m.add(tube([(0, 0, -0.1), (0, 0.085, -0.095)], 0.006, n=7, end=0.02), of=upper)
-                    m.add(loft(rings(oval, [(0.05, 0.06, 0.07), (0.055, 0.065, 0.12),
-                        (0.049, 0.059, 0.12), (0.044, 0.054, 0.08)], z=-0.09)), of=upper)  # fmt: skip
+                    m.loft([(oval(0.07, 0.13, z=0.06), 0.0), (oval(0.075, 0.13, z=0.06), 0.012),
+                        (oval(0.06, 0.11, z=0.05), 0.035), (oval(0.03, 0.06, z=0.04), 0.04)],
+                        of=upper)
+                    m.tube([(0, 0.02, 0.02), (0, 0.075, -0.085)], 0.022, of=upper)
+                    m.tube([(0, 0, -0.1), (0, 0.085, -0.095)], 0.006, n=7, end=0.02, of=upper)
+                    m.loft(rings(oval, [(0.05, 0.06, 0.07), (0.055, 0.065, 0.12),
+                        (0.049, 0.059, 0.12), (0.044, 0.054, 0.08)], z=-0.09), of=upper)
                 case 7:  # sandals
-                    m.add(bulged((wide * 0.92, 0.012, long * 0.94), n=5, edge=0.6, bulge=4.0),
-                        at=(0, y + 0.003, 0), of=plain("footbed", (0.55, 0.4, 0.27), 0.9))  # fmt: skip
+                    m.bulged((wide * 0.92, 0.012, long * 0.94), n=5, edge=0.6, bulge=4.0,
+                        at=(0, y + 0.003, 0), of=plain("footbed", (0.55, 0.4, 0.27), 0.9))
                     for z in (-0.01, 0.06):
-                        m.add(tube(bent([(-wide * 0.48, y, z * q), (-wide * 0.4, y + 0.045, z * q),
+                        m.tube(bent([(-wide * 0.48, y, z * q), (-wide * 0.4, y + 0.045, z * q),
                             (wide * 0.4, y + 0.045, z * q), (wide * 0.48, y, z * q)], 0.03, n=3),
-                            0.009, n=6), of=upper)  # fmt: skip
+                            0.009, n=6, of=upper)
 
 
 @thing(group="bag", nyu40=BAG, called="shopping_bag")
 def bag(m: Maker) -> None:
     """A bag: for shopping, of paper, a tote, a rucksack, a handbag, a sports bag."""
     form, w, h, d, t = (m.integers(0, 7), m.uniform(0.3, 0.4), m.uniform(0.28, 0.38),
-        m.uniform(0.1, 0.14), 0.004)  # fmt: skip
+        m.uniform(0.1, 0.14), 0.004)
     material, trim = (plain("bag", m.any_colour(), 0.85), plain("strap",
-        m.pick((0.35, 0.22, 0.13), (0.1, 0.1, 0.1)), 0.7))  # fmt: skip
+        m.pick((0.35, 0.22, 0.13), (0.1, 0.1, 0.1)), 0.7))
     match form:
         case 0 | 1:  # for shopping, of cloth or paper
             with m.of(material if form == 0 else plain("paper bag", (0.66, 0.5, 0.33), 0.9)):
                 tray(m, w, h, d, t)
                 for z in (-d / 2, d / 2 - t):
                     if form == 0:
-                        for x in (-0.075, 0.063):
-                            m.add(slab((x, h, z), (x + 0.012, h + 0.11, z + t)))
-                        m.add(slab((-0.075, h + 0.11, z), (0.075, h + 0.122, z + t)))
+                        m.box(0.012, 0.11, t, left=-0.075, on=h, against=z, mirrored="x")
+                        m.box(0.15, 0.012, t, on=h + 0.11, against=z)
                     else:
-                        m.add(tube(bent([(-0.06, h - 0.01, z + t / 2), (-0.05, h + 0.09, z + t / 2),
+                        m.tube(bent([(-0.06, h - 0.01, z + t / 2), (-0.05, h + 0.09, z + t / 2),
                             (0.05, h + 0.09, z + t / 2), (0.06, h - 0.01, z + t / 2)], 0.03, n=3),
-                            0.004, n=5))  # fmt: skip
+                            0.004, n=5)
         case 2:  # a tote of cloth that leans in on itself
-            m.add(loft([(oval(w * 0.8, d * 1.3, n=22, power=3.0), 0),
+            m.loft([(oval(w * 0.8, d * 1.3, n=22, power=3.0), 0),
                 (oval(w, d * 1.2, n=22, power=3.0), 0.05), (oval(w, d, n=22, power=2.6), h * 0.7),
                 (oval(w * 1.02, d * 0.8, n=22), h), (oval(w * 1.0, d * 0.72, n=22), h),
                 (oval(w * 0.96, d * 0.9, n=22, power=2.6), h * 0.65),
-                (oval(w * 0.8, d * 1.1, n=22), 0.03)]), of=material)  # fmt: skip
+                (oval(w * 0.8, d * 1.1, n=22), 0.03)], of=material)
             for z in (-1.0, 1.0):
-                m.add(tube(bent([(-0.07, h - 0.04, z * d * 0.38), (-0.06, h + 0.16, z * d * 0.3),
+                m.tube(bent([(-0.07, h - 0.04, z * d * 0.38), (-0.06, h + 0.16, z * d * 0.3),
                     (0.06, h + 0.16, z * d * 0.3), (0.07, h - 0.04, z * d * 0.38)], 0.05, n=3),
-                    0.007, n=6), of=trim)  # fmt: skip
+                    0.007, n=6, of=trim)
         case 3 | 4:  # a rucksack
             h, w = h * 1.15, w * 0.85
-            m.add(rounded((-w / 2, 0, -0.08), (w / 2, h, 0.08), 0.06, n=2), of=material)
-            m.add(rounded((-w * 0.36, 0.03, 0.07), (w * 0.36, h * 0.5, 0.12), 0.03, n=2),
-                of=material if form == 3 else plain("pocket", m.any_colour(), 0.85))  # fmt: skip
+            m.rounded(w, h, 0.16, 0.06, of=material)
+            m.rounded(0.72 * w, (0.03, h * 0.5), (0.07, 0.12), 0.03,
+                of=material if form == 3 else plain("pocket", m.any_colour(), 0.85))
             for x in (-1.0, 1.0):
-                m.add(tube(bent([(x * w * 0.22, h * 0.93, -0.075), (x * w * 0.25, h * 0.8, -0.12),
+                m.tube(bent([(x * w * 0.22, h * 0.93, -0.075), (x * w * 0.25, h * 0.8, -0.12),
                     (x * w * 0.3, h * 0.3, -0.12), (x * w * 0.36, 0.04, -0.07)], 0.06, n=3), 0.014,
-                    n=6), of=trim)  # fmt: skip
-            m.add(tube(bent([(-0.03, h - 0.02, -0.05), (-0.025, h + 0.04, -0.05),
-                (0.025, h + 0.04, -0.05), (0.03, h - 0.02, -0.05)], 0.02, n=3), 0.006, n=6),
-                of=trim)  # fmt: skip
+                    n=6, of=trim)
+            m.tube(bent([(-0.03, h - 0.02, -0.05), (-0.025, h + 0.04, -0.05),
+                (0.025, h + 0.04, -0.05), (0.03, h - 0.02, -0.05)], 0.02, n=3), 0.006, n=6, of=trim)
             if form == 4:
-                m.add(rounded((-w * 0.44, h * 0.6, -0.02), (w * 0.44, h + 0.006, 0.092), 0.04, n=2),
-                    of=material)  # fmt: skip
-            m.add(slab((-0.01, h * 0.44, 0.118), (0.01, h * 0.56, 0.123)), of=trim)
+                m.rounded(0.88 * w, (h * 0.6, h + 0.006), 0.112, 0.04, z=0.036, of=material)
+            m.box(0.02, (h * 0.44, h * 0.56), (0.118, 0.123), of=trim)
         case 5:  # a handbag
             leather_of = plain("leather", m.pick((0.14, 0.1, 0.09), (0.42, 0.24, 0.14),
-                (0.6, 0.4, 0.25), m.any_colour()), 0.5)  # fmt: skip
-            m.add(loft(rings(rect, [(w * 0.75, d, 0.02, 0), (w * 0.78, d, 0.03, 0.03),
-                (w * 0.62, d * 0.35, 0.02, h * 0.62)])), of=leather_of)  # fmt: skip
-            m.add(tube(bent([(-w * 0.2, h * 0.6, 0), (-w * 0.18, h * 0.95, 0),
-                (w * 0.18, h * 0.95, 0), (w * 0.2, h * 0.6, 0)], 0.06, n=4), 0.008, n=7),
-                of=leather_of)  # fmt: skip
-            m.add(bevelled((-0.02, h * 0.42, d * 0.24), (0.02, h * 0.5, d * 0.32), 0.002),
-                of=m.metal)  # fmt: skip
+                (0.6, 0.4, 0.25), m.any_colour()), 0.5)
+            m.loft(rings(rect, [(w * 0.75, d, 0.02, 0), (w * 0.78, d, 0.03, 0.03),
+                (w * 0.62, d * 0.35, 0.02, h * 0.62)]), of=leather_of)
+            m.tube(bent([(-w * 0.2, h * 0.6, 0), (-w * 0.18, h * 0.95, 0), (w * 0.18, h * 0.95, 0),
+                (w * 0.2, h * 0.6, 0)], 0.06, n=4), 0.008, n=7, of=leather_of)
+            m.box(0.04, (h * 0.42, h * 0.5), (d * 0.24, d * 0.32), 0.002, of=m.metal)
         case 6:  # a bag for sports
             r = m.uniform(0.11, 0.14)
-            m.add(tube([(-0.22, r, 0), (-0.21, r, 0), (0.21, r, 0), (0.22, r, 0)], r, n=18),
-                of=material)  # fmt: skip
+            m.tube([(-0.22, r, 0), (-0.21, r, 0), (0.21, r, 0), (0.22, r, 0)], r, n=18, of=material)
             for x in (-0.11, 0.11):
-                m.add(tube([(x - 0.012, r, 0), (x + 0.012, r, 0)], r + 0.003, n=18), of=trim)
+                m.rod((x - 0.012, x + 0.012), r, 0, r + 0.003, n=18, of=trim)
             for z in (-0.05, 0.05):
-                m.add(tube(bent([(-0.11, 1.85 * r, z), (-0.08, 2.6 * r, z * 0.4),
-                    (0.08, 2.6 * r, z * 0.4), (0.11, 1.85 * r, z)], 0.05, n=3), 0.007, n=6),
-                    of=trim)  # fmt: skip
+                m.tube(bent([(-0.11, 1.85 * r, z), (-0.08, 2.6 * r, z * 0.4),
+                    (0.08, 2.6 * r, z * 0.4), (0.11, 1.85 * r, z)], 0.05, n=3), 0.007, n=6, of=trim)
 
 
 @thing(group="bag", nyu40=BAG)
@@ -161,19 +145,19 @@ def suitcase(m: Maker) -> None:
     w, h, d = m.uniform(0.38, 0.5), m.uniform(0.52, 0.7), m.uniform(0.2, 0.28)
     hd = d / 2
     usual = m.chance(0.6)
-    colour = m.pick((0.08, 0.08, 0.09), (0.12, 0.16, 0.25),
-        (0.3, 0.3, 0.31)) if usual else m.any_colour()  # fmt: skip
+    colour = (m.pick((0.08, 0.08, 0.09), (0.12, 0.16, 0.25),
+        (0.3, 0.3, 0.31)) if usual else m.any_colour())
     shell, black = plain("suitcase", colour, 0.45), plain("rubber", (0.05, 0.05, 0.05), 0.7)
     # Ribs along the front, a handle, four wheels.
     with m.of(shell):
-        m.add(slab((-w / 2, 0.04, -hd), (w / 2, h, hd)))
+        m.box(w, (0.04, h), d)
         for t in spaced(-0.38, 0.38, 5):
-            m.add(slab((t * w - 0.012, 0.07, hd), (t * w + 0.012, h - 0.04, hd + 0.006)))
+            m.box(0.024, (0.07, h - 0.04), 0.006, x=t * w, against=hd)
     for x in (-0.06, 0.05):
-        m.add(slab((x, h, -0.012), (x + 0.012, h + 0.035, 0.012)), of=m.metal)
-    m.add(slab((-0.06, h + 0.035, -0.014), (0.062, h + 0.05, 0.014)), of=black)
+        m.box(0.012, 0.035, 0.024, left=x, on=h, of=m.metal)
+    m.box(0.122, 0.015, 0.028, x=0.001, on=h + 0.035, of=black)
     for x, z in product((-w / 2 + 0.03, w / 2 - 0.05), (-hd + 0.01, hd - 0.03)):
-        m.add(slab((x, 0.0, z), (x + 0.02, 0.04, z + 0.02)), of=black)
+        m.box(0.02, 0.04, 0.02, left=x, against=z, of=black)
 
 
 def raised_heel(shoe: Surface) -> Surface:

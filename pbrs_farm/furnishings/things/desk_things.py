@@ -9,45 +9,37 @@ from numpy import pi
 from pbrs_farm.core.classes import BOOKS, PAPER
 from pbrs_farm.core.frames import LYING_ALONG_X, LYING_ALONG_Z, rotation_x, rotation_y, rotation_z
 from pbrs_farm.dress.style import shade
-from pbrs_farm.furnishings.things.bodies import (
-    bevelled,
-    cylinder,
-    frustum,
-    revolve,
-    rounded,
-    slab,
-    sphere,
-    stretched,
-    tube,
-    vessel,
-)
+from pbrs_farm.furnishings.things.bodies import sphere, stretched
 from pbrs_farm.furnishings.things.maker import Maker, thing
 from pbrs_farm.furnishings.things.materials import BLACK_GLASS, BLACK_STEEL, CHROME, STEEL, plain
+
+# fmt: off
 
 
 @thing(group="monitor")
 def monitor(m: Maker) -> None:
     """A screen on its foot before a keyboard and a mouse."""
-    w, h, black = (m.uniform(0.5, 0.64), m.uniform(0.3, 0.37), plain("monitor",
-        m.pick((0.06, 0.06, 0.065), (0.6, 0.6, 0.61), (0.9, 0.9, 0.89)), 0.4))  # fmt: skip
+    w, h, black = (m.uniform(0.5, 0.64), m.uniform(0.3, 0.37),
+        plain("monitor", m.pick((0.06, 0.06, 0.065), (0.6, 0.6, 0.61), (0.9, 0.9, 0.89)), 0.4))
     y = m.uniform(0.08, 0.14)
-    m.add(bevelled((-w / 2, y, -0.05), (w / 2, y + h, -0.02), 0.004), of=black)
-    m.add(slab((-w / 2 + 0.008, y + 0.014, -0.02), (w / 2 - 0.008, y + h - 0.008, -0.0192)),
-        of=plain("screen", (0.02, 0.02, 0.025), 0.08))  # fmt: skip
+    m.box(w, h, 0.03, 0.004, on=y, against=-0.05, of=black)
+    m.box(w - 0.016, (y + 0.014, y + h - 0.008), 0.0008, against=-0.02,
+        of=plain("screen", (0.02, 0.02, 0.025), 0.08))
     if m.chance(0.5):
-        m.add(bevelled((-0.12, 0.0, -0.14), (0.12, 0.012, 0.04), 0.003), of=black)
-        m.add(bevelled((-0.025, 0.01, -0.075), (0.025, y + 0.12, -0.0505), 0.003), of=black)
+        m.box(0.24, 0.012, (-0.14, 0.04), 0.003, of=black)
+        m.box(0.05, (0.01, y + 0.12), 0.0245, 0.003, against=-0.075, of=black)
     else:
         for s in (-1.0, 1.0):
-            m.add(tube([(s * 0.16, 0.008, 0.02), (0, 0.03, -0.06)], 0.008, n=8), of=black)
-        m.add(tube([(0, 0.03, -0.06), (0, y + 0.1, -0.056)], 0.016, n=10), of=black)
+            m.tube([(s * 0.16, 0.008, 0.02), (0, 0.03, -0.06)], 0.008, of=black)
+        m.tube([(0, 0.03, -0.06), (0, y + 0.1, -0.056)], 0.016, n=10, of=black)
     keys = plain("keys", m.pick((0.1, 0.1, 0.1), (0.88, 0.88, 0.87)), 0.6)
-    m.add(bevelled((-0.21, 0, 0.1), (0.16, 0.016, 0.23), 0.004), of=black)
+    m.box((-0.21, 0.16), 0.016, (0.1, 0.23), 0.004, of=black)
     for i, k in product(range(4), range(12)):
-        m.add(slab((-0.2 + 0.0292 * k, 0.016, 0.108 + 0.0292 * i),
-            (-0.176 + 0.0292 * k, 0.02, 0.132 + 0.0292 * i)), of=keys)  # fmt: skip
+        m.box(
+            0.024, (0.016, 0.02), 0.024, x=0.0292 * k - 0.188, against=0.108 + 0.0292 * i, of=keys
+        )
     m.add(stretched(sphere((0, 0, 0), 1.0, n=12), (0.032, 0.018, 0.055)), at=(0.22, 0.018, 0.17),
-        of=black)  # fmt: skip
+        of=black)
 
 
 @thing(group="laptop")
@@ -57,16 +49,17 @@ def laptop(m: Maker) -> None:
     w, d = m.uniform(0.3, 0.36), m.uniform(0.21, 0.25)
     grey = m.pick(0.12, 0.62, 0.75)
     shell = plain("laptop", (grey, grey, grey * 1.01), 0.35)
-    m.add(slab((-w / 2, 0, -d / 2), (w / 2, 0.014, d / 2)), of=shell)
-    m.add(slab((-w * 0.44, 0.014, -d * 0.38), (w * 0.44, 0.0155, d * 0.08)),
-        of=plain("keys", (0.09, 0.09, 0.09), 0.6))  # fmt: skip
-    m.add(slab((-w * 0.15, 0.014, d * 0.16), (w * 0.15, 0.0145, d * 0.42)),
-        of=plain("pad", shade((grey, grey, grey), 0.85), 0.3))  # fmt: skip
+    m.box(w, 0.014, d, of=shell)
+    m.box(
+        0.88 * w, (0.014, 0.0155), (-d * 0.38, d * 0.08), of=plain("keys", (0.09, 0.09, 0.09), 0.6)
+    )
+    m.box(0.3 * w, (0.014, 0.0145), (d * 0.16, d * 0.42), of=plain("pad",
+        shade((grey, grey, grey), 0.85), 0.3))
     # Lid and screen are open by 105 degrees about the hinge at the back.
     lean = rotation_x(-m.uniform(0.15, 0.4))
-    m.add(slab((-w / 2, 0, -0.006), (w / 2, d, 0)), turn=lean, at=(0, 0.0142, -d / 2), of=shell)
-    m.add(slab((-w * 0.47, d * 0.06, 0), (w * 0.47, d * 0.96, 0.0006)), turn=lean,
-        at=(0, 0.0142, -d / 2), of=plain("screen", (0.02, 0.02, 0.025), 0.08))  # fmt: skip
+    m.box(w, d, (-0.006, 0), turn=lean, at=(0, 0.0142, -d / 2), of=shell)
+    m.box(0.94 * w, (d * 0.06, d * 0.96), (0, 0.0006), turn=lean, at=(0, 0.0142, -d / 2),
+        of=plain("screen", (0.02, 0.02, 0.025), 0.08))
 
 
 @thing(group="newspaper", nyu40=PAPER)
@@ -76,62 +69,55 @@ def papers(m: Maker) -> None:
     for _k in range(m.integers(2, 6)):
         thick, white = m.uniform(0.0006, 0.005), m.uniform(0.85, 0.94)
         # Sheets of A4, turned a little against each other.
-        m.add(slab((-0.105, 0, -0.1485), (0.105, thick, 0.1485)), at=(m.uniform(-0.012, 0.012), y,
-            m.uniform(-0.012, 0.012)), turn=rotation_y(m.normal(0, 0.1)), of=plain("paper",
-            (round(white, 2), round(white, 2), round(white * 0.98, 2)), 0.9))  # fmt: skip
+        m.box(0.21, thick, 0.297, at=(m.uniform(-0.012, 0.012), y, m.uniform(-0.012, 0.012)),
+            turn=rotation_y(m.normal(0, 0.1)), of=plain("paper",
+            (round(white, 2), round(white, 2), round(white * 0.98, 2)), 0.9))
         y += thick + 0.0002
 
 
 @thing(group="office_small", nyu40=PAPER)
 def notebook(m: Maker) -> None:
     """A notebook with a pen on it."""
-    m.add(slab((-0.075, 0, -0.105), (0.075, 0.014, 0.105)),
-        of=plain("notebook", m.any_colour(), 0.6))  # fmt: skip
+    m.box(0.15, 0.014, 0.21, of=plain("notebook", m.any_colour(), 0.6))
     # The pages stand out of the cover by up to 1 mm, on all sides but the spine's.
-    m.add(slab((-0.073, 0.003, -0.106), (0.0755, 0.011, 0.106)),
-        of=plain("pages", (0.9, 0.89, 0.84), 0.9))  # fmt: skip
+    m.box(0.1485, (0.003, 0.011), 0.212, x=0.00125, of=plain("pages", (0.9, 0.89, 0.84), 0.9))
     # An upright pen 14 cm long lies along x, its middle at the origin, and is then turned.
-    with (
-        m.moved(turn=rotation_y(m.uniform(-0.6, 0.6)), at=(0.01, 0.0142 + 0.0045, 0)),
-        m.of(plain("pen", m.pick((0.08, 0.1, 0.3), (0.05, 0.05, 0.05), (0.6, 0.1, 0.1)), 0.3)),
-    ):
-        m.add(revolve([(0, 0), (0.002, 0.002), (0.0045, 0.015), (0.0045, 0.138), (0, 0.14)], n=8),
-            turn=LYING_ALONG_X, at=(-0.07, 0, 0))  # fmt: skip
+    with (m.moved(turn=rotation_y(m.uniform(-0.6, 0.6)), at=(0.01, 0.0142 + 0.0045, 0)),
+        m.of(plain("pen", m.pick((0.08, 0.1, 0.3), (0.05, 0.05, 0.05), (0.6, 0.1, 0.1)), 0.3))):
+        m.revolve([(0, 0), (0.002, 0.002), (0.0045, 0.015), (0.0045, 0.138), (0, 0.14)], n=8,
+            turn=LYING_ALONG_X, at=(-0.07, 0, 0))
 
 
 @thing(group="office_small")
 def pen_pot(m: Maker) -> None:
     """A pot with pens."""
-    m.add(vessel([(0, 0), (0.04, 0), (0.04, 0.1)], 0.003), of=plain("pot", m.any_colour(), 0.5))
+    m.vessel([(0, 0), (0.04, 0), (0.04, 0.1)], 0.003, of=plain("pot", m.any_colour(), 0.5))
     # Up to six pens lean outwards round the pot, each 0.1 to 0.17 rad off the vertical.
     for k in range(m.integers(3, 7)):
         angle = 2 * pi * k / 6 + m.uniform(-0.2, 0.2)
         tilt = m.uniform(0.1, 0.17)
         with m.moved(turn=rotation_y(angle)), m.of(plain("pen", m.colour_within(0.1, 0.8), 0.4)):
-            m.add(revolve([(0, 0), (0.004, 0), (0.004, 0.15), (0, 0.156)], n=6),
-                turn=rotation_z(-tilt), at=(0.008, 0.0045, 0))  # fmt: skip
+            m.revolve([(0, 0), (0.004, 0), (0.004, 0.15), (0, 0.156)], n=6, turn=rotation_z(-tilt),
+                at=(0.008, 0.0045, 0))
 
 
 @thing(group="remote", called="remote_control")
 def remote(m: Maker) -> None:
     """A remote control."""
     grey = m.pick(0.05, 0.08, 0.5)
-    m.add(slab((-0.024, 0, -0.085), (0.024, 0.016, 0.085)),
-        of=plain("remote", (grey, grey, grey), 0.45))  # fmt: skip
+    m.box(0.048, 0.016, 0.17, of=plain("remote", (grey, grey, grey), 0.45))
     # Keys in three columns and five rows on its upper side.
     for x, z in product((-0.013, 0.0, 0.013), (-0.06, -0.035, -0.015, 0.005, 0.03)):
-        m.add(slab((x - 0.005, 0.016, z - 0.004), (x + 0.005, 0.0175, z + 0.004)),
-            of=plain("keys", (0.35, 0.35, 0.36), 0.6))  # fmt: skip
+        m.box(0.01, (0.016, 0.0175), 0.008, x=x, z=z, of=plain("keys", (0.35, 0.35, 0.36), 0.6))
 
 
 @thing(group="phone")
 def phone(m: Maker) -> None:
     """A mobile phone, its screen up."""
-    m.add(slab((-0.036, 0, -0.075), (0.036, 0.0085, 0.075)), of=plain("phone",
-        m.pick((0.1, 0.1, 0.11), (0.8, 0.8, 0.8), (0.3, 0.35, 0.45)), 0.3))  # fmt: skip
+    m.box(0.072, 0.0085, 0.15, of=plain("phone", m.pick((0.1, 0.1, 0.11), (0.8, 0.8, 0.8),
+        (0.3, 0.35, 0.45)), 0.3))
     # The screen lies 0.3 mm proud of the shell.
-    m.add(slab((-0.0335, 0.0085, -0.0715), (0.0335, 0.0088, 0.0715)),
-        of=plain("screen", (0.02, 0.02, 0.025), 0.06))  # fmt: skip
+    m.box(0.067, (0.0085, 0.0088), 0.143, of=plain("screen", (0.02, 0.02, 0.025), 0.06))
 
 
 @thing(group="office_small", nyu40=BOOKS)
@@ -140,9 +126,9 @@ def binders(m: Maker) -> None:
     x, colour = 0.0, m.any_colour()
     for _k in range(m.integers(2, 5)):
         w = m.pick(0.05, 0.078)
-        m.add(slab((x, 0, -0.28), (x + w, 0.315, 0)), of=plain("binder", colour, 0.5))
-        m.add(slab((x + 0.008, 0.12, 0), (x + w - 0.008, 0.26, 0.0006)),
-            of=plain("label", (0.92, 0.92, 0.9), 0.8))  # fmt: skip
+        m.box(w, 0.315, (-0.28, 0), left=x, of=plain("binder", colour, 0.5))
+        m.box((x + 0.008, x + w - 0.008), (0.12, 0.26), (0, 0.0006),
+            of=plain("label", (0.92, 0.92, 0.9), 0.8))
         x += w + 0.0005
 
 
@@ -152,59 +138,57 @@ def electronics(m: Maker) -> None:
     form = m.integers(0, 5)
     shell = m.pick(plain("shell", (0.05, 0.05, 0.053), 0.45),
         plain("shell", (0.88, 0.88, 0.86), 0.45), plain("shell wood", m.wood, 0.5),
-        plain("shell", m.any_colour(), 0.5))  # fmt: skip
+        plain("shell", m.any_colour(), 0.5))
     black, mesh = (plain("black plastic", (0.03, 0.03, 0.032), 0.5),
-        plain("mesh", (0.12, 0.12, 0.125), 0.9))  # fmt: skip
+        plain("mesh", (0.12, 0.12, 0.125), 0.9))
     match form:
         case 0:
             m.name, w, h, d = ("loudspeaker", m.uniform(0.14, 0.19), m.uniform(0.22, 0.32),
-                m.uniform(0.16, 0.22))  # fmt: skip
-            m.add(bevelled((-w / 2, 0, -d / 2), (w / 2, h, d / 2), 0.004), of=shell)
+                m.uniform(0.16, 0.22))
+            m.box(w, h, d, 0.004, of=shell)
             for y, r in ((h * 0.34, w * 0.36), (h * 0.76, w * 0.2)):
-                m.add(cylinder(r, 0, 0.004, n=20), turn=LYING_ALONG_Z, at=(0, y, d / 2 - 0.002),
-                    of=mesh)  # fmt: skip
-                m.add(revolve([(0, 0), (r * 0.35, 0), (0, r * 0.22)], n=14), turn=LYING_ALONG_Z,
-                    at=(0, y, d / 2 + 0.0018), of=black)  # fmt: skip
+                m.cylinder(r, 0, 0.004, n=20, turn=LYING_ALONG_Z, at=(0, y, d / 2 - 0.002), of=mesh)
+                m.revolve([(0, 0), (r * 0.35, 0), (0, r * 0.22)], n=14, turn=LYING_ALONG_Z,
+                    at=(0, y, d / 2 + 0.0018), of=black)
         case 1:
             m.name, w, h = "radio", m.uniform(0.22, 0.3), m.uniform(0.13, 0.18)
-            m.add(rounded((-w / 2, 0.008, -0.05), (w / 2, h, 0.05), 0.018, n=3), of=shell)
-            for x in (-w / 2 + 0.04, w / 2 - 0.04):
-                m.add(bevelled((x - 0.012, 0, -0.035), (x + 0.012, 0.0085, 0.035), 0.002), of=black)
-            m.add(cylinder(h * 0.34, 0, 0.003, n=22), turn=LYING_ALONG_Z,
-                at=(-w / 4, h * 0.52, 0.0495), of=mesh)  # fmt: skip
-            m.add(slab((0.01, h * 0.55, 0.0495), (w / 2 - 0.03, h * 0.78, 0.051)),
-                of=plain("scale", (0.85, 0.8, 0.65), 0.4))  # fmt: skip
+            m.rounded(w, (0.008, h), 0.1, 0.018, n=3, of=shell)
+            m.box(0.024, 0.0085, 0.07, 0.002, left=0.028 - w / 2, mirrored="x", of=black)
+            m.cylinder(
+                h * 0.34, 0, 0.003, n=22, turn=LYING_ALONG_Z, at=(-w / 4, h * 0.52, 0.0495), of=mesh
+            )
+            m.box((0.01, w / 2 - 0.03), (h * 0.55, h * 0.78), (0.0495, 0.051),
+                of=plain("scale", (0.85, 0.8, 0.65), 0.4))
             for x in (0.035, w / 2 - 0.045):
-                m.add(frustum((0.016, 0), (0.014, 0.014), n=14), turn=LYING_ALONG_Z,
-                    at=(x, h * 0.28, 0.0495), of=m.pick(CHROME, black))  # fmt: skip
+                m.frustum((0.016, 0), (0.014, 0.014), n=14, turn=LYING_ALONG_Z,
+                    at=(x, h * 0.28, 0.0495), of=m.pick(CHROME, black))
             if m.chance(0.5):
-                m.add(tube([(w / 2 - 0.03, h - 0.01, -0.03), (w / 2 - 0.1, h + 0.2, -0.03)], 0.002,
-                    n=5), of=CHROME)  # fmt: skip
+                m.tube([(w / 2 - 0.03, h - 0.01, -0.03), (w / 2 - 0.1, h + 0.2, -0.03)], 0.002, n=5,
+                    of=CHROME)
         case 2:
             m.name, w = "router", m.uniform(0.17, 0.24)
-            m.add(bevelled((-w / 2, 0, -0.07), (w / 2, 0.032, 0.07), 0.005), of=shell)
+            m.box(w, 0.032, 0.14, 0.005, of=shell)
             for k in range(m.pick(2, 3, 4)):
-                m.add(tube([(-w / 2 + 0.03 + 0.045 * k, 0.02, -0.064),
-                    (-w / 2 + 0.03 + 0.05 * k, 0.17, -0.068)], 0.006, n=6), of=black)  # fmt: skip
+                m.tube([(-w / 2 + 0.03 + 0.045 * k, 0.02, -0.064),
+                    (-w / 2 + 0.03 + 0.05 * k, 0.17, -0.068)], 0.006, n=6, of=black)
             for k in range(5):
-                m.add(slab((-0.04 + 0.018 * k, 0.012, 0.07), (-0.035 + 0.018 * k, 0.017, 0.0706)),
-                    of=plain("lamp", (0.2, 0.75, 0.35), 0.3))  # fmt: skip
+                m.box(0.005, (0.012, 0.017), (0.07, 0.0706), x=0.018 * k - 0.0375,
+                    of=plain("lamp", (0.2, 0.75, 0.35), 0.3))
         case 3:
             m.name, w, d = "hifi", m.uniform(0.38, 0.44), m.uniform(0.28, 0.34)
-            m.add(bevelled((-w / 2, 0.012, -d / 2), (w / 2, 0.09, d / 2), 0.003),
-                of=m.pick(shell, STEEL, BLACK_STEEL))  # fmt: skip
-            m.add(slab((-w * 0.3, 0.055, d / 2), (w * 0.05, 0.08, d / 2 + 0.0008)), of=BLACK_GLASS)
+            m.box(w, (0.012, 0.09), d, 0.003, of=m.pick(shell, STEEL, BLACK_STEEL))
+            m.box((-w * 0.3, w * 0.05), (0.055, 0.08), 0.0008, against=d / 2, of=BLACK_GLASS)
             for x, r in ((w * 0.36, 0.024), (w * 0.2, 0.012), (w * 0.12, 0.012)):
-                m.add(frustum((r, 0), (r * 0.9, 0.018), n=18), turn=LYING_ALONG_Z,
-                    at=(x, 0.05, d / 2 - 0.001), of=CHROME)  # fmt: skip
-            for x, z in product((-w / 2 + 0.04, w / 2 - 0.04), (-d / 2 + 0.04, d / 2 - 0.04)):
-                m.add(cylinder(0.018, 0, 0.0125, n=12), at=(x, 0, z), of=black)
+                m.frustum((r, 0), (r * 0.9, 0.018), n=18, turn=LYING_ALONG_Z,
+                    at=(x, 0.05, d / 2 - 0.001), of=CHROME)
+            m.cylinder(0.018, 0, 0.0125, n=12, at=(-w / 2 + 0.04, 0, -d / 2 + 0.04), of=black,
+                mirrored="xz")
         case 4:
             m.name, w = "console", m.uniform(0.26, 0.3)
-            m.add(bevelled((-w / 2, 0, -0.12), (w / 2, 0.055, 0.06), 0.005), of=shell)
-            m.add(slab((-w / 2 + 0.04, 0.03, 0.06), (w / 2 - 0.1, 0.036, 0.0606)), of=black)
+            m.box(w, 0.055, (-0.12, 0.06), 0.005, of=shell)
+            m.box((-w / 2 + 0.04, w / 2 - 0.1), (0.03, 0.036), (0.06, 0.0606), of=black)
             m.add(stretched(sphere((0, 0, 0), 1.0, n=12), (0.07, 0.018, 0.035)),
-                at=(-0.02, 0.018, 0.13), of=black)  # fmt: skip
+                at=(-0.02, 0.018, 0.13), of=black)
             for x in (-0.09, 0.05):
                 m.add(stretched(sphere((0, 0, 0), 1.0, n=10), (0.02, 0.016, 0.035)),
-                    at=(x, 0.016, 0.145), of=black)  # fmt: skip
+                    at=(x, 0.016, 0.145), of=black)

@@ -49,9 +49,19 @@ VERSION: Final = 8
 
 # The order decides which piece a seed draws.
 _MODULES: Final = (
-    kitchen, bathroom, seating, tables, storage, beds, lamps, radiators, bins, chandeliers, plants,
+    kitchen,
+    bathroom,
+    seating,
+    tables,
+    storage,
+    beds,
+    lamps,
+    radiators,
+    bins,
+    chandeliers,
+    plants,
     fitted,
-)  # fmt: skip
+)
 
 _WARM: Final = (1.0, 0.79, 0.55)  # linear, of a lamp of about 3000 K
 _FLUX_LM: Final = 1000.0  # of a lamp; homes give it what their rooms need
@@ -144,11 +154,15 @@ def _piece(name: str, number: int) -> Piece:
     own = np.random.default_rng(keys.seed("family", "size", name, number))
     taste = style.name.replace(" ", "-")
     return Piece(
-        f"{GENERATED}{name}-{number:02d}-{taste}", family.called.replace("_", " ").capitalize(),
-        family.group, family.place, family.nyu40, family.size(own, style, *shared),
+        f"{GENERATED}{name}-{number:02d}-{taste}",
+        family.called.replace("_", " ").capitalize(),
+        family.group,
+        family.place,
+        family.nyu40,
+        family.size(own, style, *shared),
         ItemKind.LAMP if family.nyu40 == LAMP else ItemKind.OBJECT,
         of_set=f"{family.of_set.__name__} {number}" if family.of_set else "",
-    )  # fmt: skip
+    )
 
 
 def _sized(shape: Shape, piece: Piece) -> Shape:
@@ -191,9 +205,13 @@ def _lit(shape: Shape, piece: Piece) -> Shape:
     low, high = points.min(0), points.max(0)
     x, y, z = (float(v) for v in (low + high) / 2)
     light = LightPart(
-        (x, y, z), float((high - low).min()) / 2, _FLUX_LM, PowerUnit.LUMEN, rgb_linear=_WARM,
+        (x, y, z),
+        float((high - low).min()) / 2,
+        _FLUX_LM,
+        PowerUnit.LUMEN,
+        rgb_linear=_WARM,
         emitting=bulbs,
-    )  # fmt: skip
+    )
     return replace(shape, lights=(light,))
 
 

@@ -10,7 +10,6 @@ from typing import Final
 from pbrs_farm.core.catalogue import Place
 from pbrs_farm.core.classes import BOOKSHELF, CABINET
 from pbrs_farm.core.house import Material
-from pbrs_farm.furnishings.things.bodies import bevelled, frustum, revolve, slab
 from pbrs_farm.furnishings.things.joints import (
     Inside,
     Look,
@@ -20,7 +19,7 @@ from pbrs_farm.furnishings.things.joints import (
     pull,
     shelves,
 )
-from pbrs_farm.furnishings.things.maker import Maker, Pair, Size, family
+from pbrs_farm.furnishings.things.maker import Maker, Size, family
 from pbrs_farm.furnishings.things.materials import (
     BLACK_STEEL,
     CHROME,
@@ -31,6 +30,9 @@ from pbrs_farm.furnishings.things.materials import (
     WHITE_STEEL,
     glossy,
 )
+from pbrs_farm.furnishings.things.shapes import Pair
+
+# fmt: off
 
 _BOARD_M: Final = 0.018
 _BACK_M: Final = 0.008
@@ -48,16 +50,16 @@ def _filled_in(m: Maker, size: Size, front: float, foot: float, of: Material) ->
     w, d, h = size
     side, top = m.uniform(0.02, 0.05), m.uniform(0.02, 0.06)
     with m.of(of):
-        m.add(slab((-w / 2, 0.0, -d / 2), (w / 2, foot, front - 0.03)))
+        m.box(w, foot, (-d / 2, front - 0.03))
         for a, b in ((-w / 2, -w / 2 + side), (w / 2 - side, w / 2)):
-            m.add(bevelled((a, foot, front - 0.02), (b, h, front + 0.02), 0.001))
-        m.add(bevelled((-w / 2 + side, h - top, front - 0.02), (w / 2 - side, h, front + 0.02),
-            0.001))  # fmt: skip
+            m.box((a, b), (foot, h), 0.04, 0.001, z=front)
+        m.box(w - 2 * side, (h - top, h), 0.04, 0.001, z=front)
     return (-w / 2 + side, w / 2 - side), (foot, h - top)
 
 
-@family(group="fitted_wardrobe", nyu40=CABINET, place=Place.FLOOR, called="fitted_wardrobe", variants=36,
-    size=lambda m: (m.pick(1.5, 1.8, 2.1, 2.5, 2.9, 3.4, 3.9), m.pick(0.56, 0.6, 0.62), m.pick(2.4, 2.5, 2.6)))  # fmt: skip
+@family(group="fitted_wardrobe", nyu40=CABINET, place=Place.FLOOR, called="fitted_wardrobe",
+    variants=36, size=lambda m: (m.pick(1.5, 1.8, 2.1, 2.5, 2.9, 3.4, 3.9), m.pick(0.56, 0.6, 0.62),
+    m.pick(2.4, 2.5, 2.6)))
 def fitted_wardrobe(m: Maker, size: Size) -> None:
     """Doors from wall to wall: as high as the room, in two rows, or sliding, some of mirror."""
     _w, d, _h = size
@@ -65,7 +67,9 @@ def fitted_wardrobe(m: Maker, size: Size) -> None:
     front = m.pick(body, body, WHITE, m.timber)
     form = m.weighted(0.4, 0.28, 0.32)
     kinds = ("flat", "flat", "raised") if form == 1 else ("flat", "shaker", "shaker", "grooved")
-    look = Look(m.pick(*kinds), front, body, body, m.pick("square", "none", "edge", "disc"), m.metal)  # fmt: skip
+    look = Look(
+        m.pick(*kinds), front, body, body, m.pick("square", "none", "edge", "disc"), m.metal
+    )
     f = d / 2 - 0.02
     x, y = _filled_in(m, size, f, m.pick(0.05, 0.07, 0.1), body)
     hollow(m, x, y, (-d / 2, f), _BOARD_M, body)
@@ -77,8 +81,7 @@ def fitted_wardrobe(m: Maker, size: Size) -> None:
         case 1:  # small doors over tall ones
             cut = y[1] - m.uniform(0.42, 0.55)
             fronts_of(m, look, x, (y[0], cut), f, [("door",)] * n, False, inside)
-            m.add(slab((x[0] + _BOARD_M, cut, -d / 2 + _BACK_M), (x[1] - _BOARD_M, cut + 0.016, f)),
-                of=body)  # fmt: skip
+            m.box((x[0] + _BOARD_M, x[1] - _BOARD_M), 0.016, (-d / 2 + _BACK_M, f), on=cut, of=body)
             fronts_of(m, look, x, (cut, y[1]), f, [("door",)] * n, True, inside)
         case 2:
             _leaves(m, x, y, f - 0.03, -d / 2 + _BACK_M, front, body)
@@ -91,43 +94,43 @@ def _leaves(
     n = max(2, round((x[1] - x[0]) / 1.0))
     step, rail = (x[1] - x[0]) / n, m.pick(STEEL, BLACK_STEEL, WHITE_STEEL, body)
     mirror, is_panelled = m.pick(-1, -1, 0, 1), m.chance(0.4)
-    for a, b in ((y[0] + _BOARD_M, y[0] + _BOARD_M + 0.03), (y[1] - _BOARD_M - 0.04, y[1] - _BOARD_M)):  # fmt: skip
-        m.add(slab((x[0] + _BOARD_M, a, z - 0.022), (x[1] - _BOARD_M, b, z + 0.048)), of=rail)
+    for a, b in ((y[0] + _BOARD_M, y[0] + _BOARD_M + 0.03),
+        (y[1] - _BOARD_M - 0.04, y[1] - _BOARD_M)):
+        m.box((x[0] + _BOARD_M, x[1] - _BOARD_M), (a, b), 0.07, against=z - 0.022, of=rail)
     low, high = y[0] + _BOARD_M + 0.031, y[1] - _BOARD_M - 0.041
     for k in range(n):
         a = max(x[0] + k * step - 0.03, x[0] + _BOARD_M)
         b = min(x[0] + (k + 1) * step + 0.03, x[1] - _BOARD_M)
         at = z + 0.024 * (k % 2)
         with m.sliding("leaf", along=(1.0 if k < n - 1 else -1.0, 0.0, 0.0), upper_m=step - 0.08):
-            m.add(bevelled((a + 0.002, low, at), (b - 0.002, high, at + 0.018), 0.0015), of=front)
+            m.box((a + 0.002, b - 0.002), (low, high), 0.018, 0.0015, against=at, of=front)
             if k % 2 == mirror:
-                m.add(slab((a + 0.03, low + 0.03, at + 0.0182), (b - 0.03, high - 0.03, at + 0.0192)),
-                    of=SILVERED)  # fmt: skip
+                m.box((a + 0.03, b - 0.03), (low + 0.03, high - 0.03), 0.001, against=at + 0.0182,
+                    of=SILVERED)
             elif is_panelled:
                 for c in (1, 2):
                     mid = low + (high - low) * c / 3
-                    m.add(slab((a + 0.002, mid - 0.006, at + 0.0182), (b - 0.002, mid + 0.006, at + 0.0192)),
-                        of=rail)  # fmt: skip
+                    m.box((a + 0.002, b - 0.002), 0.012, 0.001, on=mid - 0.006, against=at + 0.0182,
+                        of=rail)
             for grip in (a + 0.002, b - 0.024):
-                m.add(slab((grip, low, at + 0.0182), (grip + 0.022, high, at + 0.0198)), of=rail)
-        inner = (
-            x[0] + k * step + (0.008 if k else _BOARD_M),
-            x[0] + (k + 1) * step - (0.008 if k < n - 1 else _BOARD_M),
-        )
+                m.box(0.022, (low, high), 0.0016, left=grip, against=at + 0.0182, of=rail)
+        inner = (x[0] + k * step + (0.008 if k else _BOARD_M),
+            x[0] + (k + 1) * step - (0.008 if k < n - 1 else _BOARD_M))
         if k:
-            m.add(slab((inner[0] - 0.016, y[0] + _BOARD_M, back),
-                (inner[0], y[1] - _BOARD_M, z - 0.03)), of=body)  # fmt: skip
+            m.box(0.016, (y[0] + _BOARD_M, y[1] - _BOARD_M), (back, z - 0.03),
+                left=inner[0] - 0.016, of=body)
         shelves(m, inner, y, (back, z - 0.03), body, CHROME if k % 2 == 0 else None)
 
 
-@family(group="fitted_bookcase", nyu40=BOOKSHELF, place=Place.FLOOR, called="fitted_bookcase", variants=36,
-    size=lambda m: (m.pick(1.5, 1.8, 2.1, 2.5, 2.9, 3.4, 3.9), m.pick(0.28, 0.3, 0.34), m.pick(2.4, 2.5, 2.6)))  # fmt: skip
+@family(group="fitted_bookcase", nyu40=BOOKSHELF, place=Place.FLOOR, called="fitted_bookcase",
+    variants=36, size=lambda m: (m.pick(1.5, 1.8, 2.1, 2.5, 2.9, 3.4, 3.9), m.pick(0.28, 0.3, 0.34),
+    m.pick(2.4, 2.5, 2.6)))
 def fitted_bookcase(m: Maker, size: Size) -> None:
     """Shelves from wall to wall: down to the floor, over cupboards or drawers, or beside a closed bay."""
     _w, d, _h = size
     body = _stuff(m, 0.3)
     look = Look(m.pick("flat", "flat", "shaker"), m.pick(body, body, WHITE), body, body,
-        m.pick("none", "edge", "square"), m.metal)  # fmt: skip
+        m.pick("none", "edge", "square"), m.metal)
     form = m.weighted(0.4, 0.4, 0.2)
     t, f = m.pick(0.018, 0.022, 0.03, 0.038), d / 2 - 0.02
     x, y = _filled_in(m, size, f, m.pick(0.05, 0.08), body)
@@ -138,66 +141,63 @@ def fitted_bookcase(m: Maker, size: Size) -> None:
     step = (x[1] - x[0] - t) / n
     closed = m.integers(0, n) if form == 2 else -1
     with m.of(body):
-        m.add(slab((x[0], y[0], -d / 2), (x[1], y[1], back)))
+        m.box((x[0], x[1]), (y[0], y[1]), (-d / 2, back))
         for k in range(n + 1):
             a = x[0] + k * step
-            m.add(bevelled((a, y[0], back), (a + t, y[1], f), 0.0012))
+            m.box(t, (y[0], y[1]), (back, f), 0.0012, left=a)
         for k in range(n):
             a, b = x[0] + k * step + t, x[0] + (k + 1) * step
             # Boards at the foot and the top, and shelves not all at the heights of the next bay's.
             shift = m.pick(0.0, 0.0, 0.0, 0.06)
             for j in range(rows + 1):
                 at = cut + (y[1] - t - cut) * j / rows - (shift if 1 < j < rows else 0.0)
-                m.add(slab((a, at, back), (b, at + t, f - 0.004)))
+                m.box((a, b), t, (back, f - 0.004), on=at)
     if form == 1:
         kinds = m.pick(("door",), ("door",), ("drawer", "drawer"))
         fronts_of(m, look, (x[0], x[1]), (y[0], cut + t), f, [kinds] * n, False,
-            Inside(back, has_boards=False))  # fmt: skip
+            Inside(back, has_boards=False))
     elif closed >= 0:
         a = x[0] + closed * step + t / 2
         fronts_of(m, look, (a, a + step), (y[0], y[1]), f, [("door",)] * 2, False,
-            Inside(back, has_boards=False))  # fmt: skip
+            Inside(back, has_boards=False))
 
 
-@family(group="fitted_cabinet", nyu40=CABINET, place=Place.FLOOR, called="fitted_show_case", variants=24,
-    size=lambda m: (m.pick(1.3, 1.5, 1.8, 2.1), m.pick(0.4, 0.44, 0.48), m.pick(2.1, 2.3, 2.5)))  # fmt: skip
+@family(group="fitted_cabinet", nyu40=CABINET, place=Place.FLOOR, called="fitted_show_case",
+    variants=24, size=lambda m: (m.pick(1.3, 1.5, 1.8, 2.1), m.pick(0.4, 0.44, 0.48),
+    m.pick(2.1, 2.3, 2.5)))
 def fitted_cabinet(m: Maker, size: Size) -> None:
     """Doors of glass with china behind them over a deeper row of cupboards or drawers."""
     w, d, h = size
     hw = w / 2
     body = _stuff(m, 0.55)
-    look = Look(m.pick("flat", "raised"), body, body, body, m.pick("edge", "square", "none"),
-        m.metal)  # fmt: skip
+    look = Look(
+        m.pick("flat", "raised"), body, body, body, m.pick("edge", "square", "none"), m.metal
+    )
     n, f = max(2, round(w / 0.56)), d / 2 - 0.025
     low, cut, shallow = m.pick(0.05, 0.08), m.uniform(0.8, 0.95), f - m.uniform(0.08, 0.14)
     has_crown = m.chance(0.6)
     top = h - 0.045 if has_crown else h
-    m.add(slab((-hw + 0.01, 0.0, -d / 2), (hw - 0.01, low, f - 0.03)), of=body)
+    m.box(w - 0.02, low, (-d / 2, f - 0.03), of=body)
     hollow(m, (-hw, hw), (low, cut - 0.025), (-d / 2, f), _BOARD_M, body)
-    fronts_of(m, look, (-hw, hw), (low, cut - 0.025), f,
-        [m.pick(("door",), ("door",), ("drawer", "drawer"))] * n, False,
-        Inside(-d / 2 + _BACK_M))  # fmt: skip
-    m.add(
-        bevelled((-hw, cut - 0.025, -d / 2), (hw, cut, d / 2), 0.004),
-        of=m.pick(body, body, m.timber),
-    )
+    fronts_of(m, look, (-hw, hw), (low, cut - 0.025), f, [m.pick(("door",), ("door",),
+        ("drawer", "drawer"))] * n, False, Inside(-d / 2 + _BACK_M))
+    m.box(w, (cut - 0.025, cut), d, 0.004, of=m.pick(body, body, m.timber))
     hollow(m, (-hw + 0.004, hw - 0.004), (cut, top), (-d / 2, shallow), _BOARD_M, body)
     if has_crown:
-        m.add(bevelled((-hw, top, -d / 2), (hw, h, shallow + 0.05), 0.01), of=body)
+        m.box(w, (top, h), (-d / 2, shallow + 0.05), 0.01, of=body)
     back, rows = -d / 2 + _BACK_M, max(2, round((top - cut) / 0.42))
     ware = m.china()
     for k in range(n):
         a, b = -hw + 0.004 + (w - 0.008) * k / n, -hw + 0.004 + (w - 0.008) * (k + 1) / n
         x = (a + (0.008 if k else _BOARD_M), b - (0.008 if k < n - 1 else _BOARD_M))
         if k:
-            m.add(slab((a - 0.008, cut + _BOARD_M, back), (a + 0.008, top - _BOARD_M, shallow)),
-                of=body)  # fmt: skip
+            m.box(0.016, (cut + _BOARD_M, top - _BOARD_M), (back, shallow), x=a, of=body)
         with opens(m, "door", (a, b), (cut, top), shallow + 0.02, back, k % 2 == 0):
             _glass_door(m, look, (a, b), (cut, top), shallow, k % 2 == 0)
         for j in range(rows):
             y = cut + _BOARD_M + (top - 2 * _BOARD_M - cut) * j / rows
             if j:
-                m.add(slab((x[0], y - 0.016, back), (x[1], y, shallow - 0.02)), of=body)
+                m.box((x[0], x[1]), (y - 0.016, y), (back, shallow - 0.02), of=body)
             _china(m, ware, x, y, (back + shallow - 0.02) / 2)
 
 
@@ -206,13 +206,13 @@ def _glass_door(m: Maker, look: Look, x: Pair, y: Pair, z: float, opens_left: bo
     a, b, c, e = x[0] + 0.0015, x[1] - 0.0015, y[0] + 0.0015, y[1] - 0.0015
     r = 0.05
     with m.of(look.front):
-        m.add(bevelled((a, c, z), (a + r, e, z + 0.02), 0.0015))
-        m.add(bevelled((b - r, c, z), (b, e, z + 0.02), 0.0015))
-        m.add(bevelled((a + r, c, z), (b - r, c + r, z + 0.02), 0.0015))
-        m.add(bevelled((a + r, e - r, z), (b - r, e, z + 0.02), 0.0015))
-    m.add(slab((a + r, c + r, z + 0.008), (b - r, e - r, z + 0.012)), of=CLEAR)
+        m.box(r, (c, e), 0.02, 0.0015, left=a, against=z)
+        m.box((b - r, b), (c, e), 0.02, 0.0015, against=z)
+        m.box((a + r, b - r), r, 0.02, 0.0015, on=c, against=z)
+        m.box((a + r, b - r), (e - r, e), 0.02, 0.0015, against=z)
+    m.box((a + r, b - r), (c + r, e - r), 0.004, against=z + 0.008, of=CLEAR)
     pull(m, "square", b - r / 2 if opens_left else a + r / 2, (c + e) / 2, z + 0.02, False, 0.12,
-        look.pull_material)  # fmt: skip
+        look.pull_material)
 
 
 def _china(m: Maker, ware: Material, x: Pair, y: float, z: float) -> None:
@@ -224,13 +224,14 @@ def _china(m: Maker, ware: Material, x: Pair, y: float, z: float) -> None:
         match m.integers(0, 4):
             case 0:  # plates on each other
                 high = m.uniform(0.03, 0.09)
-                m.add(revolve([(0.0, 0.0), (0.6 * r, 0.0), (r, 0.012), (r, high), (0.0, high - 0.01)],
-                    n=10), at=at, of=ware)  # fmt: skip
+                m.revolve([(0.0, 0.0), (0.6 * r, 0.0), (r, 0.012), (r, high), (0.0, high - 0.01)],
+                    n=10, at=at, of=ware)
             case 1:  # a jug or a vase
                 high = m.uniform(0.14, 0.22)
-                m.add(revolve([(0.0, 0.0), (0.5 * r, 0.0), (0.75 * r, 0.35 * high), (0.35 * r, 0.8 * high),
-                    (0.45 * r, high), (0.0, high - 0.01)], n=10), at=at, of=m.pick(ware, m.china()))  # fmt: skip
+                m.revolve([(0.0, 0.0), (0.5 * r, 0.0), (0.75 * r, 0.35 * high),
+                    (0.35 * r, 0.8 * high), (0.45 * r, high), (0.0, high - 0.01)], n=10, at=at,
+                    of=m.pick(ware, m.china()))
             case _:  # bowls, cups upside down
                 high = m.uniform(0.07, 0.11)
                 wide, narrow = min(0.06, 0.7 * r), min(0.035, 0.4 * r)
-                m.add(frustum((wide, 0.0), (narrow, high), n=10), at=at, of=ware)
+                m.frustum((wide, 0.0), (narrow, high), n=10, at=at, of=ware)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from numpy import cos, pi, sin
+from numpy import pi
 
 from pbrs_farm.core.frames import LYING_ALONG_X, LYING_ALONG_Z, rotation_y
-from pbrs_farm.furnishings.things.bodies import bevelled, cylinder, revolve, slab, sphere, tube
+from pbrs_farm.furnishings.things.bodies import bevelled
 from pbrs_farm.furnishings.things.maker import Maker, thing
 from pbrs_farm.furnishings.things.materials import BLACK_GLASS, STEEL, plain
-from pbrs_farm.furnishings.things.outlines import Triple, bent
+from pbrs_farm.furnishings.things.outlines import Triple, bent, polar
+
+# fmt: off
 
 
 @thing(group="cable", called="power_strip")
@@ -18,25 +20,28 @@ def power_strip(m: Maker) -> None:
     colour = (0.9, 0.9, 0.88) if white else (0.08, 0.08, 0.085)
     body, wire = plain("strip", colour, 0.45), plain("cable", colour, 0.6)
     long = 0.045 * n + 0.06
-    m.add(bevelled((-long / 2, 0.0, -0.026), (long / 2, 0.038, 0.026), 0.006), of=body)
+    m.box(long, 0.038, 0.052, 0.006, of=body)
     for k in range(n):
         x = -long / 2 + 0.045 + 0.045 * k
-        m.add(cylinder(0.017, 0.0375, 0.0385, n=14), at=(x, 0.0, 0.0), of=plain("socket", (0.2, 0.2, 0.2), 0.6))  # fmt: skip
+        m.cylinder(
+            0.017, 0.0375, 0.0385, n=14, at=(x, 0.0, 0.0), of=plain("socket", (0.2, 0.2, 0.2), 0.6)
+        )
         if m.chance(0.45):
             plug = plain("plug", m.pick((0.07, 0.07, 0.07), (0.9, 0.9, 0.88)), 0.5)
-            m.add(bevelled((x - 0.017, 0.0385, -0.02), (x + 0.017, 0.0385 + m.uniform(0.02, 0.05), 0.02), 0.003), of=plug)  # fmt: skip
+            m.add(bevelled((x - 0.017, 0.0385, -0.02), (x + 0.017, 0.0385 + m.uniform(0.02, 0.05),
+                0.02), 0.003), of=plug)
             end = 0.2 + 0.1 * m.uniform(0, 1)
-            m.add(tube(bent([(x, 0.05, 0.018), (x, 0.045, 0.06), (x + m.normal(0, 0.05), 0.004, 0.11),
-                (x + m.normal(0, 0.1), 0.004, end)], 0.03, n=3), 0.003, n=5), of=plug)  # fmt: skip
+            m.tube(bent([(x, 0.05, 0.018), (x, 0.045, 0.06), (x + m.normal(0, 0.05), 0.004, 0.11),
+                (x + m.normal(0, 0.1), 0.004, end)], 0.03, n=3), 0.003, n=5, of=plug)
     # The cable leaves at one end, lies in a loop and goes on.
     r, z = m.uniform(0.07, 0.12), m.uniform(-0.05, 0.05)
     path: list[Triple] = [(long / 2 - 0.01, 0.012, 0.0), (long / 2 + 0.05, 0.005, 0.0)]
     turns = m.pick(1.0, 1.6, 2.4)
     for k in range(int(18 * turns) + 1):
         a = -pi / 2 + 2 * pi * k / 18
-        path.append((long / 2 + 0.08 + r * cos(a), 0.005 + 0.0075 * k / 18, z + r + r * sin(a)))
+        path.append(polar(r, 0.005 + 0.0075 * k / 18, a, x=long / 2 + 0.08, z=z + r))
     path += [(long / 2 + 0.15, 0.005, z + 2.2 * r), (long / 2 - 0.05, 0.005, z + 2.5 * r)]
-    m.add(tube(path, 0.0042, n=6), of=wire)
+    m.tube(path, 0.0042, n=6, of=wire)
 
 
 @thing(group="toy", called="building_blocks")
@@ -44,25 +49,23 @@ def toy_blocks(m: Maker) -> None:
     """Blocks, balls and a car where a child left them."""
     colours = [plain("toy", m.any_colour(), 0.5) for _ in range(2)]
     colours += [plain("toy wood", (0.8, 0.62, 0.4), 0.6), plain("toy red", (0.75, 0.14, 0.12), 0.4)]
-    colours += [
-        plain("toy blue", (0.12, 0.3, 0.62), 0.4),
-        plain("toy yellow", (0.9, 0.72, 0.15), 0.4),
-    ]
+    colours += [plain("toy blue", (0.12, 0.3, 0.62), 0.4),
+        plain("toy yellow", (0.9, 0.72, 0.15), 0.4)]
     for k in range(m.integers(6, 15)):
         # A ring of places keeps them apart.
         a, r = 2.4 * k, 0.055 * (k + 0.6) ** 0.62
         s = m.uniform(0.014, 0.021)
-        at = (r * cos(a), 0.0, r * sin(a))
+        at = polar(r, 0.0, a)
         of = m.pick(*colours)
         match m.integers(0, 5):
             case 0:
-                m.add(cylinder(s, 0.0, 2 * s, n=14), at=at, of=of)
+                m.cylinder(s, 0.0, 2 * s, n=14, at=at, of=of)
             case 1:
-                m.add(sphere((0.0, s, 0.0), s, n=10), at=at, of=of)
+                m.sphere((0.0, s, 0.0), s, n=10, at=at, of=of)
             case 2:
-                m.add(bevelled((-1.9 * s, 0.0, -s), (1.9 * s, s, s), 0.0015), at=at, turn=rotation_y(m.uniform(0, pi)), of=of)  # fmt: skip
+                m.box(3.8 * s, s, 2 * s, 0.0015, at=at, turn=rotation_y(m.uniform(0, pi)), of=of)
             case _:
-                m.add(bevelled((-s, 0.0, -s), (s, 2 * s, s), 0.0015), at=at, turn=rotation_y(m.uniform(0, pi)), of=of)  # fmt: skip
+                m.box(2 * s, 2 * s, 2 * s, 0.0015, at=at, turn=rotation_y(m.uniform(0, pi)), of=of)
 
 
 @thing(group="computer", called="computer_tower")
@@ -71,30 +74,19 @@ def computer_tower(m: Maker) -> None:
     w, h, d = m.uniform(0.17, 0.22), m.uniform(0.36, 0.46), m.uniform(0.38, 0.46)
     grey = m.pick(0.05, 0.08, 0.62, 0.85)
     case = plain("computer", (grey, grey, grey * 1.01), 0.4)
-    m.add(bevelled((-w / 2, 0.015, -d / 2), (w / 2, h, d / 2), 0.004), of=case)
+    m.box(w, (0.015, h), d, 0.004, of=case)
     for x in (-w / 2 + 0.03, w / 2 - 0.03):
-        for z in (-d / 2 + 0.04, d / 2 - 0.04):
-            m.add(cylinder(0.014, 0.0, 0.016, n=10), at=(x, 0.0, z), of=plain("foot", (0.06, 0.06, 0.06), 0.7))  # fmt: skip
-    front = (
-        BLACK_GLASS
-        if m.chance(0.3)
-        else plain("front", (grey * 0.8, grey * 0.8, grey * 0.82), 0.35)
-    )
-    m.add(
-        bevelled((-w / 2 + 0.006, 0.03, d / 2), (w / 2 - 0.006, h - 0.012, d / 2 + 0.012), 0.003),
-        of=front,
-    )
+        m.cylinder(0.014, 0.0, 0.016, n=10, at=(x, 0.0, -d / 2 + 0.04),
+            of=plain("foot", (0.06, 0.06, 0.06), 0.7), mirrored="z")
+    front = (BLACK_GLASS if m.chance(0.3) else plain("front", (grey * 0.8, grey * 0.8, grey * 0.82),
+        0.35))
+    m.box(w - 0.012, (0.03, h - 0.012), 0.012, 0.003, against=d / 2, of=front)
     z = d / 2 + 0.012
     if m.chance(0.6):
-        m.add(slab((-w / 2 + 0.02, h - 0.075, z), (w / 2 - 0.02, h - 0.04, z + 0.0015)), of=STEEL)
+        m.box(w - 0.04, 0.035, 0.0015, on=h - 0.075, against=z, of=STEEL)
     for k in range(m.integers(5, 10)):
-        m.add(
-            slab(
-                (-w / 2 + 0.03, 0.07 + 0.014 * k, z), (w / 2 - 0.03, 0.076 + 0.014 * k, z + 0.002)
-            ),
-            of=case,
-        )
-    m.add(cylinder(0.009, 0.0, 0.003, n=12), turn=LYING_ALONG_Z, at=(0.0, h - 0.1, z), of=STEEL)
+        m.box(w - 0.06, 0.006, 0.002, on=0.07 + 0.014 * k, against=z, of=case)
+    m.cylinder(0.009, 0.0, 0.003, n=12, turn=LYING_ALONG_Z, at=(0.0, h - 0.1, z), of=STEEL)
 
 
 @thing(group="mat", called="rolled_mat")
@@ -102,8 +94,8 @@ def rolled_mat(m: Maker) -> None:
     """A mat for exercise, rolled up and lying, a strap round it."""
     r, long = m.uniform(0.055, 0.08), m.uniform(0.55, 0.65)
     mat = plain("mat foam", m.any_colour(), 0.9)
-    m.add(revolve([(0.0, 0.0), (0.35 * r, 0.004), (0.4 * r, 0.0), (0.7 * r, 0.003), (0.75 * r, 0.0),
-        (r, 0.0), (r, long), (0.0, long)], n=24), turn=LYING_ALONG_X, at=(-long / 2, r, 0.0), of=mat)  # fmt: skip
+    m.revolve([(0.0, 0.0), (0.35 * r, 0.004), (0.4 * r, 0.0), (0.7 * r, 0.003), (0.75 * r, 0.0),
+        (r, 0.0), (r, long), (0.0, long)], n=24, turn=LYING_ALONG_X, at=(-long / 2, r, 0.0), of=mat)
     for x in (-0.25, 0.25):
-        m.add(revolve([(0.0, 0.0), (1.02 * r, 0.0), (1.02 * r, 0.02), (0.0, 0.02)], n=24),
-            turn=LYING_ALONG_X, at=(x * long, r, 0.0), of=plain("strap", (0.1, 0.1, 0.1), 0.7))  # fmt: skip
+        m.revolve([(0.0, 0.0), (1.02 * r, 0.0), (1.02 * r, 0.02), (0.0, 0.02)], n=24,
+            turn=LYING_ALONG_X, at=(x * long, r, 0.0), of=plain("strap", (0.1, 0.1, 0.1), 0.7))

@@ -10,20 +10,12 @@ from pbrs_farm.core.classes import PICTURE
 from pbrs_farm.core.frames import LYING_ALONG_Z, rotation_x, rotation_y
 from pbrs_farm.core.house import Material
 from pbrs_farm.dress.style import mix
-from pbrs_farm.furnishings.things.bodies import (
-    bevelled,
-    cylinder,
-    frustum,
-    loft,
-    revolve,
-    slab,
-    sphere,
-    tube,
-    vessel,
-)
-from pbrs_farm.furnishings.things.maker import Maker, Pair, thing
+from pbrs_farm.furnishings.things.maker import Maker, thing
 from pbrs_farm.furnishings.things.materials import glass, plain
 from pbrs_farm.furnishings.things.outlines import bent, rect, ring_path, rings
+from pbrs_farm.furnishings.things.shapes import Pair
+
+# fmt: off
 
 
 @thing(group="picture_frame", nyu40=PICTURE)
@@ -33,11 +25,12 @@ def table_frame(m: Maker) -> None:
     w, h = sorted((m.uniform(0.11, 0.24), m.uniform(0.11, 0.24)))
     w, h = (h, w) if m.chance(0.4) else (w, h)
     material = m.pick(plain("frame", m.wood, 0.4), plain("frame", (0.1, 0.1, 0.1), 0.35),
-        plain("frame", (0.9, 0.9, 0.88), 0.4), m.metal, plain("frame", m.any_colour(), 0.4))  # fmt: skip
+        plain("frame", (0.9, 0.9, 0.88), 0.4), m.metal, plain("frame", m.any_colour(), 0.4))
     match form:
         case 0 | 1:  # without or with a mat
-            leaning_frame(m, w, h, m.uniform(0.01, 0.028), 0.015, material,
-                0.0 if form == 0 else 0.03)  # fmt: skip
+            leaning_frame(
+                m, w, h, m.uniform(0.01, 0.028), 0.015, material, 0.0 if form == 0 else 0.03
+            )
         case 2:  # a mat of its own, deep as a box
             leaning_frame(m, w, h, 0.012, 0.032, material, 0.04)
         case 3:  # two that are hinged, a little open
@@ -48,54 +41,49 @@ def table_frame(m: Maker) -> None:
         case 4:  # round
             r = m.uniform(0.06, 0.1)
             with m.moved(turn=rotation_x(-0.17), at=(0, r, 0)):
-                m.add(tube(ring_path(r, n=28), 0.011, n=8), turn=rotation_x(pi / 2), of=material)
-                m.add(cylinder(r * 0.98, 0, 0.004, n=28), turn=LYING_ALONG_Z, at=(0, 0, -0.003),
-                    of=plain("mount", (0.9, 0.89, 0.85), 0.8))  # fmt: skip
+                m.tube(ring_path(r, n=28), 0.011, turn=rotation_x(pi / 2), of=material)
+                m.cylinder(r * 0.98, 0, 0.004, n=28, turn=LYING_ALONG_Z, at=(0, 0, -0.003),
+                    of=plain("mount", (0.9, 0.89, 0.85), 0.8))
                 photo_head(m, r * 1.1, 0.0015)
-            m.add(slab((-0.012, 0, -0.003), (0.012, r * 1.2, 0)), turn=rotation_x(0.42),
-                at=(0, 0, -r * 0.62), of=material)  # fmt: skip
+            m.box(0.024, r * 1.2, (-0.003, 0), turn=rotation_x(0.42), at=(0, 0, -r * 0.62),
+                of=material)
         case 5:  # a picture in a block of glass
-            m.add(bevelled((-w / 2, 0, -0.012), (w / 2, h, 0.012), 0.002), of=glass())
+            m.box(w, h, 0.024, 0.002, of=glass())
             with m.moved(at=(0, 0, -0.004)):
                 photo(m, (-w / 2 + 0.006, 0.006), (w / 2 - 0.006, h - 0.006))
             if m.chance(0.5):
-                m.add(bevelled((-w * 0.35, 0.0, -0.03), (w * 0.35, 0.012, 0.03), 0.002),
-                    of=material)  # fmt: skip
+                m.box(0.7 * w, 0.012, 0.06, 0.002, of=material)
         case 6:  # a small canvas on an easel
             with m.moved(turn=rotation_x(-0.2)):
-                m.add(slab((-w / 2, 0.03, 0), (w / 2, 0.03 + h, 0.016)),
-                    of=plain("canvas", (0.9, 0.89, 0.85), 0.9))  # fmt: skip
+                m.box(w, h, (0, 0.016), on=0.03, of=plain("canvas", (0.9, 0.89, 0.85), 0.9))
                 with m.moved(at=(0, 0, 0.0125)):
                     photo(m, (-w / 2 + 0.001, 0.031), (w / 2 - 0.001, 0.029 + h))
-                for x in (-0.3 * w, 0.3 * w):
-                    m.add(bevelled((x - 0.005, 0, -0.012), (x + 0.005, h + 0.05, 0), 0.001),
-                        of=material)  # fmt: skip
-                m.add(bevelled((-w * 0.4, 0.018, -0.012), (w * 0.4, 0.03, 0.024), 0.001),
-                    of=material)  # fmt: skip
-            m.add(tube([(0, 0, -h * 0.55), (0, h * 0.8, -h * 0.17)], 0.005, n=6), of=material)
+                m.box(0.01, h + 0.05, (-0.012, 0), 0.001, x=-0.3 * w, mirrored="x", of=material)
+                m.box(0.8 * w, (0.018, 0.03), 0.036, 0.001, z=0.006, of=material)
+            m.tube([(0, 0, -h * 0.55), (0, h * 0.8, -h * 0.17)], 0.005, n=6, of=material)
 
 
-def leaning_frame(m: Maker, w: float, h: float, b: float, t: float, material: Material,
-    mat: float) -> None:  # fmt: skip
+def leaning_frame(
+    m: Maker, w: float, h: float, b: float, t: float, material: Material, mat: float
+) -> None:
     """It leans back by ten degrees on a stand that goes from behind up to the frame's back."""
     with m.moved(turn=rotation_x(-0.17)):
         frame_of(m, w, h, b, t, material, mat)
-    m.add(slab((-0.015, 0, -0.003), (0.015, h * 0.62, 0)), turn=rotation_x(0.42),
-        at=(0, 0, -h * 0.352), of=material)  # fmt: skip
+    m.box(0.03, h * 0.62, (-0.003, 0), turn=rotation_x(0.42), at=(0, 0, -h * 0.352), of=material)
 
 
-def frame_of(m: Maker, w: float, h: float, b: float, t: float, material: Material,
-    mat: float) -> None:  # fmt: skip
+def frame_of(
+    m: Maker, w: float, h: float, b: float, t: float, material: Material, mat: float
+) -> None:
     """A frame of moulding b wide and t thick round a photograph; mat: how wide its mat is."""
     hw = w / 2
     with m.of(material):
-        m.add(bevelled((-hw, 0, 0), (hw, b, t), 0.0015))
-        m.add(bevelled((-hw, h - b, 0), (hw, h, t), 0.0015))
-        m.add(bevelled((-hw, b, 0), (-hw + b, h - b, t), 0.0015))
-        m.add(bevelled((hw - b, b, 0), (hw, h - b, t), 0.0015))
+        m.box(w, b, (0, t), 0.0015)
+        m.box(w, (h - b, h), (0, t), 0.0015)
+        m.box(b, (b, h - b), (0, t), 0.0015, left=-hw)
+        m.box((hw - b, hw), (b, h - b), (0, t), 0.0015)
     if mat > 0:
-        m.add(slab((-hw + b, b, 0.002), (hw - b, h - b, 0.0045)),
-            of=plain("mat", (0.92, 0.91, 0.88), 0.9))  # fmt: skip
+        m.box(w - 2 * b, (b, h - b), (0.002, 0.0045), of=plain("mat", (0.92, 0.91, 0.88), 0.9))
     edge = b + min(mat, 0.2 * (min(w, h) - 2 * b))
     with m.moved(at=(0, 0, 0.0006 if mat > 0 else 0.0)):
         photo(m, (-hw + edge, edge), (hw - edge, h - edge))
@@ -111,28 +99,28 @@ def photo(m: Maker, low: Pair, high: Pair) -> None:
     else:
         w, h = high[0] - low[0], high[1] - low[1]
         x, y, b = (low[0] + high[0]) / 2, low[1], 0.06 * min(w, h)
-        m.add(slab((low[0], low[1], 0.004), (high[0], high[1], 0.005)),
-            of=plain("mount", (0.92, 0.91, 0.88), 0.8))  # fmt: skip
-        m.add(slab((low[0] + b, low[1] + b, 0.0052), (high[0] - b, high[1] - b, 0.0056)),
-            of=plain("photo", mix(m.colour_within(0.2, 0.85), (0.6, 0.58, 0.55), 0.5), 0.3))  # fmt: skip
+        m.box((low[0], high[0]), (low[1], high[1]), (0.004, 0.005),
+            of=plain("mount", (0.92, 0.91, 0.88), 0.8))
+        m.box((low[0] + b, high[0] - b), (low[1] + b, high[1] - b), (0.0052, 0.0056),
+            of=plain("photo", mix(m.colour_within(0.2, 0.85), (0.6, 0.58, 0.55), 0.5), 0.3))
         n = 1 if w < 1.2 * h else 2
         for k in range(n):
             c, r = x + (k - (n - 1) / 2) * 0.32 * w, 0.15 * min(w, h)
-            m.add(slab((c - 1.5 * r, y + b, 0.0057), (c + 1.5 * r, y + 0.38 * h, 0.006)),
-                of=plain("photo", mix(m.colour_within(0.05, 0.8), (0.4, 0.38, 0.36), 0.4), 0.3))  # fmt: skip
-            m.add(cylinder(r, 0, 0.0004, n=14), turn=LYING_ALONG_Z,
-                at=(c, y + 0.38 * h + 0.9 * r, 0.0061), of=plain("photo", m.pick((0.85, 0.66, 0.54),
-                (0.6, 0.42, 0.3), (0.35, 0.23, 0.16)), 0.3))  # fmt: skip
+            m.box(3 * r, (y + b, y + 0.38 * h), (0.0057, 0.006), x=c,
+                of=plain("photo", mix(m.colour_within(0.05, 0.8), (0.4, 0.38, 0.36), 0.4), 0.3))
+            m.cylinder(r, 0, 0.0004, n=14, turn=LYING_ALONG_Z,
+                at=(c, y + 0.38 * h + 0.9 * r, 0.0061), of=plain("photo",
+                m.pick((0.85, 0.66, 0.54), (0.6, 0.42, 0.3), (0.35, 0.23, 0.16)), 0.3))
 
 
 def photo_head(m: Maker, w: float, z: float) -> None:
     """A head and its hair, w of the picture across, before z."""
-    m.add(cylinder(0.42 * w, 0, 0.0004, n=20), turn=LYING_ALONG_Z, at=(0, 0, z), of=plain("photo",
-        mix(m.colour_within(0.2, 0.85), (0.6, 0.58, 0.55), 0.5), 0.3))  # fmt: skip
-    m.add(cylinder(0.15 * w, 0, 0.0004, n=14), turn=LYING_ALONG_Z, at=(0, 0.05 * w, z + 0.0008),
-        of=plain("photo", (0.75, 0.56, 0.44), 0.3))  # fmt: skip
-    m.add(slab((-0.2 * w, -0.3 * w, z + 0.0008), (0.2 * w, -0.1 * w, z + 0.0011)),
-        of=plain("photo", m.colour_within(0.1, 0.7), 0.3))  # fmt: skip
+    m.cylinder(0.42 * w, 0, 0.0004, n=20, turn=LYING_ALONG_Z, at=(0, 0, z),
+        of=plain("photo", mix(m.colour_within(0.2, 0.85), (0.6, 0.58, 0.55), 0.5), 0.3))
+    m.cylinder(0.15 * w, 0, 0.0004, n=14, turn=LYING_ALONG_Z, at=(0, 0.05 * w, z + 0.0008),
+        of=plain("photo", (0.75, 0.56, 0.44), 0.3))
+    m.box(0.4 * w, w / 5, 0.0003, on=-0.3 * w, against=z + 0.0008,
+        of=plain("photo", m.colour_within(0.1, 0.7), 0.3))
 
 
 @thing(group="candle")
@@ -158,69 +146,68 @@ def candle(m: Maker) -> None:
             for _ in range(m.integers(1, 4)):
                 h = m.uniform(0.06, 0.2)
                 with m.moved(at=(x, 0, m.uniform(-0.02, 0.02))):
-                    m.add(revolve([(0, 0), (0.035, 0), (0.033, 0.006), (0.008, 0.012),
-                        (0.007, h - 0.02), (0.015, h - 0.015), (0.015, h), (0, h)], n=16), of=stick)  # fmt: skip
-                    m.add(revolve([(0, 0), (0.011, 0), (0.008, 0.19), (0, 0.2)], n=12),
-                        at=(0, h + 0.0002, 0), of=wax)  # fmt: skip
+                    m.revolve([(0, 0), (0.035, 0), (0.033, 0.006), (0.008, 0.012),
+                        (0.007, h - 0.02), (0.015, h - 0.015), (0.015, h), (0, h)], of=stick)
+                    m.revolve([(0, 0), (0.011, 0), (0.008, 0.19), (0, 0.2)], n=12,
+                        at=(0, h + 0.0002, 0), of=wax)
                 x += 0.085
         case 2:  # tea lights
             for k in range(m.integers(2, 6)):
                 with m.moved(at=(0.075 * k, 0, m.uniform(-0.025, 0.025))):
-                    m.add(vessel([(0, 0), (0.026, 0), (0.03, 0.05)], 0.003, n=16),
-                        of=glass(m.any_colour(), 0.35))  # fmt: skip
-                    m.add(cylinder(0.019, 0.004, 0.018, n=14), of=wax)
+                    m.vessel(
+                        [(0, 0), (0.026, 0), (0.03, 0.05)], 0.003, of=glass(m.any_colour(), 0.35)
+                    )
+                    m.cylinder(0.019, 0.004, 0.018, n=14, of=wax)
         case 3:  # in a jar
             r, h = m.uniform(0.035, 0.05), m.uniform(0.07, 0.11)
-            m.add(vessel([(0, 0), (r, 0), (r, h)], 0.003, n=20), of=glass(m.any_colour(), 0.45))
-            m.add(cylinder(r - 0.004, 0.005, 0.7 * h, n=18), of=wax)
+            m.vessel([(0, 0), (r, 0), (r, h)], 0.003, n=20, of=glass(m.any_colour(), 0.45))
+            m.cylinder(r - 0.004, 0.005, 0.7 * h, n=18, of=wax)
             if m.chance(0.5):
-                m.add(cylinder(r * 1.02, h + 0.0002, h + 0.012, n=20),
-                    of=plain("lid wood", m.wood, 0.5))  # fmt: skip
+                m.cylinder(r * 1.02, h + 0.0002, h + 0.012, n=20, of=plain("lid wood", m.wood, 0.5))
             else:
-                m.add(slab((-0.6 * r, 0.2 * h, r - 0.004), (0.6 * r, 0.65 * h, r + 0.0006)),
-                    of=plain("label", (0.92, 0.9, 0.85), 0.8))  # fmt: skip
+                m.box(1.2 * r, (0.2 * h, 0.65 * h), 0.0046, against=r - 0.004,
+                    of=plain("label", (0.92, 0.9, 0.85), 0.8))
         case 4:  # in a lantern
             w, h = m.uniform(0.1, 0.15), m.uniform(0.18, 0.3)
             with m.of(stick):
-                m.add(bevelled((-w / 2, 0, -w / 2), (w / 2, 0.012, w / 2), 0.002))
-                m.add(bevelled((-w / 2, h - 0.012, -w / 2), (w / 2, h, w / 2), 0.002))
+                m.box(w, 0.012, w, 0.002)
+                m.box(w, (h - 0.012, h), w, 0.002)
                 for x, z in product((-1, 1), (-1, 1)):
-                    m.add(bevelled((x * (w / 2 - 0.006) - 0.005, 0.012,
-                        z * (w / 2 - 0.006) - 0.005), (x * (w / 2 - 0.006) + 0.005, h - 0.012,
-                        z * (w / 2 - 0.006) + 0.005), 0.001))  # fmt: skip
-                m.add(loft(rings(rect, [(w * 0.8, w * 0.8, 0.002, h),
-                    (w * 0.2, w * 0.2, 0.002, h + 0.3 * w)], n=1), sharp=20.0))  # fmt: skip
-                m.add(tube(ring_path(0.02, n=14), 0.0025, n=6), turn=rotation_x(pi / 2),
-                    at=(0, h + 0.3 * w + 0.018, 0))  # fmt: skip
+                    m.box(0.01, (0.012, h - 0.012), 0.01, 0.001, x=x * (w / 2 - 0.006),
+                        z=z * (w / 2 - 0.006))
+                m.loft(rings(rect, [(w * 0.8, w * 0.8, 0.002, h),
+                    (w * 0.2, w * 0.2, 0.002, h + 0.3 * w)], n=1), sharp=20.0)
+                m.tube(ring_path(0.02, n=14), 0.0025, n=6, turn=rotation_x(pi / 2),
+                    at=(0, h + 0.3 * w + 0.018, 0))
             with m.moved(at=(0, 0.0122, 0)):
                 pillar(m, 0.03, 0.45 * h, wax)
         case 5:  # on three arms
             h = m.uniform(0.14, 0.2)
             with m.of(stick):
-                m.add(revolve([(0, 0), (0.05, 0), (0.048, 0.008), (0.01, 0.018), (0.008, h),
-                    (0.016, h + 0.01), (0, h + 0.01)], n=18))  # fmt: skip
+                m.revolve([(0, 0), (0.05, 0), (0.048, 0.008), (0.01, 0.018), (0.008, h),
+                    (0.016, h + 0.01), (0, h + 0.01)], n=18)
                 for x in (-1.0, 1.0):
-                    m.add(tube(bent([(0, 0.55 * h, 0), (x * 0.09, 0.5 * h, 0),
-                        (x * 0.09, 0.9 * h, 0)], 0.04, n=4), 0.006, n=8))  # fmt: skip
+                    m.tube(bent([(0, 0.55 * h, 0), (x * 0.09, 0.5 * h, 0), (x * 0.09, 0.9 * h, 0)],
+                        0.04, n=4), 0.006)
             for x, y in ((0.0, 1.0), (-0.09, 0.9), (0.09, 0.9)):
-                m.add(revolve([(0, 0), (0.011, 0), (0.009, 0.14), (0, 0.15)], n=10),
-                    at=(x, y * h + (0.0105 if x == 0.0 else 0.0), 0), of=wax)  # fmt: skip
+                m.revolve([(0, 0), (0.011, 0), (0.009, 0.14), (0, 0.15)], n=10,
+                    at=(x, y * h + (0.0105 if x == 0.0 else 0.0), 0), of=wax)
         case 6:  # a ball on a dish
-            m.add(revolve([(0, 0), (0.05, 0), (0.065, 0.01), (0.062, 0.012), (0.045, 0.005),
-                (0, 0.005)], n=20), of=stick)  # fmt: skip
+            m.revolve([(0, 0), (0.05, 0), (0.065, 0.01), (0.062, 0.012), (0.045, 0.005),
+                (0, 0.005)], n=20, of=stick)
             if m.chance(0.5):
-                m.add(sphere((0, 0.047, 0), 0.042, n=16), of=wax)
+                m.sphere((0, 0.047, 0), 0.042, of=wax)
             else:
-                m.add(bevelled((-0.035, 0.0052, -0.035), (0.035, 0.08, 0.035), 0.004), of=wax)
+                m.box(0.07, (0.0052, 0.08), 0.07, 0.004, of=wax)
 
 
 def pillar(m: Maker, r: float, tall: float, wax: Material) -> None:
     """A candle with its wick."""
     # The rim stands 4 mm above the hollow that the wick rises from.
-    m.add(revolve([(0, 0), (r, 0), (r, tall - 0.004), (r - 0.004, tall), (0, tall - 0.004)]),
-        of=wax)  # fmt: skip
-    m.add(frustum((0.0015, tall - 0.005), (0.001, tall + 0.008), n=5),
-        of=plain("wick", (0.1, 0.1, 0.1), 0.9))  # fmt: skip
+    m.revolve([(0, 0), (r, 0), (r, tall - 0.004), (r - 0.004, tall), (0, tall - 0.004)], of=wax)
+    m.frustum(
+        (0.0015, tall - 0.005), (0.001, tall + 0.008), n=5, of=plain("wick", (0.1, 0.1, 0.1), 0.9)
+    )
 
 
 def photograph(m: Maker, low: Pair, high: Pair) -> None:
@@ -231,7 +218,7 @@ def photograph(m: Maker, low: Pair, high: Pair) -> None:
     sky, land = m.colour_within(0.45, 0.9), m.colour_within(0.1, 0.6)
 
     def add_pane(x0: float, y0: float, x1: float, y1: float, z: float, of: Material) -> None:
-        m.add(slab((x0, y0, z), (x1, y1, z + 0.001)), of=of)
+        m.box((x0, x1), (y0, y1), 0.001, against=z, of=of)
 
     add_pane(x0, y0, x1, y1, 0.004, plain("mount", (0.92, 0.91, 0.88), 0.8))
     add_pane(x0 + b, horizon, x1 - b, y1 - b, 0.0052, plain("photo", sky, 0.3))

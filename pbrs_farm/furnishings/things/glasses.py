@@ -8,60 +8,44 @@ import numpy as np
 
 from pbrs_farm.core.frames import rotation_x, rotation_y
 from pbrs_farm.furnishings.things import materials
-from pbrs_farm.furnishings.things.bodies import bevelled, cylinder, loft, revolve, tube, vessel
+from pbrs_farm.furnishings.things.bodies import bevelled, vessel
 from pbrs_farm.furnishings.things.cups import handle
 from pbrs_farm.furnishings.things.maker import Maker, thing
 from pbrs_farm.furnishings.things.materials import plain
 from pbrs_farm.furnishings.things.outlines import bent, fluted, oval, rings
 
+# fmt: off
+
 _Shape = tuple[tuple[float, float], ...]
 
 # Of each bowl: half its width and its height in metres, and its outside from the foot to the rim in
 # shares of these. Those of the first table stand on a stem, those of the second on the table.
-_ON_STEMS: Final[dict[str, tuple[float, float, _Shape]]] = {
-    "red wine": (0.045, 0.11, ((0.35, 0.04), (0.8, 0.22), (1.0, 0.45), (0.95, 0.7), (0.75, 1.0))),
+_ON_STEMS: Final[dict[str, tuple[float, float, _Shape]]] = {"red wine": (0.045, 0.11,
+    ((0.35, 0.04), (0.8, 0.22), (1.0, 0.45), (0.95, 0.7), (0.75, 1.0))),
     "white wine": (0.036, 0.1, ((0.4, 0.05), (0.95, 0.32), (1.0, 0.5), (0.85, 1.0))),
-    "balloon": (
-        0.05,
-        0.1,
-        ((0.4, 0.03), (0.85, 0.2), (1.0, 0.42), (0.9, 0.7), (0.65, 0.95), (0.64, 1.0)),
-    ),
-    "flute": (0.025, 0.16, ((0.25, 0.03), (0.7, 0.2), (1.0, 0.6), (0.92, 1.0))),
+    "balloon": (0.05, 0.1, ((0.4, 0.03), (0.85, 0.2), (1.0, 0.42), (0.9, 0.7), (0.65, 0.95),
+    (0.64, 1.0))), "flute": (0.025, 0.16, ((0.25, 0.03), (0.7, 0.2), (1.0, 0.6), (0.92, 1.0))),
     "tulip": (0.031, 0.13, ((0.3, 0.04), (0.9, 0.28), (1.0, 0.45), (0.8, 0.75), (0.95, 1.0))),
     "coupe": (0.05, 0.05, ((0.3, 0.1), (0.75, 0.35), (0.95, 0.65), (1.0, 1.0))),
-    "cocktail": (0.052, 0.06, ((0.1, 0.02), (1.0, 1.0))),
-    "hurricane": (0.036, 0.14, ((0.6, 0.05), (0.95, 0.25), (0.7, 0.6), (0.72, 0.7), (1.0, 1.0))),
+    "cocktail": (0.052, 0.06, ((0.1, 0.02), (1.0, 1.0))), "hurricane": (0.036, 0.14,
+    ((0.6, 0.05), (0.95, 0.25), (0.7, 0.6), (0.72, 0.7), (1.0, 1.0))),
     "goblet": (0.04, 0.09, ((0.5, 0.03), (0.92, 0.25), (1.0, 0.6), (1.0, 1.0))),
     "sherry": (0.027, 0.07, ((0.35, 0.06), (0.95, 0.45), (0.8, 1.0))),
     "snifter": (0.045, 0.085, ((0.5, 0.03), (0.95, 0.25), (1.0, 0.4), (0.55, 1.0))),
-    "sundae": (0.04, 0.12, ((0.3, 0.02), (0.45, 0.2), (0.75, 0.55), (0.8, 0.75), (1.0, 1.0))),
-}
-_TUMBLERS: Final[dict[str, tuple[float, float, _Shape]]] = {
-    "straight": (0.035, 0.1, ((0.97, 0.0), (1.0, 0.03), (1.0, 1.0))),
-    "tapered": (0.038, 0.12, ((0.72, 0.0), (1.0, 1.0))),
+    "sundae": (0.04, 0.12, ((0.3, 0.02), (0.45, 0.2), (0.75, 0.55), (0.8, 0.75), (1.0, 1.0)))}
+_TUMBLERS: Final[dict[str, tuple[float, float, _Shape]]] = {"straight": (0.035, 0.1,
+    ((0.97, 0.0), (1.0, 0.03), (1.0, 1.0))), "tapered": (0.038, 0.12, ((0.72, 0.0), (1.0, 1.0))),
     "old fashioned": (0.042, 0.085, ((0.9, 0.0), (0.96, 0.05), (1.0, 1.0))),
     "barrel": (0.038, 0.1, ((0.8, 0.0), (0.97, 0.25), (1.0, 0.5), (0.92, 0.85), (0.9, 1.0))),
     "highball": (0.031, 0.15, ((0.95, 0.0), (1.0, 0.02), (0.98, 0.5), (1.0, 1.0))),
-    "pint": (
-        0.043,
-        0.15,
-        ((0.7, 0.0), (0.92, 0.7), (1.0, 0.76), (1.0, 0.84), (0.96, 0.87), (0.99, 1.0)),
-    ),
-    "wheat beer": (
-        0.04,
-        0.2,
-        ((0.85, 0.0), (0.9, 0.06), (0.66, 0.25), (0.8, 0.5), (1.0, 0.8), (0.94, 1.0)),
-    ),
-    "waisted": (0.036, 0.14, ((0.88, 0.0), (0.9, 0.2), (0.78, 0.42), (1.0, 1.0))),
-    "round": (0.042, 0.08, ((0.55, 0.0), (0.9, 0.18), (1.0, 0.45), (0.95, 0.75), (0.8, 1.0))),
-    "shot": (0.023, 0.06, ((0.75, 0.0), (0.8, 0.12), (1.0, 1.0))),
+    "pint": (0.043, 0.15, ((0.7, 0.0), (0.92, 0.7), (1.0, 0.76), (1.0, 0.84), (0.96, 0.87),
+    (0.99, 1.0))), "wheat beer": (0.04, 0.2, ((0.85, 0.0), (0.9, 0.06), (0.66, 0.25), (0.8, 0.5),
+    (1.0, 0.8), (0.94, 1.0))), "waisted": (0.036, 0.14, ((0.88, 0.0), (0.9, 0.2), (0.78, 0.42),
+    (1.0, 1.0))), "round": (0.042, 0.08, ((0.55, 0.0), (0.9, 0.18), (1.0, 0.45), (0.95, 0.75),
+    (0.8, 1.0))), "shot": (0.023, 0.06, ((0.75, 0.0), (0.8, 0.12), (1.0, 1.0))),
     "ringed": (0.036, 0.11, tuple((1.0 if k % 2 else 0.95, k / 11) for k in range(12))),
-    "two steps": (
-        0.038,
-        0.13,
-        ((0.66, 0.0), (0.68, 0.3), (0.82, 0.34), (0.84, 0.64), (0.98, 0.68), (1.0, 1.0)),
-    ),
-}
+    "two steps": (0.038, 0.13, ((0.66, 0.0), (0.68, 0.3), (0.82, 0.34), (0.84, 0.64), (0.98, 0.68),
+    (1.0, 1.0)))}
 _WALL_M: Final = 0.002
 
 
@@ -69,37 +53,43 @@ def _filled(m: Maker, r: float, low: float, tall: float, shape: _Shape, share: f
     """What is in a bowl up to a share of its height."""
     radii, heights = np.array([(0.0, 0.0), *shape]).T
     ys = np.linspace(0.06, share, 5)
-    inside = [
-        (float(np.interp(y, heights, radii) * r - _WALL_M - 0.0008), float(low + y * tall))
-        for y in ys
-    ]
+    inside = [(float(np.interp(y, heights, radii) * r - _WALL_M - 0.0008),
+        float(low + y * tall)) for y in ys]
     inside = [(max(x, 0.001), y + _WALL_M) for x, y in inside]
-    drink = plain("drink", m.pick((0.35, 0.03, 0.06), (0.85, 0.75, 0.4), (0.8, 0.45, 0.1), (0.45, 0.2, 0.06),
-        (0.9, 0.85, 0.78), (0.75, 0.25, 0.3)), 0.1)  # fmt: skip
-    m.add(revolve([(0.0, inside[0][1]), *inside, (0.0, inside[-1][1])], n=16), of=drink)
+    drink = plain("drink", m.pick((0.35, 0.03, 0.06), (0.85, 0.75, 0.4), (0.8, 0.45, 0.1),
+        (0.45, 0.2, 0.06), (0.9, 0.85, 0.78), (0.75, 0.25, 0.3)), 0.1)
+    m.revolve([(0.0, inside[0][1]), *inside, (0.0, inside[-1][1])], of=drink)
 
 
 def _stemmed(m: Maker) -> None:
     """A bowl on a stem and a foot."""
     half, tall, shape = _ON_STEMS[m.pick(*_ON_STEMS)]
-    r, tall, stem = (
-        half * m.uniform(0.92, 1.08),
-        tall * m.uniform(0.92, 1.1),
-        m.uniform(0.035, 0.09),
-    )
+    r, tall, stem = (half * m.uniform(0.92, 1.08), tall * m.uniform(0.92, 1.1),
+        m.uniform(0.035, 0.09))
     foot = max(0.8 * r, 0.028)
     way = m.integers(0, 4)
     middle = [
         [(0.0045, 0.009), (0.0038, 0.5 * stem), (0.006, stem - 0.004)],  # thin
-        [(0.006, 0.012), (0.0035, 0.3 * stem), (0.009, 0.5 * stem), (0.0035, 0.7 * stem), (0.006, stem - 0.003)],  # a knot
+        [
+            (0.006, 0.012),
+            (0.0035, 0.3 * stem),
+            (0.009, 0.5 * stem),
+            (0.0035, 0.7 * stem),
+            (0.006, stem - 0.003),
+        ],  # a knot
         [(0.014, 0.01), (0.008, 0.5 * stem), (0.01, stem - 0.004)],  # thick
-        [(0.01, 0.009), (0.004, 0.35 * stem), (0.004, 0.75 * stem), (0.012, stem - 0.002)],  # drawn out of the bowl
-    ][way]  # fmt: skip
+        [
+            (0.01, 0.009),
+            (0.004, 0.35 * stem),
+            (0.004, 0.75 * stem),
+            (0.012, stem - 0.002),
+        ],  # drawn out of the bowl
+    ][way]
     outer = [(x * r, stem + y * tall) for x, y in shape]
     inner = [(x - _WALL_M, y + (_WALL_M if k else 0.0)) for k, (x, y) in enumerate(outer)]
     inner = [(x, min(y, outer[-1][1])) for x, y in inner if x > 0.001]
-    m.add(revolve([(0.0, 0.0), (foot, 0.0), (0.96 * foot, 0.003), *middle, *outer, *inner[::-1],
-        (0.0, outer[0][1] + 1.5 * _WALL_M)], n=m.pick(16, 18, 20)))  # fmt: skip
+    m.revolve([(0.0, 0.0), (foot, 0.0), (0.96 * foot, 0.003), *middle, *outer, *inner[::-1],
+        (0.0, outer[0][1] + 1.5 * _WALL_M)], n=m.pick(16, 18, 20))
     if m.chance(0.4):
         _filled(m, r, stem, tall, shape, m.uniform(0.35, 0.75))
 
@@ -118,7 +108,8 @@ def _tumbler(m: Maker) -> None:
         m.add(glass, at=(apart * (k % 2), 0.0, apart * (k // 2)))
         # A thick base is a slab of glass inside.
         if base > 1.0:
-            m.add(cylinder(0.8 * shape[0][0] * r, _WALL_M * 1.5, _WALL_M * base, n=16), at=(apart * (k % 2), 0.0, apart * (k // 2)))  # fmt: skip
+            m.cylinder(0.8 * shape[0][0] * r, _WALL_M * 1.5, _WALL_M * base,
+                at=(apart * (k % 2), 0.0, apart * (k // 2)))
     if n > 1:
         return
     share = m.uniform(0.4, 0.85)
@@ -127,16 +118,17 @@ def _tumbler(m: Maker) -> None:
         _filled(m, r, _WALL_M * base, tall - _WALL_M * base, shape, share)
     extra = m.weighted(0.6, 0.12, 0.12, 0.16)
     if extra == 1:
-        m.add(tube([(-0.3 * r, 0.3 * tall, 0.0), (0.75 * r, 1.0 * tall, 0.0), (1.3 * r, 1.35 * tall, 0.004)], 0.003, n=6),
-            of=plain("straw", m.any_colour(), 0.5))  # fmt: skip
+        m.tube([(-0.3 * r, 0.3 * tall, 0.0), (0.75 * r, 1.0 * tall, 0.0),
+            (1.3 * r, 1.35 * tall, 0.004)], 0.003, n=6, of=plain("straw", m.any_colour(), 0.5))
     elif extra == 2:
         rim = shape[-1][0] * r
-        m.add(cylinder(0.62 * r, 0.0, 0.004, n=16), turn=rotation_x(np.pi / 2), at=(rim, tall + 0.12 * r, 0.0),
-            of=plain("lemon", m.pick((0.88, 0.78, 0.25), (0.85, 0.5, 0.15), (0.5, 0.65, 0.2)), 0.5))  # fmt: skip
+        m.cylinder(0.62 * r, 0.0, 0.004, turn=rotation_x(np.pi / 2), at=(rim, tall + 0.12 * r, 0.0),
+            of=plain("lemon", m.pick((0.88, 0.78, 0.25), (0.85, 0.5, 0.15), (0.5, 0.65, 0.2)), 0.5))
     elif extra == 3 and has_drink:
         for k in range(m.integers(2, 4)):
-            m.add(bevelled((-0.008,) * 3, (0.008,) * 3, 0.002), turn=rotation_y(0.7 * k) @ rotation_x(0.5 * k),
-                at=(0.3 * r * np.cos(2.2 * k), share * tall, 0.3 * r * np.sin(2.2 * k)))  # fmt: skip
+            m.add(bevelled((-0.008,) * 3, (0.008,) * 3, 0.002),
+                turn=rotation_y(0.7 * k) @ rotation_x(0.5 * k), at=(0.3 * r * np.cos(2.2 * k),
+                share * tall, 0.3 * r * np.sin(2.2 * k)))
 
 
 def _mug(m: Maker) -> None:
@@ -144,20 +136,25 @@ def _mug(m: Maker) -> None:
     r, tall, form = m.uniform(0.036, 0.042), m.uniform(0.11, 0.15), m.integers(0, 3)
     match form:
         case 0:
-            m.add(vessel([(0, 0), (r, 0), (1.02 * r, tall)], 0.004, n=18))
+            m.vessel([(0, 0), (r, 0), (1.02 * r, tall)], 0.004, n=18)
         case 1:
-            m.add(vessel([(0, 0), (0.9 * r, 0), (1.05 * r, 0.4 * tall), (1.05 * r, 0.65 * tall), (0.95 * r, tall)], 0.004, n=18))  # fmt: skip
+            m.vessel([(0, 0), (0.9 * r, 0), (1.05 * r, 0.4 * tall), (1.05 * r, 0.65 * tall),
+                (0.95 * r, tall)], 0.004, n=18)
         case 2:
-            m.add(loft(rings(fluted, [(2 * r, 9, 0.1, 0.0), (2.05 * r, 9, 0.1, tall), (1.8 * r, 9, 0.06, tall), (1.76 * r, 9, 0.06, 0.012)]), sharp=70.0))  # fmt: skip
+            m.loft(rings(fluted, [(2 * r, 9, 0.1, 0.0), (2.05 * r, 9, 0.1, tall),
+                (1.8 * r, 9, 0.06, tall), (1.76 * r, 9, 0.06, 0.012)]), sharp=70.0)
     if m.chance(0.5):
-        m.add(tube(bent([(r - 0.003, 0.86 * tall, 0), (r + 0.038, 0.86 * tall, 0), (r + 0.036, 0.2 * tall, 0),
-            (r - 0.003, 0.2 * tall, 0)], 0.02, n=3), 0.005, n=6))  # fmt: skip
+        m.tube(bent([(r - 0.003, 0.86 * tall, 0), (r + 0.038, 0.86 * tall, 0),
+            (r + 0.036, 0.2 * tall, 0), (r - 0.003, 0.2 * tall, 0)], 0.02, n=3), 0.005, n=6)
     else:
         m.add(handle(r, tall))
     if m.chance(0.5):
-        m.add(cylinder(r - 0.0075, 0.0135, 0.72 * tall, n=18), of=plain("drink", (0.82, 0.55, 0.12), 0.1))  # fmt: skip
+        m.cylinder(
+            r - 0.0075, 0.0135, 0.72 * tall, n=18, of=plain("drink", (0.82, 0.55, 0.12), 0.1)
+        )
         if m.chance(0.6):
-            m.add(cylinder(r - 0.0075, 0.7202 * tall, 0.86 * tall, n=18), of=plain("foam", (0.93, 0.9, 0.82), 0.9))  # fmt: skip
+            m.cylinder(r - 0.0075, 0.7202 * tall, 0.86 * tall, n=18,
+                of=plain("foam", (0.93, 0.9, 0.82), 0.9))
 
 
 @thing(group="glass")
@@ -177,10 +174,12 @@ def glass(m: Maker) -> None:
             case 2:
                 _mug(m)
             case 3:  # a carafe, with a ball on it or without
-                m.add(vessel([(0, 0), (0.045, 0), (0.052, 0.03), (0.045, 0.09), (0.022, 0.15), (0.024, 0.2), (0.032, 0.225)],
-                    0.003, n=20))  # fmt: skip
+                m.vessel([(0, 0), (0.045, 0), (0.052, 0.03), (0.045, 0.09), (0.022, 0.15),
+                    (0.024, 0.2), (0.032, 0.225)], 0.003, n=20)
                 if m.chance(0.4):
-                    m.add(revolve([(0.0, 0.19), (0.017, 0.192), (0.019, 0.228), (0.03, 0.25), (0.022, 0.278), (0.0, 0.285)], n=16))  # fmt: skip
+                    m.revolve([(0.0, 0.19), (0.017, 0.192), (0.019, 0.228), (0.03, 0.25),
+                        (0.022, 0.278), (0.0, 0.285)])
             case 4:  # cut, for whisky
                 k = m.pick(6, 8, 10, 12)
-                m.add(loft(rings(oval, [(0.07, 0.07, 0), (0.078, 0.078, 0.085), (0.072, 0.072, 0.085), (0.062, 0.062, 0.02)], n=k), sharp=20.0))  # fmt: skip
+                m.loft(rings(oval, [(0.07, 0.07, 0), (0.078, 0.078, 0.085), (0.072, 0.072, 0.085),
+                    (0.062, 0.062, 0.02)], n=k), sharp=20.0)

@@ -18,15 +18,19 @@ from pbrs_farm.core.classes import CABINET, CLOTHES, MIRROR, PAPER, SHELVES, WHI
 from pbrs_farm.core.frames import LYING_ALONG_X, LYING_ALONG_Z, rotation_z
 from pbrs_farm.core.house import Material, Surface
 from pbrs_farm.dress.style import Rgb, mix, shade
-from pbrs_farm.furnishings.things.bodies import box, cylinder, revolve, slab, smooth
+from pbrs_farm.furnishings.things.bodies import smooth
 from pbrs_farm.furnishings.things.joints import hollow, opens, shelves
-from pbrs_farm.furnishings.things.maker import Maker, Pair, thing
+from pbrs_farm.furnishings.things.maker import Maker, thing
 from pbrs_farm.furnishings.things.materials import MIRROR_GLASS, plain
 from pbrs_farm.furnishings.things.outlines import Profile, spaced
 from pbrs_farm.furnishings.things.papers import printed, white_paper
+from pbrs_farm.furnishings.things.shapes import Pair
 from pbrs_farm.geometry.solids import lathe, quads_surface
 
-_STICKY: Final[tuple[Rgb, ...]] = ((0.95, 0.88, 0.35), (0.95, 0.6, 0.7), (0.6, 0.85, 0.6), (0.55, 0.8, 0.93))  # fmt: skip
+# fmt: off
+
+_STICKY: Final[tuple[Rgb, ...]] = ((0.95, 0.88, 0.35), (0.95, 0.6, 0.7), (0.6, 0.85, 0.6),
+    (0.55, 0.8, 0.93))
 # Turns what stands upright so that its top looks along +z.
 _LYING: Final = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
 
@@ -36,15 +40,14 @@ def wall_shelf(m: Maker, width: float, depth: float, n: int, board: Material) ->
     """Boards above one another on two brackets each; the lowest board's top is at y = 0.04."""
     for k in range(n):
         y = 0.028 + 0.32 * k
-        m.add(box((0.0, y, depth / 2), (width / 2, 0.012, depth / 2)), name="board", of=board)
+        m.box(width, 0.024, (0.0, depth), on=y - 0.012, name="board", of=board)
         for x in (-(width / 2 - 0.12), width / 2 - 0.12):
-            m.add(box((x, y - 0.02, depth * 0.4), (0.01, 0.008, depth * 0.4)), name="bracket",
-                of=m.metal)  # fmt: skip
+            m.box(0.02, 0.016, (0.0, 0.8 * depth), x=x, on=y - 0.028, name="bracket", of=m.metal)
 
 
 @thing(group="upper_cabinet", nyu40=CABINET, place=Place.WALL)
 def wall_cupboard(m: Maker, body: Material, face: Material, width: float, height: float, d: float,
-    n: int, form: int) -> None:  # fmt: skip
+    n: int, form: int) -> None:
     """A closed cupboard with its doors.
 
     Bars, knobs, grip edges, shaker fronts, flaps, an open end.
@@ -56,20 +59,20 @@ def wall_cupboard(m: Maker, body: Material, face: Material, width: float, height
     hollow(m, (-w, -w + wide), (0.0, height), (0.0, d), t, body)
     if e > 0:
         with m.of(body):
-            m.add(slab((w - e, 0.0, 0.0), (w, height, t)))
-            m.add(slab((w - t, 0.0, t), (w, height, d)))
+            m.box((w - e, w), height, (0.0, t))
+            m.box((w - t, w), height, (t, d))
             for y in spaced(0.0, height - t, max(2, round(height / 0.3) + 1)):
-                m.add(slab((w - e, y, t), (w - t, y + t, d)))
+                m.box((w - e, w - t), t, (t, d), on=y)
     if form == 4:
         # Flaps that open upwards, one above the other.
         rows = 2 if height > 0.5 else 1
         for r in range(rows):
             low, high = r * height / rows, (r + 1) * height / rows
             with opens(m, "flap", (-w, w), (low, high), d + 0.0185, 0.0, is_high=True):
-                m.add(slab((-w + 0.002, low + 0.002, d + 0.0005), (w - 0.002, high - 0.002, d + 0.0185)),
-                    of=face)  # fmt: skip
-                m.add(slab((-0.08, low + 0.02, d + 0.0185), (0.08, low + 0.03, d + 0.03)),
-                    of=m.metal)  # fmt: skip
+                m.box(
+                    2 * w - 0.004, (low + 0.002, high - 0.002), 0.018, against=d + 0.0005, of=face
+                )
+                m.box(0.16, 0.01, 0.0115, on=low + 0.02, against=d + 0.0185, of=m.metal)
         shelves(m, (-w + t, w - t), (0.0, height), (0.008, d), body)
         return
     for k in range(n):
@@ -78,42 +81,41 @@ def wall_cupboard(m: Maker, body: Material, face: Material, width: float, height
         with opens(m, "door", (x, x + step), (0.0, height), d + 0.0185, 0.0, opens_left):
             cupboard_door(m, face, (x, x + step), height, d, form, opens_left)
         if k:
-            m.add(slab((x - t / 2, t, 0.008), (x + t / 2, height - t, d)), of=body)
+            m.box(t, (t, height - t), (0.008, d), x=x, of=body)
         shelves(m, (x + (t / 2 if k else t), x + step - (t / 2 if k < n - 1 else t)), (0.0, height),
-            (0.008, d), body)  # fmt: skip
+            (0.008, d), body)
 
 
-def cupboard_door(m: Maker, face: Material, span: Pair, height: float, d: float, form: int,
-    opens_left: bool) -> None:  # fmt: skip
+def cupboard_door(
+    m: Maker, face: Material, span: Pair, height: float, d: float, form: int, opens_left: bool
+) -> None:
     """A door of a cupboard that hangs, before d, with what opens it at the end without hinges."""
     x, step = span[0], span[1] - span[0]
     a = x + (step - 0.04 if opens_left else 0.04)
-    m.add(slab((x + 0.002, 0.002 + (0.016 if form == 2 else 0.0), d + 0.0005),
-        (x + step - 0.002, height - 0.002, d + 0.0185)), of=face)  # fmt: skip
+    m.box((x + 0.002, x + step - 0.002), (0.002 + (0.016 if form == 2 else 0.0), height - 0.002),
+        0.018, against=d + 0.0005, of=face)
     match form:
         case 3 | 5:
             with m.of(face):
                 # A frame stands out round a panel.
                 for y in (0.002, height - 0.062):
-                    m.add(
-                        slab((x + 0.062, y, d + 0.0185), (x + step - 0.062, y + 0.06, d + 0.0235))
-                    )
+                    m.box((x + 0.062, x + step - 0.062), 0.06, 0.005, on=y, against=d + 0.0185)
                 for q in (x + 0.002, x + step - 0.062):
-                    m.add(slab((q, 0.002, d + 0.0185), (q + 0.06, height - 0.002, d + 0.0235)))
+                    m.box(0.06, (0.002, height - 0.002), 0.005, left=q, against=d + 0.0185)
         case 0:  # bars
             with m.of(m.metal):
-                m.add(slab((a - 0.005, 0.04, d + 0.0345), (a + 0.005, 0.2, d + 0.0425)))
+                m.box(0.01, (0.04, 0.2), 0.008, x=a, against=d + 0.0345)
                 for y in (0.05, 0.185):
-                    m.add(slab((a - 0.004, y, d + 0.0185), (a + 0.004, y + 0.008, d + 0.0345)))
+                    m.box(0.008, 0.008, 0.016, x=a, on=y, against=d + 0.0185)
     match form:
         case 1 | 3:  # knobs
             with m.of(m.metal):
-                m.add(revolve([(0.0, 0.0), (0.005, 0.0), (0.005, 0.018), (0.013, 0.02),
-                    (0.013, 0.028), (0.0, 0.03)], n=14), turn=LYING_ALONG_Z,
-                    at=(a, 0.07, d + (0.0235 if form == 3 else 0.0185)))  # fmt: skip
+                m.revolve([(0.0, 0.0), (0.005, 0.0), (0.005, 0.018), (0.013, 0.02), (0.013, 0.028),
+                    (0.0, 0.03)], n=14, turn=LYING_ALONG_Z, at=(a, 0.07,
+                    d + (0.0235 if form == 3 else 0.0185)))
         case 2:  # a grip edge
-            m.add(slab((x + 0.002, 0.002, d + 0.0005), (x + step - 0.002, 0.012, d + 0.008)),
-                of=m.metal)  # fmt: skip
+            m.box((x + 0.002, x + step - 0.002), (0.002, 0.012), 0.0075, against=d + 0.0005,
+                of=m.metal)
 
 
 @thing(group="shelves", nyu40=SHELVES, place=Place.WALL)
@@ -121,26 +123,26 @@ def open_cupboard(m: Maker, body: Material, width: float, height: float, d: floa
     """An open cupboard of one to three shelves."""
     w, t = width / 2, 0.018
     with m.of(body):
-        m.add(slab((-w, 0.0, 0.0), (-w + t, height, d)))
-        m.add(slab((w - t, 0.0, 0.0), (w, height, d)))
-        m.add(slab((-w + t, 0.0, 0.0), (w - t, height, 0.006)))
+        m.box(t, height, (0.0, d), left=-w)
+        m.box((w - t, w), height, (0.0, d))
+        m.box(2 * w - 2 * t, height, (0.0, 0.006))
         for y in spaced(0.0, height - t, max(1, round(height / 0.3)) + 1):
-            m.add(slab((-w + t, y, 0.006), (w - t, y + t, d)))
+            m.box(2 * w - 2 * t, t, (0.006, d), on=y)
 
 
 @thing(group="kitchen_tool", place=Place.WALL)
 def tool_rail(m: Maker, width: float) -> None:
     """A bar on two holders with tools, pans and cups on hooks; the bar hangs above y = 0.3."""
     half, y = width / 2, 0.36
-    m.add(cylinder(0.006, 0.0, width, n=12), turn=LYING_ALONG_X, at=(-half, y, 0.045), of=m.metal)
-    for x in (-half + 0.03, half - 0.03):
-        m.add(slab((x - 0.008, y - 0.008, 0.0), (x + 0.008, y + 0.008, 0.045 - 0.004)), of=m.metal)
+    m.cylinder(0.006, 0.0, width, n=12, turn=LYING_ALONG_X, at=(-half, y, 0.045), of=m.metal)
+    m.box(
+        0.016, 0.016, 0.041, left=0.022 - half, on=y - 0.008, against=0.0, mirrored="x", of=m.metal
+    )
     x = -half + 0.1
     while x < half - 0.08:
         tool = m.weighted(0.3, 0.3, 0.22, 0.18)
         # A hook reaches from the bar down to what hangs.
-        m.add(slab((x - 0.0015, y - 0.006 - 0.03, 0.045 - 0.0015),
-            (x + 0.0015, y - 0.006 + 0.001, 0.045 + 0.0015)), of=m.metal)  # fmt: skip
+        m.box(0.003, 0.031, 0.003, x=x, on=y - 0.006 - 0.03, z=0.045, of=m.metal)
         match tool:
             case 0:
                 ladle(m, x, y - 0.006)
@@ -155,46 +157,45 @@ def tool_rail(m: Maker, width: float) -> None:
 
 def stick(m: Maker, x: float, top: float, low: float) -> None:
     """The handle of a tool from `low` to `top`."""
-    m.add(slab((x - 0.006, low, 0.045 - 0.003), (x + 0.006, top, 0.045 + 0.003)))
+    m.box(0.012, (low, top), 0.006, x=x, z=0.045)
 
 
 def ladle(m: Maker, x: float, y: float) -> None:
     """A ladle that hangs from (x, y)."""
     r, low = m.uniform(0.03, 0.042), y - m.uniform(0.24, 0.3)
     with m.of(m.pick(m.metal, plain("handle", (0.08, 0.08, 0.08), 0.5),
-        plain("handle " + m.style.wood.name, m.wood, 0.6))):  # fmt: skip
+        plain("handle " + m.style.wood.name, m.wood, 0.6))):
         stick(m, x, y - 0.028, low + 0.6 * r)
-    m.add(revolve([(0.0, -r), (0.7 * r, -0.7 * r), (r, 0.0), (0.7 * r, 0.7 * r), (0.0, r)], n=14),
-        turn=np.diag((1.0, 1.0, 0.55)), at=(x, low, 0.045), of=m.metal)  # fmt: skip
+    m.revolve([(0.0, -r), (0.7 * r, -0.7 * r), (r, 0.0), (0.7 * r, 0.7 * r), (0.0, r)], n=14,
+        turn=np.diag((1.0, 1.0, 0.55)), at=(x, low, 0.045), of=m.metal)
 
 
 def turner(m: Maker, x: float, y: float) -> None:
     """A turner that hangs from (x, y)."""
     w, low = m.uniform(0.028, 0.04), y - m.uniform(0.2, 0.24)
     grip = m.pick(m.metal, plain("handle", (0.08, 0.08, 0.08), 0.5),
-        plain("handle " + m.style.wood.name, m.wood, 0.6))  # fmt: skip
+        plain("handle " + m.style.wood.name, m.wood, 0.6))
     with m.of(grip):
         stick(m, x, y - 0.028, low)
-    m.add(slab((x - w, low - 0.1, 0.045 - 0.0015), (x + w, low + 0.002, 0.045 + 0.0015)),
-        of=grip if m.chance(0.5) else m.metal)  # fmt: skip
+    m.box(2 * w, 0.102, 0.003, x=x, on=low - 0.1, z=0.045, of=grip if m.chance(0.5) else m.metal)
 
 
 def pan(m: Maker, x: float, y: float) -> None:
     """A pan that hangs from (x, y), its inside to the front."""
     r, low, black = m.uniform(0.08, 0.1), y - 0.13, plain("pan", (0.07, 0.07, 0.075), 0.4)
-    m.add(slab((x - 0.009, low - 0.004, 0.028), (x + 0.009, y - 0.024, 0.046)), of=black)
-    m.add(revolve([(0.0, 0.0), (0.85 * r, 0.0), (r, 0.035), (0.96 * r, 0.035), (0.82 * r, 0.005),
-        (0.0, 0.005)], n=24), turn=LYING_ALONG_Z, at=(x, low - r, 0.008),
-        of=black if m.chance(0.6) else m.metal)  # fmt: skip
+    m.box(0.018, (low - 0.004, y - 0.024), (0.028, 0.046), x=x, of=black)
+    m.revolve([(0.0, 0.0), (0.85 * r, 0.0), (r, 0.035), (0.96 * r, 0.035), (0.82 * r, 0.005),
+        (0.0, 0.005)], n=24, turn=LYING_ALONG_Z, at=(x, low - r, 0.008),
+        of=black if m.chance(0.6) else m.metal)
 
 
 def hung_cup(m: Maker, x: float, y: float) -> None:
     """A cup that hangs by its handle, its mouth to the side."""
     r, h = 0.038, 0.085
     with m.of(plain("hung cup", m.any_colour(), 0.25)):
-        m.add(slab((x - 0.018, y - 0.05, 0.045 - 0.005), (x + 0.018, y - 0.026, 0.045 + 0.005)))
-        m.add(revolve([(0.0, 0.0), (r, 0.0), (r, h), (r - 0.004, h), (r - 0.004, 0.004),
-            (0.0, 0.004)], n=18), turn=LYING_ALONG_X, at=(x - h / 2, y - 0.03 - 0.018 - r, 0.045))  # fmt: skip
+        m.box(0.036, 0.024, 0.01, x=x, on=y - 0.05, z=0.045)
+        m.revolve([(0.0, 0.0), (r, 0.0), (r, h), (r - 0.004, h), (r - 0.004, 0.004), (0.0, 0.004)],
+            n=18, turn=LYING_ALONG_X, at=(x - h / 2, y - 0.03 - 0.018 - r, 0.045))
 
 
 @thing(group="socket", place=Place.WALL)
@@ -204,8 +205,8 @@ def wall_socket(m: Maker, n: int, colour: Rgb) -> None:
         cover(m, n)
     for k in range(n):
         m.add(facing_disc([(0.019 + 0.003, 0.009), (0.019, 0.0093), (0, 0.0093)], 0.0405,
-            (k - (n - 1) / 2) * 0.081), name="well",
-            of=plain("plate hole", shade(colour, 0.25), 0.5))  # fmt: skip
+            (k - (n - 1) / 2) * 0.081), name="well", of=plain("plate hole", shade(colour, 0.25),
+            0.5))
 
 
 @thing(group="switch", place=Place.WALL)
@@ -220,30 +221,30 @@ def wall_switch(m: Maker, n: int, colour: Rgb, form: int) -> None:
             x = (k - (n - 1) / 2) * 0.081
             match form:
                 case 0:  # a rocker
-                    m.add(box((x, 0.0405, 0.0105), (0.029, 0.029, 0.002)), name="rocker")
+                    m.box(0.058, (0.0115, 0.0695), (0.0085, 0.0125), x=x, name="rocker")
                 case 1:  # halved
                     for s in (-1, 1):
-                        m.add(box((x + s * 0.0148, 0.0405, 0.0105), (0.0138, 0.029, 0.002)),
-                            name="rocker")  # fmt: skip
+                        m.box(0.0276, (0.0115, 0.0695), (0.0085, 0.0125), x=x + 0.0148 * s,
+                            name="rocker")
                 case 2:  # small, in a screwed plate
-                    m.add(box((x, 0.0405, 0.0115), (0.012, 0.022, 0.003)), name="rocker")
+                    m.box(0.024, (0.0185, 0.0625), (0.0085, 0.0145), x=x, name="rocker")
                 case 3:  # round, it turns
                     m.add(facing_disc([(0.024, 0.009), (0.024, 0.013), (0, 0.013)], 0.0405, x),
-                        name="rocker")  # fmt: skip
-                    m.add(box((x, 0.0405, 0.019), (0.004, 0.018, 0.0065)), name="rocker")
+                        name="rocker")
+                    m.box(0.008, (0.0225, 0.0585), (0.0125, 0.0255), x=x, name="rocker")
                 case 4:  # round
                     m.add(facing_disc([(0.03, 0.009), (0.03, 0.0105), (0.024, 0.014), (0, 0.0145)],
-                        0.0405, x), name="rocker")  # fmt: skip
+                        0.0405, x), name="rocker")
                 case 5:  # flat, nearly the whole plate
-                    m.add(box((x, 0.0405, 0.0098), (0.038, 0.038, 0.0012)), name="rocker")
+                    m.box(0.076, (0.0025, 0.0785), (0.0086, 0.011), x=x, name="rocker")
         for y in (0.012, 0.069):
             if form == 2:
-                m.add(box((0.0, y, 0.0096), (0.003, 0.003, 0.0008)), name="screw")
+                m.box(0.006, 0.006, (0.0088, 0.0104), on=y - 0.003, name="screw")
 
 
 def cover(m: Maker, n: int) -> None:
     """The plate of n switches or sockets side by side."""
-    m.add(box((0.0, 0.0405, 0.0045), (0.081 * n / 2, 0.0405, 0.0045)), name="plate")
+    m.box(0.081 * n, 0.081, (0.0, 0.009), name="plate")
 
 
 @thing(group="mirror", nyu40=MIRROR, place=Place.WALL)
@@ -251,7 +252,7 @@ def round_mirror(m: Maker, diameter: float, frame: Material) -> None:
     """A round mirror in a narrow ring."""
     r = diameter / 2
     m.add(facing_disc([(0, 0), (r, 0), (r, 0.02), (r - 0.014, 0.02), (r - 0.014, 0.012)], r),
-        name="rim", of=frame)  # fmt: skip
+        name="rim", of=frame)
     m.add(facing_disc([(r - 0.014, 0.012), (0, 0.012)], r), name="mirror", of=MIRROR_GLASS)
 
 
@@ -259,8 +260,8 @@ def round_mirror(m: Maker, diameter: float, frame: Material) -> None:
 def pin_board(m: Maker, width: float, height: float, frame: Material) -> None:
     """Cork in a frame, with papers, cards and photographs pinned to it."""
     m.add(ring("frame", (-width / 2, 0.0), (width / 2, height), 0.022, 0.018), of=frame)
-    m.add(slab((-width / 2 + 0.022, 0.022, 0.001), (width / 2 - 0.022, height - 0.022, 0.01)),
-        of=plain("cork", (0.66, 0.5, 0.34), 0.9))  # fmt: skip
+    m.box(width - 0.044, (0.022, height - 0.022), (0.001, 0.01),
+        of=plain("cork", (0.66, 0.5, 0.34), 0.9))
     # Sheets are pinned to cells of a grid, so that they lie beside one another.
     columns, rows = max(2, int(width / 0.19)), max(2, int(height / 0.2))
     for row, column in product(range(rows), range(columns)):
@@ -269,14 +270,14 @@ def pin_board(m: Maker, width: float, height: float, frame: Material) -> None:
             x = -width / 2 + 0.03 + (column + 0.5) * (width - 0.06) / columns
             y = 0.03 + (row + 0.5) * (height - 0.06) / rows
             is_white = m.chance(0.5)
-            m.add(slab((x - w / 2, y - h / 2, 0.01), (x + w / 2, y + h / 2, 0.0108)),
-                of=plain("sheet", (0.92, 0.91, 0.88) if is_white else m.any_colour(), 0.8))  # fmt: skip
+            m.box(w, h, (0.01, 0.0108), x=x, on=y - h / 2, of=plain("sheet",
+                (0.92, 0.91, 0.88) if is_white else m.any_colour(), 0.8))
             for k in range(m.integers(2, 5) if is_white else 0):
                 high = y + h / 2 - 0.018 - 0.018 * k
-                m.add(slab((x - 0.38 * w, high - 0.003, 0.0108), (x + 0.35 * w, high, 0.0111)),
-                    of=plain("print", (0.45, 0.45, 0.47), 0.8))  # fmt: skip
-            m.add(slab((x - 0.005, y + h / 2 - 0.012, 0.0108),
-                (x + 0.005, y + h / 2 - 0.002, 0.016)), of=plain("pin", m.any_colour(), 0.3))  # fmt: skip
+                m.box(0.73 * w, (high - 0.003, high), (0.0108, 0.0111), left=x - 0.38 * w,
+                    of=plain("print", (0.45, 0.45, 0.47), 0.8))
+            m.box(0.01, 0.01, (0.0108, 0.016), x=x, on=y + h / 2 - 0.012,
+                of=plain("pin", m.any_colour(), 0.3))
 
 
 @thing(group="notes", nyu40=PAPER, place=Place.WALL)
@@ -296,21 +297,21 @@ def wall_notes(m: Maker) -> None:
                 else:
                     w, h = m.pick((0.21, 0.297), (0.21, 0.297), (0.148, 0.21), (0.13, 0.18))
                     printed(m, w, h, z, white_paper(m))
-                    m.add(slab((-0.02, h / 2 - 0.012, z + 0.0006), (0.02, h / 2 + 0.01, z + 0.0008)),
-                        of=plain("tape", (0.86, 0.83, 0.72), 0.5))  # fmt: skip
+                    m.box(0.04, 0.022, 0.0002, on=h / 2 - 0.012, against=z + 0.0006,
+                        of=plain("tape", (0.86, 0.83, 0.72), 0.5))
 
 
 @thing(group="clothes", nyu40=CLOTHES, place=Place.WALL)
 def coat_rack(m: Maker, n: int, is_bath: bool) -> None:
     """A board with hooks 0.3 m apart and garments on most; its lower edge at y = 0."""
     half = n * 0.3 / 2
-    m.add(slab((-half, 0.0, 0.0), (half, 0.09, 0.018)), of=plain("rack " + m.style.wood.name,
-        m.wood, 0.4) if m.chance(0.6) else plain("rack white", (0.9, 0.9, 0.88), 0.4))  # fmt: skip
+    m.box(2 * half, 0.09, (0.0, 0.018), of=plain("rack " + m.style.wood.name, m.wood,
+        0.4) if m.chance(0.6) else plain("rack white", (0.9, 0.9, 0.88), 0.4))
     # A hook is an arm out of the board and a tip that turns up.
     for k in range(n):
         x = -half + (k + 0.5) * 0.3
-        m.add(slab((x - 0.008, 0.035, 0.018), (x + 0.008, 0.05, 0.06)), of=m.metal)
-        m.add(slab((x - 0.008, 0.05, 0.048), (x + 0.008, 0.07, 0.06)), of=m.metal)
+        m.box(0.016, (0.035, 0.05), (0.018, 0.06), x=x, of=m.metal)
+        m.box(0.016, (0.05, 0.07), (0.048, 0.06), x=x, of=m.metal)
         if n == 1 or m.chance(0.85):
             coat(m, x, is_bath)
 
@@ -321,14 +322,14 @@ def coat(m: Maker, x: float, is_bath: bool) -> None:
     if is_bath:
         colour = mix((0.92, 0.91, 0.89), m.any_colour(), 0.3)
     else:
-        colour = m.pick((0.09, 0.1, 0.13), (0.2, 0.2, 0.2), (0.35, 0.28, 0.2),
-            (0.16, 0.2, 0.16)) if m.chance(0.6) else m.any_colour()  # fmt: skip
+        colour = (m.pick((0.09, 0.1, 0.13), (0.2, 0.2, 0.2), (0.35, 0.28, 0.2),
+            (0.16, 0.2, 0.16)) if m.chance(0.6) else m.any_colour())
     phase = m.uniform(0, 6)
     with m.of(plain("coat", colour, 0.95)):
         m.add(garment(wide, long, 0.075, phase), at=(x, 0.045, 0.105))
         for sign in (-1.0, 1.0):
             m.add(garment(0.07, min(0.62, 0.8 * long), 0.055, phase + sign),
-                at=(x + sign * (wide / 2 - 0.015), 0.02, 0.085))  # fmt: skip
+                at=(x + sign * (wide / 2 - 0.015), 0.02, 0.085))
 
 
 def ring(
@@ -359,7 +360,7 @@ def facing_disc(profile: Profile | F64, up: float, x: float = 0.0) -> Surface:
     assert normals is not None
     lying = replace(upright,
         positions=(upright.positions @ _LYING.T.astype(np.float32)).astype(np.float32),
-        normals=(normals @ _LYING.T.astype(np.float32)).astype(np.float32))  # fmt: skip
+        normals=(normals @ _LYING.T.astype(np.float32)).astype(np.float32))
     return replace(lying, positions=(lying.positions + np.array((x, up, 0.0))).astype(np.float32))
 
 
@@ -381,7 +382,7 @@ def garment(wide: float, long: float, deep: float, phase: float) -> Surface:
     for r in range(rows - 1):
         a, b = r * n, (r + 1) * n
         faces += [np.stack([a + k, a + after, b + after], -1),
-            np.stack([a + k, b + after, b + k], -1)]  # fmt: skip
+            np.stack([a + k, b + after, b + k], -1)]
     last = (rows - 1) * n
     faces.append(np.stack([np.full(n, rows * n + 1), last + k, last + after], -1))
     return smooth("coat", points, np.concatenate(faces).astype(np.int32))

@@ -11,8 +11,7 @@ from numpy import pi
 
 from pbrs_farm.core.frames import LYING_ALONG_Z, rotation_x, rotation_z
 from pbrs_farm.core.house import Material
-from pbrs_farm.furnishings.things.bodies import bevelled, loft, revolve, slab, tube
-from pbrs_farm.furnishings.things.maker import Maker, Pair
+from pbrs_farm.furnishings.things.maker import Maker
 from pbrs_farm.furnishings.things.materials import FROSTED
 from pbrs_farm.furnishings.things.outlines import (
     Outline,
@@ -23,6 +22,9 @@ from pbrs_farm.furnishings.things.outlines import (
     rings,
     scaled,
 )
+from pbrs_farm.furnishings.things.shapes import Pair
+
+# fmt: off
 
 _HEIGHTS: Final = {"door": 3.4, "low": 0.7}  # of fronts in one column, against a drawer's
 _FRONT_M: Final = 0.019  # thickness of a front
@@ -62,31 +64,31 @@ def hollow(m: Maker, x: Pair, y: Pair, z: Pair, t: float, material: Material) ->
     """A box of boards t thick, open to the front: sides, bottom, top, back."""
     with m.of(material):
         for a in (x[0], x[1] - t):
-            m.add(slab((a, y[0], z[0]), (a + t, y[1], z[1])))
+            m.box(t, (y[0], y[1]), (z[0], z[1]), left=a)
         for b in (y[0], y[1] - t):
-            m.add(slab((x[0] + t, b, z[0]), (x[1] - t, b + t, z[1])))
-        m.add(slab((x[0] + t, y[0] + t, z[0]), (x[1] - t, y[1] - t, z[0] + min(_BACK_M, t))))
+            m.box((x[0] + t, x[1] - t), t, (z[0], z[1]), on=b)
+        m.box((x[0] + t, x[1] - t), (y[0] + t, y[1] - t), min(_BACK_M, t), against=z[0])
 
 
 def shell(m: Maker, x: Pair, y: Pair, z: Pair, wall: float, material: Material, r: float = 0.004,
-    liner: Material | None = None) -> None:  # fmt: skip
+    liner: Material | None = None) -> None:
     """A body of thick walls, open to the front, r: of its edges; liner: of its inside."""
     middle, size = ((x[0] + x[1]) / 2, -(y[0] + y[1]) / 2), (x[1] - x[0], y[1] - y[0])
 
     def ring(inset: float, at: float) -> tuple[Outline, float]:
-        return (rect(size[0] - 2 * inset, size[1] - 2 * inset, max(r - inset, 0.002),
-            x=middle[0], z=middle[1], n=3), at)  # fmt: skip
+        return (rect(size[0] - 2 * inset, size[1] - 2 * inset, max(r - inset, 0.002), x=middle[0],
+            z=middle[1], n=3), at)
 
-    m.add(loft([ring(0.0, z[0]), ring(0.0, z[1]), ring(wall, z[1]), ring(wall, z[0] + wall)]),
-        turn=LYING_ALONG_Z, of=material)  # fmt: skip
+    m.loft([ring(0.0, z[0]), ring(0.0, z[1]), ring(wall, z[1]), ring(wall, z[0] + wall)],
+        turn=LYING_ALONG_Z, of=material)
     if liner is not None:
-        m.add(loft([ring(wall + 0.0002, z[0] + wall + 0.0002), ring(wall + 0.0002, z[1] - 0.001),
-            ring(wall + 0.002, z[1] - 0.001), ring(wall + 0.002, z[0] + wall + 0.002)]),
-            turn=LYING_ALONG_Z, of=liner)  # fmt: skip
+        m.loft([ring(wall + 0.0002, z[0] + wall + 0.0002), ring(wall + 0.0002, z[1] - 0.001),
+            ring(wall + 0.002, z[1] - 0.001), ring(wall + 0.002, z[0] + wall + 0.002)],
+            turn=LYING_ALONG_Z, of=liner)
 
 
 def opens(m: Maker, kind: str, x: Pair, y: Pair, z: float, back: float, opens_left: bool = True,
-    is_high: bool = False) -> AbstractContextManager[None]:  # fmt: skip
+    is_high: bool = False) -> AbstractContextManager[None]:
     """What is added inside opens as a front of its kind does: 'door', 'drawer', 'low', 'flap'.
 
     z: of its outer face; back: where the space behind it ends. A door's hinges are at its left
@@ -94,10 +96,10 @@ def opens(m: Maker, kind: str, x: Pair, y: Pair, z: float, back: float, opens_le
     """
     if kind == "door":
         return m.hinged("door", at=(x[0] if opens_left else x[1], y[0], z),
-            axis=(0.0, -1.0 if opens_left else 1.0, 0.0), upper_rad=_DOOR_RAD)  # fmt: skip
+            axis=(0.0, -1.0 if opens_left else 1.0, 0.0), upper_rad=_DOOR_RAD)
     if kind == "flap" and y[1] - y[0] > _FLAP_M:
         return m.hinged("flap", at=(x[0], y[1] if is_high else y[0], z),
-            axis=(-1.0 if is_high else 1.0, 0.0, 0.0), upper_rad=_FLAP_RAD)  # fmt: skip
+            axis=(-1.0 if is_high else 1.0, 0.0, 0.0), upper_rad=_FLAP_RAD)
     return m.sliding("drawer", along=(0.0, 0.0, 1.0), upper_m=_DRAWN_OUT * (z - back))
 
 
@@ -115,22 +117,22 @@ def drawer_box(m: Maker, x: Pair, y: Pair, z: Pair, material: Material, top: flo
         return
     with m.of(material):
         for c in (a, b - t):
-            m.add(slab((c, low, back), (c + t, high, z[1])))
-        m.add(slab((a + t, low, back), (b - t, high, back + t)))
-        m.add(slab((a + t, low + 0.006, back + t), (b - t, low + 0.014, z[1])))
+            m.box(t, (low, high), (back, z[1]), left=c)
+        m.box((a + t, b - t), (low, high), t, against=back)
+        m.box((a + t, b - t), 0.008, (back + t, z[1]), on=low + 0.006)
 
 
-def shelves(m: Maker, x: Pair, y: Pair, z: Pair, material: Material,
-    rail: Material | None = None) -> None:  # fmt: skip
+def shelves(
+    m: Maker, x: Pair, y: Pair, z: Pair, material: Material, rail: Material | None = None
+) -> None:
     """Shelves in the space x, y, z; rail: one shelf above, a rail for clothes under it."""
     tall = y[1] - y[0]
     levels = [y[0] + tall * k / n for n in (round(tall / _SHELF_STEP_M),) for k in range(1, n)]
     if rail is not None and tall > _HANGING_M:
         levels = [y[1] - 0.3]
-        m.add(tube([(x[0], y[1] - 0.36, (z[0] + z[1]) / 2), (x[1], y[1] - 0.36, (z[0] + z[1]) / 2)],
-            0.0125, n=8), of=rail)  # fmt: skip
+        m.rod((x[0], x[1]), y[1] - 0.36, (z[0] + z[1]) / 2, 0.0125, of=rail)
     for at in levels:
-        m.add(slab((x[0], at, z[0]), (x[1], at + _BOARD_M, z[1] - 0.02)), of=material)
+        m.box((x[0], x[1]), _BOARD_M, (z[0], z[1] - 0.02), on=at, of=material)
 
 
 def panel(m: Maker, kind: str, x: Pair, y: Pair, z: float, material: Material) -> None:
@@ -142,30 +144,32 @@ def panel(m: Maker, kind: str, x: Pair, y: Pair, z: float, material: Material) -
     rail = min(0.065, 0.22 * (b - a), 0.3 * (d - c))
     with m.of(material):
         if kind in ("shaker", "glazed"):
-            m.add(bevelled((a, c, z), (a + rail, d, z + 0.019), 0.0015))
-            m.add(bevelled((b - rail, c, z), (b, d, z + 0.019), 0.0015))
-            m.add(bevelled((a + rail, c, z), (b - rail, c + rail, z + 0.019), 0.0015))
-            m.add(bevelled((a + rail, d - rail, z), (b - rail, d, z + 0.019), 0.0015))
+            m.box(rail, (c, d), 0.019, 0.0015, left=a, against=z)
+            m.box((b - rail, b), (c, d), 0.019, 0.0015, against=z)
+            m.box((a + rail, b - rail), rail, 0.019, 0.0015, on=c, against=z)
+            m.box((a + rail, b - rail), (d - rail, d), 0.019, 0.0015, against=z)
             if kind == "shaker":
-                m.add(slab((a + rail, c + rail, z), (b - rail, d - rail, z + 0.011)))
+                m.box((a + rail, b - rail), (c + rail, d - rail), 0.011, against=z)
             else:
-                m.add(slab((a + rail, c + rail, z + 0.006), (b - rail, d - rail, z + 0.01)),
-                    of=FROSTED)  # fmt: skip
+                m.box(
+                    (a + rail, b - rail), (c + rail, d - rail), 0.004, against=z + 0.006, of=FROSTED
+                )
         elif kind == "grooved":
-            m.add(slab((a, c, z), (b, d, z + 0.012)))
+            m.box((a, b), (c, d), 0.012, against=z)
             n = max(2, round((b - a) / 0.11))
             for k in range(n):
-                m.add(bevelled((a + (b - a) * k / n + 0.001, c, z + 0.012),
-                    (a + (b - a) * (k + 1) / n - 0.001, d, z + 0.019), 0.002))  # fmt: skip
+                m.box((a + (b - a) * k / n + 0.001, a + (b - a) * (k + 1) / n - 0.001), (c, d),
+                    0.007, 0.002, against=z + 0.012)
         else:
-            m.add(bevelled((a, c, z), (b, d, z + 0.019), 0.002))
+            m.box((a, b), (c, d), 0.019, 0.002, against=z)
             if kind == "raised" and b - a > 0.16 and d - c > 0.12:
-                m.add(bevelled((a + rail * 0.8, c + rail * 0.8, z + 0.019),
-                    (b - rail * 0.8, d - rail * 0.8, z + 0.025), 0.006))  # fmt: skip
+                m.box((a + rail * 0.8, b - rail * 0.8), (c + rail * 0.8, d - rail * 0.8), 0.006,
+                    0.006, against=z + 0.019)
 
 
-def pull(m: Maker, kind: str, x: float, y: float, z: float, across: bool, long: float,
-    material: Material) -> None:  # fmt: skip
+def pull(
+    m: Maker, kind: str, x: float, y: float, z: float, across: bool, long: float, material: Material
+) -> None:
     """What a front is opened by, its foot at z.
 
     Bar, bow, knob, cup, edge, ring or none. across: it lies along x.
@@ -174,40 +178,40 @@ def pull(m: Maker, kind: str, x: float, y: float, z: float, across: bool, long: 
     with m.of(material), m.moved(at=(x, y, z)):
         match kind:
             case "knob":
-                m.add(revolve([(0.0, 0.0), (0.006, 0.0), (0.006, 0.012), (0.015, 0.016),
-                    (0.013, 0.025), (0.0, 0.027)], n=10), turn=LYING_ALONG_Z)  # fmt: skip
+                m.revolve([(0.0, 0.0), (0.006, 0.0), (0.006, 0.012), (0.015, 0.016), (0.013, 0.025),
+                    (0.0, 0.027)], n=10, turn=LYING_ALONG_Z)
             case "disc":
-                m.add(revolve([(0.0, 0.0), (0.007, 0.0), (0.007, 0.014), (0.019, 0.015),
-                    (0.019, 0.022), (0.0, 0.023)], n=12), turn=LYING_ALONG_Z)  # fmt: skip
+                m.revolve([(0.0, 0.0), (0.007, 0.0), (0.007, 0.014), (0.019, 0.015), (0.019, 0.022),
+                    (0.0, 0.023)], n=12, turn=LYING_ALONG_Z)
         with m.moved(turn=rotation_z(0.0 if across else pi / 2)):
             match kind:
                 case "bar":
-                    m.add(tube([(-h, 0.0, 0.027), (h, 0.0, 0.027)], 0.006, n=8))
+                    m.rod((-h, h), 0.0, 0.027, 0.006)
                     for s in (-0.8 * h, 0.8 * h):
-                        m.add(tube([(s, 0.0, 0.0), (s, 0.0, 0.027)], 0.0045, n=6))
+                        m.rod(s, 0.0, (0.0, 0.027), 0.0045, n=6)
                 case "bow":
-                    m.add(tube(bent([(-h, 0.0, 0.0), (-0.8 * h, 0.0, 0.027), (0.8 * h, 0.0, 0.027),
-                        (h, 0.0, 0.0)], 0.02, n=3), 0.0055, n=8))  # fmt: skip
+                    m.tube(bent([(-h, 0.0, 0.0), (-0.8 * h, 0.0, 0.027), (0.8 * h, 0.0, 0.027),
+                        (h, 0.0, 0.0)], 0.02, n=3), 0.0055)
                 case "square":
-                    m.add(bevelled((-h, -0.005, 0.02), (h, 0.005, 0.028), 0.0015))
-                    for s in (-h + 0.006, h - 0.006):
-                        m.add(slab((s - 0.005, -0.005, 0.0), (s + 0.005, 0.005, 0.021)))
+                    m.box(2 * h, (-0.005, 0.005), (0.02, 0.028), 0.0015)
+                    m.box(0.01, (-0.005, 0.005), (0.0, 0.021), left=0.001 - h, mirrored="x")
                 case "cup":
-                    m.add(loft(rings(d_shape, [(min(long, 0.09), 0.024, 0.0),
-                        (min(long, 0.085), 0.022, 0.022), (0.05, 0.012, 0.03)], share=0.9)),
-                        at=(0.0, -0.012, 0.0))  # fmt: skip
+                    m.loft(rings(d_shape, [(min(long, 0.09), 0.024, 0.0),
+                        (min(long, 0.085), 0.022, 0.022), (0.05, 0.012, 0.03)], share=0.9),
+                        at=(0.0, -0.012, 0.0))
                 case "edge":
-                    m.add(bevelled((-h, -0.002, 0.0), (h, 0.002, 0.022), 0.0008))
-                    m.add(bevelled((-h, -0.014, 0.019), (h, 0.0015, 0.022), 0.0008))
+                    m.box(2 * h, (-0.002, 0.002), (0.0, 0.022), 0.0008)
+                    m.box(2 * h, (-0.014, 0.0015), (0.019, 0.022), 0.0008)
                 case "ring":
-                    m.add(bevelled((-0.012, -0.016, 0.0), (0.012, 0.016, 0.003), 0.001))
-                    m.add(tube(ring_path(0.018, n=14), 0.0028, n=6), turn=rotation_x(pi / 2),
-                        at=(0.0, -0.016, 0.012))  # fmt: skip
-                    m.add(tube([(0.0, 0.0, 0.0), (0.0, 0.0, 0.016)], 0.004, n=6))
+                    m.box(0.024, (-0.016, 0.016), (0.0, 0.003), 0.001)
+                    m.tube(ring_path(0.018, n=14), 0.0028, n=6, turn=rotation_x(pi / 2),
+                        at=(0.0, -0.016, 0.012))
+                    m.rod(0.0, 0.0, (0.0, 0.016), 0.004, n=6)
 
 
-def door_front(m: Maker, look: Look, x: Pair, y: Pair, z: float, opens_left: bool,
-    is_high: bool) -> None:  # fmt: skip
+def door_front(
+    m: Maker, look: Look, x: Pair, y: Pair, z: float, opens_left: bool, is_high: bool
+) -> None:
     """A front with a pull at the side away from its hinges.
 
     At its upper end below, its lower end above eyes.
@@ -220,7 +224,7 @@ def door_front(m: Maker, look: Look, x: Pair, y: Pair, z: float, opens_left: boo
     b = y[0] + 0.5 * tall if tall > 1.1 else b
     if look.pull == "edge":
         pull(m, "edge", (x[0] + x[1]) / 2, y[0] if is_high else y[1] - 0.004, z + 0.012, True,
-            0.7 * (x[1] - x[0]), look.pull_material)  # fmt: skip
+            0.7 * (x[1] - x[0]), look.pull_material)
     elif look.pull == "cup":
         pull(m, "knob", a, b, z + 0.019, False, long, look.pull_material)
     else:
@@ -234,7 +238,7 @@ def drawer_front(m: Maker, look: Look, x: Pair, y: Pair, z: float) -> None:
     is_flat = (tall < 0.17 and look.kind != "grooved") or look.kind == "glazed"
     panel(m, "flat" if is_flat else look.kind, x, y, z, look.front)
     middle, high, long = ((x[0] + x[1]) / 2, y[1] - 0.045 if tall > 0.2 else (y[0] + y[1]) / 2,
-        min(0.16 if wide < 0.5 else 0.24, 0.5 * wide))  # fmt: skip
+        min(0.16 if wide < 0.5 else 0.24, 0.5 * wide))
     if look.pull == "edge":
         pull(m, "edge", middle, y[1] - 0.004, z + 0.012, True, 0.7 * wide, look.pull_material)
     elif look.pull in ("knob", "disc", "ring") and wide > 0.6:
@@ -245,7 +249,7 @@ def drawer_front(m: Maker, look: Look, x: Pair, y: Pair, z: float) -> None:
 
 
 def fronts_of(m: Maker, look: Look, x: Pair, y: Pair, z: float, columns: Sequence[Sequence[str]],
-    is_high: bool, inside: Inside, add_to: Callable[[int], None] | None = None) -> None:  # fmt: skip
+    is_high: bool, inside: Inside, add_to: Callable[[int], None] | None = None) -> None:
     """Columns of fronts before z that open, each column named from the top, and what is behind them.
 
     'door', 'drawer', 'low' (a lower drawer), 'flap', 'open'. add_to: adds to a front of the column of
@@ -256,8 +260,7 @@ def fronts_of(m: Maker, look: Look, x: Pair, y: Pair, z: float, columns: Sequenc
         a, b = x[0] + (x[1] - x[0]) * k / n, x[0] + (x[1] - x[0]) * (k + 1) / n
         space = (a + (t / 2 if k else t), b - (t / 2 if k < n - 1 else t))
         if k and inside.has_boards:
-            m.add(slab((a - t / 2, y[0] + t, inside.back), (a + t / 2, min(y[1], inside.top), z)),
-                of=look.body)  # fmt: skip
+            m.box(t, (y[0] + t, min(y[1], inside.top)), (inside.back, z), x=a, of=look.body)
         total, below = sum(_HEIGHTS.get(kind, 1.0) for kind in kinds), 0.0
         for kind in kinds:
             above = below
@@ -277,11 +280,12 @@ def fronts_of(m: Maker, look: Look, x: Pair, y: Pair, z: float, columns: Sequenc
                     add_to(k)
             if inside.has_boards and not is_drawer(kind, (c, d)):
                 shelves(m, space, (c, min(d, inside.top)), (inside.back, z), look.body,
-                    inside.rail if k % 2 == 0 else None)  # fmt: skip
+                    inside.rail if k % 2 == 0 else None)
 
 
-def leg(m: Maker, kind: str, foot: Pair, top: Pair, high: float, thick: float,
-    material: Material) -> None:  # fmt: skip
+def leg(
+    m: Maker, kind: str, foot: Pair, top: Pair, high: float, thick: float, material: Material
+) -> None:
     """One of furniture's legs from foot (x, z) to top (x, z) at a height.
 
     Square, round, tapered, hairpin or bun.
@@ -290,30 +294,29 @@ def leg(m: Maker, kind: str, foot: Pair, top: Pair, high: float, thick: float,
     with m.of(material):
         match kind:
             case "square":
-                m.add(bevelled((top[0] - thick / 2, 0.0, top[1] - thick / 2),
-                    (top[0] + thick / 2, high, top[1] + thick / 2), 0.003))  # fmt: skip
+                m.box(thick, high, thick, 0.003, x=top[0], z=top[1])
             case "round":
-                m.add(tube([a, b], thick / 2, n=12))
+                m.tube([a, b], thick / 2, n=12)
             case "tapered":
-                m.add(tube([a, b], 0.3 * thick, n=12, end=0.55 * thick))
+                m.tube([a, b], 0.3 * thick, n=12, end=0.55 * thick)
             case "bun":
-                m.add(revolve(scaled(thick, high, [(0, 0), (0.3, 0), (0.62, 0.3), (0.62, 0.6),
-                    (0.35, 0.85), (0.5, 1), (0, 1)]), n=16), at=(top[0], 0.0, top[1]))  # fmt: skip
+                m.revolve(scaled(thick, high, [(0, 0), (0.3, 0), (0.62, 0.3), (0.62, 0.6),
+                    (0.35, 0.85), (0.5, 1), (0, 1)]), at=(top[0], 0.0, top[1]))
             case "hairpin":
                 for s in (-1.0, 1.0):
-                    m.add(tube([(foot[0], 0.004, foot[1]), (top[0] + s * 0.035, high, top[1])],
-                        0.005, n=6))  # fmt: skip
-                m.add(tube([(foot[0] - 0.008, 0.005, foot[1]), (foot[0] + 0.008, 0.005, foot[1])],
-                    0.005, n=6))  # fmt: skip
+                    m.tube(
+                        [(foot[0], 0.004, foot[1]), (top[0] + s * 0.035, high, top[1])], 0.005, n=6
+                    )
+                m.rod((foot[0] - 0.008, foot[0] + 0.008), 0.005, foot[1], 0.005, n=6)
             case "turned":
-                m.add(revolve(scaled(thick, high, [(0, 0), (0.35, 0), (0.4, 0.06), (0.28, 0.1),
+                m.revolve(scaled(thick, high, [(0, 0), (0.35, 0), (0.4, 0.06), (0.28, 0.1),
                     (0.5, 0.3), (0.42, 0.62), (0.55, 0.7), (0.4, 0.74), (0.55, 0.78), (0.55, 1),
-                    (0, 1)]), n=14), at=(top[0], 0.0, top[1]))  # fmt: skip
+                    (0, 1)]), n=14, at=(top[0], 0.0, top[1]))
 
 
 def four_legs(m: Maker, kind: str, w: float, d: float, high: float, thick: float, inset: float,
-    splay: float, material: Material) -> None:  # fmt: skip
+    splay: float, material: Material) -> None:
     """Under what is w wide and d deep, inset from its edges, leaning outwards by splay."""
     for sx, sz in product((-1.0, 1.0), (-1.0, 1.0)):
         leg(m, kind, (sx * (w / 2 - inset + splay), sz * (d / 2 - inset + splay)),
-            (sx * (w / 2 - inset), sz * (d / 2 - inset)), high, thick, material)  # fmt: skip
+            (sx * (w / 2 - inset), sz * (d / 2 - inset)), high, thick, material)

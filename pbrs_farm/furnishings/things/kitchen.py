@@ -19,19 +19,7 @@ from pbrs_farm.core.classes import CABINET, COUNTER, OTHERFURNITURE, REFRIGERATO
 from pbrs_farm.core.frames import LYING_ALONG_Z
 from pbrs_farm.core.house import Material, Surface
 from pbrs_farm.dress.style import mix
-from pbrs_farm.furnishings.things.bodies import (
-    bevelled,
-    board,
-    creased,
-    cylinder,
-    frustum,
-    loft,
-    revolve,
-    rounded,
-    slab,
-    tube,
-    vessel,
-)
+from pbrs_farm.furnishings.things.bodies import creased
 from pbrs_farm.furnishings.things.joints import (
     Inside,
     Look,
@@ -44,7 +32,7 @@ from pbrs_farm.furnishings.things.joints import (
     pull,
     shell,
 )
-from pbrs_farm.furnishings.things.maker import Maker, Pair, Size, family
+from pbrs_farm.furnishings.things.maker import Maker, Size, family
 from pbrs_farm.furnishings.things.materials import (
     BLACK_GLASS,
     BLACK_STEEL,
@@ -62,6 +50,9 @@ from pbrs_farm.furnishings.things.materials import (
     plain,
 )
 from pbrs_farm.furnishings.things.outlines import bent, d_shape, oval, rect, rings
+from pbrs_farm.furnishings.things.shapes import Pair
+
+# fmt: off
 
 _OVEN: Final = glossy("oven enamel", (0.09, 0.09, 0.095), 0.35)
 CLEAR_PLASTIC: Final = glass((0.93, 0.96, 0.96), 0.25)
@@ -98,12 +89,13 @@ def kitchen_set(m: Maker) -> KitchenSet:
     stone = m.weighted(0.4, 0.2, 0.2, 0.1, 0.1)
     worktop = (plain("oak wood", mix(m.wood, (0.6, 0.45, 0.3), 0.4), 0.45),
         glossy("stone", (0.88, 0.87, 0.84), 0.25), glossy("stone", (0.13, 0.13, 0.14), 0.25),
-        glossy("stone", (0.55, 0.53, 0.5), 0.3), STEEL)[stone]  # fmt: skip
+        glossy("stone", (0.55, 0.53, 0.5), 0.3), STEEL)[stone]
     pull_kind = m.pick("bar", "bow", "knob", "disc", "square", "cup", "edge", "edge")
     pull_material = m.metal if m.chance(0.6) else m.pick(STEEL, BLACK_STEEL, BRASS)
     look = Look(kind, front, body, worktop, pull_kind, pull_material)
-    upper_look = Look(m.pick(kind, kind, kind, "glazed"), upper_front, body, worktop, pull_kind,
-        pull_material)  # fmt: skip
+    upper_look = Look(
+        m.pick(kind, kind, kind, "glazed"), upper_front, body, worktop, pull_kind, pull_material
+    )
     plinth = front if m.chance(0.5) else m.pick(STEEL, RUBBER)
     plinth_h = m.pick(0.1, 0.12, 0.15)
     return KitchenSet(top_h, top_t, look, upper_look, worktop, plinth, plinth_h)
@@ -114,71 +106,71 @@ def unit_body(m: Maker, size: Size, top_h: float, k: KitchenSet) -> None:
     w, d, _h = size
     f = d / 2 - 0.049
     hollow(m, (-w / 2 + 0.0005, w / 2 - 0.0005), (k.plinth_h, top_h - k.top_t), (-d / 2, f), 0.016,
-        k.look.body)  # fmt: skip
-    m.add(slab((-w / 2, 0.0, -d / 2 + 0.02), (w / 2, k.plinth_h, f - 0.05)), of=k.plinth)
+        k.look.body)
+    m.box(w, k.plinth_h, (-d / 2 + 0.02, f - 0.05), of=k.plinth)
 
 
 def unit(m: Maker, size: Size, k: KitchenSet, columns: Sequence[Sequence[str]]) -> None:
     """A unit with its worktop and columns of fronts."""
     unit_body(m, size, k.top_h, k)
     w, d, h = size
-    m.add(slab((-w / 2, h - k.top_t, -d / 2), (w / 2, h, d / 2 - 0.012)), of=k.worktop)
+    m.box(w, (h - k.top_t, h), (-d / 2, d / 2 - 0.012), of=k.worktop)
     fronts_of(m, k.look, (-w / 2, w / 2), (k.plinth_h, h - k.top_t - 0.003), d / 2 - 0.049, columns,
-        False, Inside(-d / 2 + _BACK_M))  # fmt: skip
+        False, Inside(-d / 2 + _BACK_M))
 
 
 @family(group="base_cabinet", nyu40=COUNTER, place=Place.KITCHEN, called="kitchen_cabinet",
-    variants=32, of_set=kitchen_set, size=lambda m, k: (0.6, 0.6, k.top_h))  # fmt: skip
+    variants=32, of_set=kitchen_set, size=lambda m, k: (0.6, 0.6, k.top_h))
 def base_cabinet(m: Maker, size: Size, k: KitchenSet) -> None:
     """A kitchen's unit with a worktop: doors, drawers, or both."""
     unit(m, size, k, m.pick([("door",)], [("low", "door")], [("drawer", "drawer", "drawer")],
-        [("low", "drawer", "drawer")], [("door",), ("door",)]))  # fmt: skip
+        [("low", "drawer", "drawer")], [("door",), ("door",)]))
 
 
 @family(group="base_cabinet", nyu40=COUNTER, place=Place.KITCHEN, called="kitchen_cabinet",
-    variants=32, of_set=kitchen_set, size=lambda m, k: (0.6, 0.6, k.top_h))  # fmt: skip
+    variants=32, of_set=kitchen_set, size=lambda m, k: (0.6, 0.6, k.top_h))
 def drawer_cabinet(m: Maker, size: Size, k: KitchenSet) -> None:
     """The same with drawers alone, as a second unit of the kitchen."""
     unit(m, size, k, m.pick([("low", "drawer", "drawer")], [("drawer", "drawer")],
-        [("low", "low", "drawer", "drawer")], [("low", "door")]))  # fmt: skip
+        [("low", "low", "drawer", "drawer")], [("low", "door")]))
 
 
 @family(group="blind_cabinet", nyu40=COUNTER, place=Place.KITCHEN, called="kitchen_blind_cabinet",
-    variants=32, of_set=kitchen_set, size=lambda m, k: (0.67, 0.588, k.top_h))  # fmt: skip
+    variants=32, of_set=kitchen_set, size=lambda m, k: (0.67, 0.588, k.top_h))
 def blind_cabinet(m: Maker, size: Size, k: KitchenSet) -> None:
     """What stands in the corner of a kitchen, and strips beside it: a front that nothing opens."""
     w, h = size[0], size[2]
     # It is drawn like its neighbours, whose pulls reach 12 mm before their worktop.
     unit_body(m, (w, 0.6, h), k.top_h, k)
-    m.add(slab((-w / 2, h - k.top_t, -0.3), (w / 2, h, 0.288)), of=k.worktop)
+    m.box(w, (h - k.top_t, h), (-0.3, 0.288), of=k.worktop)
     panel(m, "flat", (-w / 2, w / 2), (k.plinth_h, h - k.top_t - 0.003), 0.251, k.look.front)
 
 
 @family(group="upper_cabinet", nyu40=CABINET, place=Place.WALL, called="kitchen_wall_cabinet",
-    variants=32, of_set=kitchen_set, size=lambda m, k: (0.6, 0.35, m.pick(0.6, 0.7, 0.72)))  # fmt: skip
+    variants=32, of_set=kitchen_set, size=lambda m, k: (0.6, 0.35, m.pick(0.6, 0.7, 0.72)))
 def upper_cabinet(m: Maker, size: Size, k: KitchenSet) -> None:
     """A kitchen's cupboard on the wall: one door or two, a flap, glass, or open shelves."""
     w, d, h = size
     hw = w / 2
     f, t = d - (0.022 if k.look.pull == "edge" else 0.049), 0.016
     with m.of(k.look.body):
-        m.add(slab((-hw, 0.0, 0.0), (hw, h, 0.008)))
-        m.add(slab((-hw, 0.0, 0.008), (-hw + t, h, f)))
-        m.add(slab((hw - t, 0.0, 0.008), (hw, h, f)))
+        m.box(w, h, (0.0, 0.008))
+        m.box(t, h, (0.008, f), left=-hw)
+        m.box((hw - t, hw), h, (0.008, f))
         for y in (0.0, h * 0.36, h * 0.68, h - t):
-            m.add(slab((-hw + t, y, 0.008), (hw - t, y + t, f - 0.002)))
+            m.box(w - 2 * t, t, (0.008, f - 0.002), on=y)
     if not m.chance(0.12):
         fronts_of(m, k.upper_look, (-hw, hw), (0.0, h), f, m.pick([("door",), ("door",)],
-            [("door",)], [("flap", "flap")]), True, Inside(_BACK_M, has_boards=False))  # fmt: skip
+            [("door",)], [("flap", "flap")]), True, Inside(_BACK_M, has_boards=False))
     else:
-        m.add(slab((-hw, -0.0001, f), (-hw + t, h, d - 0.002)), of=k.upper_look.front)
-        m.add(slab((hw - t, -0.0001, f), (hw, h, d - 0.002)), of=k.upper_look.front)
-        m.add(slab((-hw + t, 0.0, f), (hw - t, t, d)), of=k.upper_look.front)
-        m.add(slab((-hw + t, h - t, f), (hw - t, h, d)), of=k.upper_look.front)
+        m.box(t, (-0.0001, h), (f, d - 0.002), left=-hw, of=k.upper_look.front)
+        m.box((hw - t, hw), (-0.0001, h), (f, d - 0.002), of=k.upper_look.front)
+        m.box(w - 2 * t, t, (f, d), of=k.upper_look.front)
+        m.box(w - 2 * t, (h - t, h), (f, d), of=k.upper_look.front)
 
 
 @family(group="sink", nyu40=SINK, place=Place.KITCHEN, variants=32, of_set=kitchen_set,
-    size=lambda m, k: (0.8, 0.6, k.top_h + 0.3))  # fmt: skip
+    size=lambda m, k: (0.8, 0.6, k.top_h + 0.3))
 def kitchen_sink(m: Maker, size: Size, k: KitchenSet) -> None:
     """A unit with a sink in its worktop: one bowl, two, or one with a drainer; many taps."""
     w, d, h = size
@@ -186,7 +178,7 @@ def kitchen_sink(m: Maker, size: Size, k: KitchenSet) -> None:
     unit_body(m, size, k.top_h, k)
     fronts_of(m, k.look, (-w / 2, w / 2), (k.plinth_h, k.top_h - k.top_t - 0.003), hd - 0.049,
         [("door",), ("door",)] if m.chance(0.7) else [("drawer", "drawer")], False,
-        Inside(-hd + _BACK_M, has_boards=False, top=k.top_h - 0.2))  # fmt: skip
+        Inside(-hd + _BACK_M, has_boards=False, top=k.top_h - 0.2))
     # The bowl, and a worktop of four pieces around it.
     basin = m.pick(STEEL, STEEL, CERAMIC, glossy("granite", (0.12, 0.12, 0.13), 0.4))
     form = m.weighted(0.4, 0.25, 0.25, 0.1)
@@ -194,10 +186,10 @@ def kitchen_sink(m: Maker, size: Size, k: KitchenSet) -> None:
     bd, z0 = 0.4, -0.005
     x0, x1, a, b = -bw / 2, bw / 2, z0 - bd / 2, z0 + bd / 2
     with m.of(k.worktop):
-        m.add(slab((-w / 2, k.top_h - k.top_t, -hd), (x0, k.top_h, hd - 0.012)))
-        m.add(slab((x1, k.top_h - k.top_t, -hd), (w / 2, k.top_h, hd - 0.012)))
-        m.add(slab((x0, k.top_h - k.top_t, -hd), (x1, k.top_h, a)))
-        m.add(slab((x0, k.top_h - k.top_t, b), (x1, k.top_h, hd - 0.012)))
+        m.box((-w / 2, x0), (k.top_h - k.top_t, k.top_h), (-hd, hd - 0.012))
+        m.box((x1, w / 2), (k.top_h - k.top_t, k.top_h), (-hd, hd - 0.012))
+        m.box((x0, x1), (k.top_h - k.top_t, k.top_h), (-hd, a))
+        m.box((x0, x1), (k.top_h - k.top_t, k.top_h), (b, hd - 0.012))
     with m.of(basin):
         match form:
             case 0:  # one bowl
@@ -207,29 +199,27 @@ def kitchen_sink(m: Maker, size: Size, k: KitchenSet) -> None:
                 sink_bowl(m, 0.18, z0, 0.36, bd, k.top_h, 0.05)
             case 2:  # one and a drainer
                 sink_bowl(m, -0.15, z0, 0.42, bd, k.top_h, 0.06)
-                m.add(bevelled((0.06, k.top_h - 0.01, a), (x1, k.top_h + 0.003, b), 0.002))
+                m.box((0.06, x1), 0.013, (a, b), 0.002, on=k.top_h - 0.01)
                 for i in range(6):
-                    m.add(bevelled((0.09, k.top_h + 0.002, a + 0.05 + i * 0.05),
-                        (x1 - 0.03, k.top_h + 0.007, a + 0.06 + i * 0.05), 0.002))  # fmt: skip
+                    m.box((0.09, x1 - 0.03), 0.005, 0.01, 0.002, on=k.top_h + 0.002,
+                        against=a + 0.05 + i * 0.05)
             case 3:  # round
-                m.add(loft([(oval(0.36, 0.36, z=z0), k.top_h - 0.17),
-                    (oval(0.43, 0.39, z=z0), k.top_h - 0.02),
-                    (rect(0.44, bd, 0.02, z=z0, n=5), k.top_h - 0.001),
-                    (rect(0.46, bd + 0.02, 0.02, z=z0, n=5), k.top_h + 0.004),
-                    (oval(0.39, 0.38, z=z0), k.top_h + 0.003),
-                    (oval(0.36, 0.35, z=z0), k.top_h - 0.1),
-                    (oval(0.25, 0.25, z=z0), k.top_h - 0.15)]))  # fmt: skip
+                m.loft([(oval(0.36, 0.36, z=z0), k.top_h - 0.17),
+                    (oval(0.43, 0.39, z=z0), k.top_h - 0.02), (rect(0.44, bd, 0.02, z=z0, n=5),
+                    k.top_h - 0.001), (rect(0.46, bd + 0.02, 0.02, z=z0, n=5), k.top_h + 0.004),
+                    (oval(0.39, 0.38, z=z0), k.top_h + 0.003), (oval(0.36, 0.35, z=z0),
+                    k.top_h - 0.1), (oval(0.25, 0.25, z=z0), k.top_h - 0.15)])
     with m.moved(at=(0.0 if form != 2 else -0.15, 0.0, 0.0)):
         kitchen_tap(m, k.top_h, -hd + 0.06, h)
 
 
 def sink_bowl(m: Maker, x: float, z: float, w: float, d: float, y: float, r: float) -> None:
     """A bowl w by d about (x, z), its rim at y, with its drain; r: of its corners."""
-    m.add(loft(rings(rect, [(w - 0.04, d - 0.04, r, y - 0.19), (w - 0.014, d - 0.014, r, y - 0.16),
+    m.loft(rings(rect, [(w - 0.04, d - 0.04, r, y - 0.19), (w - 0.014, d - 0.014, r, y - 0.16),
         (w - 0.002, d - 0.002, r, y - 0.001), (w, d, r, y + 0.002),
         (w - 0.02, d - 0.02, r, y + 0.003), (w - 0.03, d - 0.03, r, y - 0.14),
-        (w - 0.1, d - 0.1, r, y - 0.175)], x=x, z=z)))  # fmt: skip
-    m.add(cylinder(0.04, y - 0.175, y - 0.172, n=16), at=(x, 0.0, z), of=CHROME)
+        (w - 0.1, d - 0.1, r, y - 0.175)], x=x, z=z))
+    m.cylinder(0.04, y - 0.175, y - 0.172, at=(x, 0.0, z), of=CHROME)
 
 
 def kitchen_tap(m: Maker, y: float, z: float, top: float) -> None:
@@ -237,26 +227,24 @@ def kitchen_tap(m: Maker, y: float, z: float, top: float) -> None:
     material = m.pick(CHROME, CHROME, STEEL, BLACK_STEEL, m.metal)
     form, r, t = m.weighted(0.4, 0.3, 0.3), m.uniform(0.01, 0.014), top
     with m.of(material):
-        m.add(revolve([(0.0, y), (0.028, y), (0.028, y + 0.006), (0.022, y + 0.012),
-            (0.022, y + 0.05), (0.0, y + 0.05)], n=20), at=(0.0, 0.0, z))  # fmt: skip
+        m.revolve([(0.0, y), (0.028, y), (0.028, y + 0.006), (0.022, y + 0.012), (0.022, y + 0.05),
+            (0.0, y + 0.05)], n=20, at=(0.0, 0.0, z))
         match form:
             case 0:  # an arch
-                m.add(tube(bent([(0.0, y + 0.04, z), (0.0, t - r, z), (0.0, t - r, z + 0.2),
-                    (0.0, t - 0.12, z + 0.2)], 0.09, n=6), r, n=10))  # fmt: skip
+                m.tube(bent([(0.0, y + 0.04, z), (0.0, t - r, z), (0.0, t - r, z + 0.2),
+                    (0.0, t - 0.12, z + 0.2)], 0.09, n=6), r, n=10)
             case 1:  # a bend
-                m.add(tube(bent([(0.0, y + 0.04, z), (0.0, t - r, z), (0.0, t - r, z + 0.2),
-                    (0.0, t - 0.05, z + 0.2)], 0.03, n=3), r, n=10))  # fmt: skip
+                m.tube(bent([(0.0, y + 0.04, z), (0.0, t - r, z), (0.0, t - r, z + 0.2),
+                    (0.0, t - 0.05, z + 0.2)], 0.03, n=3), r, n=10)
             case 2:  # an angle, its head pulls out
-                m.add(tube(bent([(0.0, y + 0.04, z), (0.0, t - r - 0.06, z),
-                    (0.0, t - r, z + 0.22)], 0.05, n=4), r * 1.1, n=10))  # fmt: skip
-                m.add(tube([(0.0, t - r - 0.004, z + 0.2), (0.0, t - r - 0.05, z + 0.215)], r,
-                    n=10))  # fmt: skip
+                m.tube(bent([(0.0, y + 0.04, z), (0.0, t - r - 0.06, z), (0.0, t - r, z + 0.22)],
+                    0.05, n=4), r * 1.1, n=10)
+                m.tube([(0.0, t - r - 0.004, z + 0.2), (0.0, t - r - 0.05, z + 0.215)], r, n=10)
         if m.chance(0.7):
-            m.add(tube([(0.02, y + 0.035, z), (0.05, y + 0.045, z), (0.1, y + 0.075, z)], 0.005,
-                n=6))  # fmt: skip
+            m.tube([(0.02, y + 0.035, z), (0.05, y + 0.045, z), (0.1, y + 0.075, z)], 0.005, n=6)
         else:
             for s in (-1.0, 1.0):
-                m.add(tube([(s * 0.015, y + 0.03, z), (s * 0.055, y + 0.03, z)], 0.012, n=8))
+                m.rod((s * 0.015, s * 0.055), y + 0.03, z, 0.012)
 
 
 def hob_top(
@@ -265,47 +253,43 @@ def hob_top(
     """What one cooks on, over y: gas, ceramic, or solid plates, in w by d about z."""
     match kind:
         case "ceramic":
-            m.add(board(w, d, y, y + 0.006, 0.01, 0.002, z=z), of=BLACK_GLASS)
+            m.board(w, d, y, y + 0.006, 0.01, 0.002, z=z, of=BLACK_GLASS)
             ring = glossy("ring", (0.3, 0.3, 0.31), 0.3)
             for x, c, r in ((-0.24, -0.22, 0.09), (0.24, -0.22, 0.075), (-0.24, 0.22, 0.075),
-                (0.24, 0.22, 0.1)):  # fmt: skip
-                m.add(revolve([(r * 0.97, y + 0.0055), (r, y + 0.0055), (r, y + 0.0065),
-                    (r * 0.97, y + 0.0065), (r * 0.97, y + 0.0055)], n=28),
-                    at=(x * w, 0.0, z + c * d), of=ring)  # fmt: skip
+                (0.24, 0.22, 0.1)):
+                m.revolve([(r * 0.97, y + 0.0055), (r, y + 0.0055), (r, y + 0.0065),
+                    (r * 0.97, y + 0.0065), (r * 0.97, y + 0.0055)], n=28,
+                    at=(x * w, 0.0, z + c * d), of=ring)
         case "plates":
-            m.add(board(w, d, y, y + 0.008, 0.015, 0.003, z=z), of=material)
+            m.board(w, d, y, y + 0.008, 0.015, 0.003, z=z, of=material)
             for x, c, r in ((-0.24, -0.22, 0.09), (0.24, -0.22, 0.073), (-0.24, 0.22, 0.073),
-                (0.24, 0.22, 0.09)):  # fmt: skip
-                m.add(revolve([(0.0, y + 0.006), (r + 0.008, y + 0.006), (r + 0.006, y + 0.011),
+                (0.24, 0.22, 0.09)):
+                m.revolve([(0.0, y + 0.006), (r + 0.008, y + 0.006), (r + 0.006, y + 0.011),
                     (r, y + 0.012), (r, y + 0.019), (r * 0.3, y + 0.019), (r * 0.28, y + 0.016),
-                    (0.0, y + 0.016)], n=26), at=(x * w, 0.0, z + c * d), of=CAST_IRON)  # fmt: skip
+                    (0.0, y + 0.016)], n=26, at=(x * w, 0.0, z + c * d), of=CAST_IRON)
         case "gas":
-            m.add(board(w, d, y, y + 0.008, 0.015, 0.003, z=z), of=material)
+            m.board(w, d, y, y + 0.008, 0.015, 0.003, z=z, of=material)
             for x, c, r in ((-0.24, -0.22, 0.05), (0.24, -0.22, 0.038), (-0.24, 0.22, 0.03),
-                (0.24, 0.22, 0.042)):  # fmt: skip
-                m.add(revolve([(0.0, y + 0.007), (r + 0.012, y + 0.007), (r, y + 0.014),
-                    (r, y + 0.022), (r - 0.008, y + 0.026), (0.0, y + 0.026)], n=18),
-                    at=(x * w, 0.0, z + c * d), of=CAST_IRON)  # fmt: skip
+                (0.24, 0.22, 0.042)):
+                m.revolve([(0.0, y + 0.007), (r + 0.012, y + 0.007), (r, y + 0.014), (r, y + 0.022),
+                    (r - 0.008, y + 0.026), (0.0, y + 0.026)], n=18, at=(x * w, 0.0, z + c * d),
+                    of=CAST_IRON)
             # Grates: a frame over each side and four fingers a burner.
             with m.of(CAST_IRON):
                 for s in (-0.24, 0.24):
                     a, b, c = s * w - 0.21 * w, s * w + 0.21 * w, 0.44 * d
                     for q in (-c, c):
-                        m.add(bevelled((a, y + 0.034, z + q - 0.005), (b, y + 0.044, z + q + 0.005),
-                            0.002))  # fmt: skip
+                        m.box((a, b), 0.01, 0.01, 0.002, on=y + 0.034, z=z + q)
                     for x in (a, b):
-                        m.add(bevelled((x - 0.005, y + 0.034, z - c), (x + 0.005, y + 0.044, z + c),
-                            0.002))  # fmt: skip
-                    m.add(bevelled((a, y + 0.034, z - 0.005), (b, y + 0.044, z + 0.005), 0.002))
+                        m.box(0.01, 0.01, 2 * c, 0.002, x=x, on=y + 0.034, z=z)
+                    m.box((a, b), 0.01, 0.01, 0.002, on=y + 0.034, z=z)
                     for q in (-0.22 * d, 0.22 * d):
                         for e in (-1.0, 1.0):
-                            m.add(bevelled((min(s * w + e * 0.06 * w, s * w + e * 0.21 * w),
-                                y + 0.036, z + q - 0.004),
-                                (max(s * w + e * 0.06 * w, s * w + e * 0.21 * w), y + 0.044,
-                                z + q + 0.004), 0.0015))  # fmt: skip
+                            m.box((min(s * w + e * 0.06 * w, s * w + e * 0.21 * w),
+                                max(s * w + e * 0.06 * w, s * w + e * 0.21 * w)), 0.008, 0.008,
+                                0.0015, on=y + 0.036, z=z + q)
                     for x, q in product((a, b), (-c, c)):
-                        m.add(slab((x - 0.005, y + 0.006, z + q - 0.005),
-                            (x + 0.005, y + 0.035, z + q + 0.005)))  # fmt: skip
+                        m.box(0.01, 0.029, 0.01, x=x, on=y + 0.006, z=z + q)
 
 
 def oven(m: Maker, x: Pair, y: Pair, z: Pair) -> None:
@@ -315,52 +299,50 @@ def oven(m: Maker, x: Pair, y: Pair, z: Pair) -> None:
     a, b, c = x[0] + wall, x[1] - wall, (z[0] + 0.06, z[1] - 0.03)
     low, high = y[0] + wall, y[1] - wall
     rack(m, (a, b), low + 0.55 * (high - low), c, STEEL)
-    m.add(bevelled((a, low + 0.25 * (high - low), c[0]), (b, low + 0.25 * (high - low) + 0.012, c[1]),
-        0.003), of=_OVEN)  # fmt: skip
+    m.box((a, b), 0.012, (c[0], c[1]), 0.003, on=low + 0.25 * (high - low), of=_OVEN)
 
 
 def rack(m: Maker, x: Pair, y: float, z: Pair, material: Material, n: int = 8) -> None:
     """A grid of bars from front to back on two rails, at a height."""
     with m.of(material):
         for at in z:
-            m.add(slab((x[0], y, at - 0.004), (x[1], y + 0.006, at + 0.004)))
+            m.box((x[0], x[1]), 0.006, 0.008, on=y, z=at)
         for k in range(n):
             at = x[0] + (x[1] - x[0]) * (k + 0.5) / n
-            m.add(slab((at - 0.002, y + 0.001, z[0]), (at + 0.002, y + 0.005, z[1])))
+            m.box(0.004, 0.004, (z[0], z[1]), x=at, on=y + 0.001)
 
 
 def oven_front(m: Maker, x: Pair, y: Pair, z: float, panel_h: float, material: Material, grip: str,
-    has_knobs: bool, n: int) -> None:  # fmt: skip
+    has_knobs: bool, n: int) -> None:
     """An oven's door with its window and handle, in x and y before z.
 
     Its knobs or its display above.
     """
     a, b, c, d = x[0] + 0.002, x[1] - 0.002, y[0] + 0.002, y[1]
     w = b - a
-    m.add(bevelled((a, d - panel_h, z), (b, d - 0.001, z + 0.02), 0.002), of=material)
+    m.box((a, b), (d - panel_h, d - 0.001), 0.02, 0.002, against=z, of=material)
     e = d - panel_h - 0.004
     with m.hinged("door", at=(a, c, z + 0.02), axis=(1.0, 0.0, 0.0), upper_rad=_FALLING_RAD):
-        m.add(bevelled((a, c, z), (b, e, z + 0.02), 0.003), of=m.pick(BLACK_GLASS, material))
-        m.add(bevelled((a + 0.06, c + 0.07, z + 0.0195), (b - 0.06, e - 0.1, z + 0.022), 0.001),
-            of=BLACK_GLASS)  # fmt: skip
+        m.box((a, b), (c, e), 0.02, 0.003, against=z, of=m.pick(BLACK_GLASS, material))
+        m.box((a + 0.06, b - 0.06), (c + 0.07, e - 0.1), 0.0025, 0.001, against=z + 0.0195,
+            of=BLACK_GLASS)
         pull(m, grip, (a + b) / 2, e - 0.04, z + 0.019, True, 0.8 * w,
-            m.pick(STEEL, CHROME, BLACK_STEEL))  # fmt: skip
+            m.pick(STEEL, CHROME, BLACK_STEEL))
     knob = m.pick(RUBBER, STEEL, CHROME, WHITE)
     if has_knobs:
         for k in range(n):
-            m.add(revolve([(0.0, 0.0), (0.02, 0.0), (0.018, 0.01), (0.016, 0.024), (0.0, 0.025)],
-                n=14), turn=LYING_ALONG_Z, at=(a + w * (k + 0.5) / n, d - panel_h / 2, z + 0.019),
-                of=knob)  # fmt: skip
+            m.revolve([(0.0, 0.0), (0.02, 0.0), (0.018, 0.01), (0.016, 0.024), (0.0, 0.025)], n=14,
+                turn=LYING_ALONG_Z, at=(a + w * (k + 0.5) / n, d - panel_h / 2, z + 0.019), of=knob)
         if m.chance(0.4):
-            m.add(slab(((a + b) / 2 - 0.05, d - panel_h / 2 - 0.015, z + 0.0199),
-                ((a + b) / 2 + 0.05, d - panel_h / 2 + 0.015, z + 0.0207)), of=BLACK_GLASS)  # fmt: skip
+            m.box(0.1, 0.03, 0.0008, x=a / 2 + b / 2, on=d - panel_h / 2 - 0.015,
+                against=z + 0.0199, of=BLACK_GLASS)
     else:
-        m.add(slab((a + 0.25 * w, d - panel_h + 0.012, z + 0.0199),
-            (b - 0.25 * w, d - 0.012, z + 0.0207)), of=BLACK_GLASS)  # fmt: skip
+        m.box((a + 0.25 * w, b - 0.25 * w), (d - panel_h + 0.012, d - 0.012), 0.0008,
+            against=z + 0.0199, of=BLACK_GLASS)
 
 
 @family(group="cooker", nyu40=OTHERFURNITURE, place=Place.KITCHEN, variants=32,
-    size=lambda m: (m.pick(0.5, 0.6, 0.6), 0.6, m.uniform(0.88, 0.92)))  # fmt: skip
+    size=lambda m: (m.pick(0.5, 0.6, 0.6), 0.6, m.uniform(0.88, 0.92)))
 def cooker(m: Maker, size: Size) -> None:
     """A cooker that stands between the units.
 
@@ -369,34 +351,34 @@ def cooker(m: Maker, size: Size) -> None:
     w, d, h = size
     hw = w / 2
     material = m.pick(ENAMEL, STEEL, STEEL, glossy("black enamel", (0.06, 0.06, 0.065), 0.25),
-        glossy("cream enamel", (0.9, 0.86, 0.74), 0.2))  # fmt: skip
+        glossy("cream enamel", (0.9, 0.86, 0.74), 0.2))
     kind = m.pick("gas", "gas", "ceramic", "plates")
     y, f = h - _HOB_M[kind], d / 2 - 0.049
     box = (-d / 2, f)
-    m.add(board(w, d - 0.02, y - 0.012, y + 0.0005, 0.008, 0.003, z=-0.01), of=material)
+    m.board(w, d - 0.02, y - 0.012, y + 0.0005, 0.008, 0.003, z=-0.01, of=material)
     hob_top(m, w - 0.02, d - 0.09, y, -0.02, kind, material)
     for x, z in product((-hw + 0.05, hw - 0.05), (-d / 2 + 0.06, f - 0.06)):
-        m.add(frustum((0.02, 0.0), (0.016, 0.06), n=10), at=(x, 0.0, z), of=RUBBER)
+        m.frustum((0.02, 0.0), (0.016, 0.06), n=10, at=(x, 0.0, z), of=RUBBER)
     drawer = m.uniform(0.14, 0.2) if m.chance(0.7) else 0.0
     if drawer > 0:
         hollow(m, (-hw, hw), (0.06, 0.062 + drawer), box, 0.012, material)
         with opens(m, "drawer", (-hw, hw), (0.065, 0.06 + drawer), f + 0.02, box[0]):
-            m.add(bevelled((-hw + 0.002, 0.065, f), (hw - 0.002, 0.06 + drawer, f + 0.02), 0.003),
-                of=material)  # fmt: skip
-            drawer_box(m, (-hw + 0.012, hw - 0.012), (0.065, 0.06 + drawer), (box[0] + 0.012, f),
-                STEEL)  # fmt: skip
+            m.box(w - 0.004, (0.065, 0.06 + drawer), 0.02, 0.003, against=f, of=material)
+            drawer_box(
+                m, (-hw + 0.012, hw - 0.012), (0.065, 0.06 + drawer), (box[0] + 0.012, f), STEEL
+            )
     panel_h = m.pick(0.09, 0.1, 0.11)
     # The oven in a body of its sheet, and what its knobs turn above it.
     low, high = 0.06 + (drawer + 0.002 if drawer > 0 else 0.0), y - 0.016 - panel_h - 0.004
     shell(m, (-hw, hw), (low, high), box, 0.004, material)
     oven(m, (-hw + 0.004, hw - 0.004), (low + 0.004, high - 0.004), (box[0] + 0.004, f - 0.001))
-    m.add(slab((-hw, high, box[0]), (hw, y - 0.012, f)), of=material)
+    m.box(w, (high, y - 0.012), (box[0], f), of=material)
     oven_front(m, (-hw, hw), (0.064 + drawer, y - 0.016), f, panel_h, material,
-        m.pick("bar", "bow", "square"), m.chance(0.8), m.pick(5, 6))  # fmt: skip
+        m.pick("bar", "bow", "square"), m.chance(0.8), m.pick(5, 6))
 
 
 @family(group="cooker", nyu40=OTHERFURNITURE, place=Place.KITCHEN, called="cooker", variants=32,
-    of_set=kitchen_set, size=lambda m, k: (0.6, 0.6, k.top_h))  # fmt: skip
+    of_set=kitchen_set, size=lambda m, k: (0.6, 0.6, k.top_h))
 def built_in_cooker(m: Maker, size: Size, k: KitchenSet) -> None:
     """An oven in a unit of the kitchen, a hob in the worktop over it."""
     w, d, h = size
@@ -406,15 +388,15 @@ def built_in_cooker(m: Maker, size: Size, k: KitchenSet) -> None:
     # The worktop lies below its height by what stands on it.
     y = h - _HOB_M[kind]
     unit_body(m, (w, d, y), y, k)
-    m.add(slab((-hw, y - k.top_t, -d / 2), (hw, y, d / 2 - 0.012)), of=k.worktop)
+    m.box(w, (y - k.top_t, y), (-d / 2, d / 2 - 0.012), of=k.worktop)
     hob_top(m, w - 0.02, 0.51, y - 0.001, -0.02, kind, m.pick(STEEL, ENAMEL, BLACK_GLASS))
     material = m.pick(STEEL, STEEL, BLACK_GLASS, ENAMEL)
     low, panel_h = y - k.top_t - 0.003 - 0.595, m.pick(0.09, 0.12)
     high, inner = y - k.top_t - 0.003 - panel_h - 0.004, (-hw + 0.0166, hw - 0.0166)
     oven(m, inner, (max(low, k.plinth_h + 0.017), high), (-d / 2 + 0.02, f - 0.001))
-    m.add(slab((inner[0], high, -d / 2 + 0.02), (inner[1], y - k.top_t - 0.017, f)), of=material)
+    m.box((inner[0], inner[1]), (high, y - k.top_t - 0.017), (-d / 2 + 0.02, f), of=material)
     oven_front(m, (-hw, hw), (low, y - k.top_t - 0.003), f, panel_h, material,
-        m.pick("bar", "square", "bow"), m.chance(0.6), m.pick(2, 4))  # fmt: skip
+        m.pick("bar", "square", "bow"), m.chance(0.6), m.pick(2, 4))
     if low - k.plinth_h > 0.06:
         with opens(m, "drawer", (-hw, hw), (k.plinth_h, low), f + 0.019, -d / 2):
             drawer_front(m, k.look, (-hw, hw), (k.plinth_h, low), f)
@@ -422,23 +404,24 @@ def built_in_cooker(m: Maker, size: Size, k: KitchenSet) -> None:
 
 
 @family(group="dishwasher", nyu40=OTHERFURNITURE, place=Place.FLOOR, variants=32,
-    of_set=kitchen_set, size=lambda m, k: (0.6, 0.6, k.top_h))  # fmt: skip
+    of_set=kitchen_set, size=lambda m, k: (0.6, 0.6, k.top_h))
 def dishwasher(m: Maker, size: Size, k: KitchenSet) -> None:
     """A dishwasher under the kitchen's worktop: a front of the kitchen, or its own with a panel."""
     w, d, h = size
     hw = w / 2
     f, y = d / 2 - 0.049, h - k.top_t - 0.003
     unit_body(m, size, k.top_h, k)
-    m.add(slab((-hw, h - k.top_t, -d / 2), (hw, h, d / 2 - 0.012)), of=k.worktop)
+    m.box(w, (h - k.top_t, h), (-d / 2, d / 2 - 0.012), of=k.worktop)
     # A tub of steel with two baskets behind the door, which falls open.
     shell(m, (-hw + 0.0166, hw - 0.0166), (k.plinth_h + 0.0166, y - 0.014),
-        (-d / 2 + _BACK_M, f - 0.001), 0.02, STEEL)  # fmt: skip
+        (-d / 2 + _BACK_M, f - 0.001), 0.02, STEEL)
     for at in (k.plinth_h + 0.12, k.plinth_h + 0.42):
         for rim in (0.0, 0.09):
             rack(m, (-hw + 0.05, hw - 0.05), at + rim, (-d / 2 + 0.07, f - 0.03), WHITE_STEEL,
-                n=12 if rim == 0 else 2)  # fmt: skip
-    with m.hinged("door", at=(-hw, k.plinth_h, f + 0.02), axis=(1.0, 0.0, 0.0),
-        upper_rad=_FALLING_RAD):  # fmt: skip
+                n=12 if rim == 0 else 2)
+    with m.hinged(
+        "door", at=(-hw, k.plinth_h, f + 0.02), axis=(1.0, 0.0, 0.0), upper_rad=_FALLING_RAD
+    ):
         dishwasher_front(m, k, (-hw, hw), y, f)
 
 
@@ -449,62 +432,57 @@ def dishwasher_front(m: Maker, k: KitchenSet, x: Pair, y: float, f: float) -> No
         drawer_front(m, k.look, x, (k.plinth_h, y), f)
     else:
         material = m.pick(ENAMEL, STEEL, STEEL, BLACK_GLASS)
-        m.add(bevelled((-hw + 0.002, k.plinth_h, f), (hw - 0.002, y - 0.12, f + 0.02), 0.003),
-            of=material)  # fmt: skip
-        m.add(bevelled((-hw + 0.002, y - 0.117, f), (hw - 0.002, y, f + 0.02), 0.002), of=material)
-        m.add(slab((-0.06, y - 0.07, f + 0.0199), (0.06, y - 0.035, f + 0.0207)), of=BLACK_GLASS)
+        m.box(2 * hw - 0.004, (k.plinth_h, y - 0.12), 0.02, 0.003, against=f, of=material)
+        m.box(2 * hw - 0.004, (y - 0.117, y), 0.02, 0.002, against=f, of=material)
+        m.box(0.12, 0.035, 0.0008, on=y - 0.07, against=f + 0.0199, of=BLACK_GLASS)
         for i in range(m.pick(3, 4, 5)):
-            m.add(cylinder(0.008, 0.0, 0.003, n=10), turn=LYING_ALONG_Z,
-                at=(0.1 + i * 0.03, y - 0.052, f + 0.02), of=m.pick(CHROME, RUBBER))  # fmt: skip
+            m.cylinder(0.008, 0.0, 0.003, n=10, turn=LYING_ALONG_Z,
+                at=(0.1 + i * 0.03, y - 0.052, f + 0.02), of=m.pick(CHROME, RUBBER))
         pull(m, m.pick("bar", "bow", "square"), 0.0, y - 0.16, f + 0.019, True, 0.42,
-            m.pick(STEEL, CHROME))  # fmt: skip
+            m.pick(STEEL, CHROME))
 
 
 @family(group="hood", nyu40=OTHERFURNITURE, place=Place.KITCHEN, called="range_hood", variants=24,
-    size=lambda m: (0.6, m.pick(0.45, 0.48, 0.5), m.pick(0.3, 0.7, 0.8, 0.9)))  # fmt: skip
+    size=lambda m: (0.6, m.pick(0.45, 0.48, 0.5), m.pick(0.3, 0.7, 0.8, 0.9)))
 def hood(m: Maker, size: Size) -> None:
     """An extractor over the cooker: a chimney, a pyramid, a dome, a glass plate, or a flat one."""
     w, d, h = size
-    hw, hd = w / 2, d / 2
-    material = m.pick(STEEL, STEEL, ENAMEL, glossy("black enamel", (0.06, 0.06, 0.065), 0.3),
-        m.metal)  # fmt: skip
+    hd = d / 2
+    material = m.pick(
+        STEEL, STEEL, ENAMEL, glossy("black enamel", (0.06, 0.06, 0.065), 0.3), m.metal
+    )
     form = m.weighted(0.3, 0.3, 0.2, 0.2) if h > 0.5 else 4
     # Everything is drawn from the wall, z = -d / 2.
     c, cd = 0.24, 0.26
     cz = -hd + cd / 2
     with m.of(material):
         if form < 4:
-            m.add(bevelled((-c / 2, 0.1, -hd), (c / 2, h, -hd + cd), 0.002))
+            m.box(c, (0.1, h), cd, 0.002, against=-hd)
         match form:
             case 0:  # a beam
-                m.add(bevelled((-hw, 0.0, -hd), (hw, 0.07, hd), 0.002))
+                m.box(w, 0.07, d, 0.002)
             case 1:  # a pyramid
-                m.add(bevelled((-hw, 0.0, -hd), (hw, 0.045, hd), 0.002))
-                m.add(loft([(rect(w, d, 0.004), 0.044),
-                    (rect(c + 0.01, cd + 0.01, 0.004, z=cz), 0.26)]))  # fmt: skip
+                m.box(w, 0.045, d, 0.002)
+                m.loft([(rect(w, d, 0.004), 0.044), (rect(c + 0.01, cd + 0.01, 0.004, z=cz), 0.26)])
             case 2:  # a dome
-                m.add(loft([(d_shape(w, d, back=-hd, share=0.5), 0.0),
-                    (d_shape(w, d, back=-hd, share=0.5), 0.02),
-                    (d_shape(w * 0.9, d * 0.9, back=-hd, share=0.5), 0.09),
-                    (d_shape(c + 0.02, cd + 0.02, back=-hd, share=0.3), 0.2)]))  # fmt: skip
+                m.loft([(d_shape(w, d, back=-hd, share=0.5), 0.0),
+                    (d_shape(w, d, back=-hd, share=0.5), 0.02), (d_shape(w * 0.9, d * 0.9, back=-hd,
+                    share=0.5), 0.09), (d_shape(c + 0.02, cd + 0.02, back=-hd, share=0.3), 0.2)])
             case 3:  # a glass plate
-                m.add(bevelled((-c / 2 - 0.05, 0.03, -hd), (c / 2 + 0.05, 0.09, -hd + cd + 0.08),
-                    0.003))  # fmt: skip
-                m.add(board(w, d, 0.02, 0.03, 0.05, 0.002), of=glass((0.8, 0.9, 0.9), 0.3))
-                m.add(bevelled((-c / 2 - 0.03, 0.0, -hd), (c / 2 + 0.03, 0.02, -hd + cd), 0.002))
+                m.box(c + 0.1, (0.03, 0.09), (-hd, -hd + cd + 0.08), 0.003)
+                m.board(w, d, 0.02, 0.03, 0.05, 0.002, of=glass((0.8, 0.9, 0.9), 0.3))
+                m.box(c + 0.06, 0.02, cd, 0.002, against=-hd)
             case 4:  # flat
-                m.add(bevelled((-hw, 0.0, -hd), (hw, 0.035, hd), 0.002))
-                m.add(bevelled((-hw + 0.02, 0.035, -hd), (hw - 0.02, h, hd - 0.14), 0.003))
-    m.add(slab((-0.2, -0.002, -hd + 0.1), (0.2, 0.001, hd - 0.1)),
-        of=glossy("filter", (0.35, 0.35, 0.36), 0.4))  # fmt: skip
+                m.box(w, 0.035, d, 0.002)
+                m.box(w - 0.04, (0.035, h), (-hd, hd - 0.14), 0.003)
+    m.box(0.4, (-0.002, 0.001), d - 0.2, of=glossy("filter", (0.35, 0.35, 0.36), 0.4))
     for k in range(4):
-        m.add(slab((-0.06 + k * 0.035, 0.012, hd - 0.001), (-0.04 + k * 0.035, 0.024, hd + 0.001)),
-            of=RUBBER)  # fmt: skip
+        m.box(0.02, (0.012, 0.024), 0.002, x=0.035 * k - 0.05, against=hd - 0.001, of=RUBBER)
 
 
 @family(group="fridge", nyu40=REFRIGERATOR, place=Place.FLOOR, variants=32,
     size=lambda m: (m.pick(0.55, 0.6, 0.6, 0.7, 0.9), m.uniform(0.6, 0.68),
-    m.pick(1.45, 1.75, 1.8, 1.86, 2.0)))  # fmt: skip
+    m.pick(1.45, 1.75, 1.8, 1.86, 2.0)))
 def fridge(m: Maker, size: Size) -> None:
     """A fridge.
 
@@ -514,7 +492,7 @@ def fridge(m: Maker, size: Size) -> None:
     hw = w / 2
     material = m.pick(ENAMEL, ENAMEL, STEEL, STEEL, glossy("black", (0.07, 0.07, 0.075), 0.25),
         glossy("enamel", m.pick((0.62, 0.75, 0.72), (0.75, 0.2, 0.16), (0.9, 0.86, 0.72),
-        (0.35, 0.48, 0.58)), 0.2))  # fmt: skip
+        (0.35, 0.48, 0.58)), 0.2))
     retro = m.chance(0.25) and w < 0.8
     grip = m.pick("bar", "square", "bow", "none") if w < 0.8 else m.pick("bar", "square", "bow")
     f, foot = d / 2 - (0.07 if grip == "none" else 0.1), 0.05
@@ -535,40 +513,37 @@ def fridge(m: Maker, size: Size) -> None:
         fridge_space(m, (-hw, hw), (c, e), (-d / 2, f), material, 0.05 if retro else 0.006, filling)
         if n_doors == 0:
             with opens(m, "drawer", (-hw, hw), (c, e), f + 0.07, -d / 2), m.of(material):
-                m.add(rounded((-hw + 0.002, c, f + 0.004), (hw - 0.002, e - 0.002, f + 0.07), 0.01,
-                    n=1))  # fmt: skip
+                m.rounded(w - 0.004, (c, e - 0.002), 0.066, 0.01, n=1, against=f + 0.004)
                 pull(m, grip, 0.0, e - 0.06, f + 0.069, True, 0.5 * w, grip_material)
                 drawer_box(m, (-hw + 0.05, hw - 0.05), (c + 0.05, e - 0.05),
-                    (-d / 2 + 0.08, f + 0.004), WHITE)  # fmt: skip
+                    (-d / 2 + 0.08, f + 0.004), WHITE)
         for k in range(n_doors):
             is_left = left if n_doors == 1 else k == 0
             a, b = (-hw, hw) if n_doors == 1 else ((-hw, -0.002), (0.002, hw))[k]
             with m.hinged("door", at=(a if is_left else b, c, f + 0.07),
-                axis=(0.0, -1.0 if is_left else 1.0, 0.0), upper_rad=_FRIDGE_RAD):  # fmt: skip
+                axis=(0.0, -1.0 if is_left else 1.0, 0.0), upper_rad=_FRIDGE_RAD):
                 door_racks(m, (a + 0.06, b - 0.06), (c, e), f)
                 if n_doors == 2:
-                    m.add(rounded((a + 0.002, c + 0.003, f + 0.004), (b - 0.002, e, f + 0.07), 0.01,
-                        n=1), of=material)  # fmt: skip
+                    m.rounded((a + 0.002, b - 0.002), (c + 0.003, e), 0.066, 0.01, n=1,
+                        against=f + 0.004, of=material)
                     pull(m, grip, 0.045 * (1 if k else -1), (c + e) / 2, f + 0.069, False,
-                        0.5 * (e - c), grip_material)  # fmt: skip
+                        0.5 * (e - c), grip_material)
                 else:
-                    m.add(rounded((-hw + 0.001, c + 0.002, f + 0.006),
-                        (hw - 0.001, e - 0.002, f + 0.07), 0.05 if retro else 0.008,
-                        n=3 if retro else 1), of=material)  # fmt: skip
+                    m.rounded(w - 0.002, (c + 0.002, e - 0.002), 0.064, 0.05 if retro else 0.008,
+                        n=3 if retro else 1, against=f + 0.006, of=material)
                     at = c + 0.52 * (e - c) if e - c > 1.2 else c + min(0.28, 0.5 * (e - c))
-                    pull(m, grip, (hw - 0.05) * (1 if left else -1),
-                        e - 0.2 if e < 0.6 * h else at, f + 0.069, False, min(0.34, 0.6 * (e - c)),
-                        grip_material)  # fmt: skip
+                    pull(m, grip, (hw - 0.05) * (1 if left else -1), e - 0.2 if e < 0.6 * h else at,
+                        f + 0.069, False, min(0.34, 0.6 * (e - c)), grip_material)
                 if shows_time and e == h and k == 0:
                     at = -0.05 if n_doors == 1 else -0.112
-                    m.add(slab((at, h - 0.3, f + 0.0695), (at + 0.1, h - 0.2, f + 0.0708)),
-                        of=BLACK_GLASS)  # fmt: skip
+                    m.box(0.1, 0.1, 0.0013, left=at, on=h - 0.3, against=f + 0.0695, of=BLACK_GLASS)
     for x, z in product((-hw + 0.06, hw - 0.06), (-d / 2 + 0.06, f - 0.06)):
-        m.add(frustum((0.022, 0.0), (0.018, foot + 0.01), n=10), at=(x, 0.0, z), of=RUBBER)
+        m.frustum((0.022, 0.0), (0.018, foot + 0.01), n=10, at=(x, 0.0, z), of=RUBBER)
 
 
-def fridge_space(m: Maker, x: Pair, y: Pair, z: Pair, material: Material, r: float,
-    filling: str) -> None:  # fmt: skip
+def fridge_space(
+    m: Maker, x: Pair, y: Pair, z: Pair, material: Material, r: float, filling: str
+) -> None:
     """A compartment of a fridge: foam between sheet and a white liner; 'shelves' or 'drawers' in it."""
     wall = 0.045
     shell(m, x, y, z, wall, material, r, liner=WHITE)
@@ -577,12 +552,13 @@ def fridge_space(m: Maker, x: Pair, y: Pair, z: Pair, material: Material, r: flo
     n = max(1, round((high - low) / 0.26))
     if filling == "drawers":
         for k in range(n):
-            m.add(bevelled((a + 0.004, low + (high - low) * k / n + 0.006, c[0]), (b - 0.004,
-                low + (high - low) * (k + 1) / n - 0.014, c[1] + 0.04), 0.006), of=CLEAR_PLASTIC)  # fmt: skip
+            m.box((a + 0.004, b - 0.004), (low + (high - low) * k / n + 0.006,
+                low + (high - low) * (k + 1) / n - 0.014), (c[0], c[1] + 0.04), 0.006,
+                of=CLEAR_PLASTIC)
     for k in range(1, n) if filling == "shelves" else ():
         at = low + (high - low) * k / n
-        m.add(slab((a, at, c[0]), (b, at + 0.005, c[1])), of=CLEAR_PLASTIC)
-        m.add(slab((a, at - 0.004, c[1] - 0.012), (b, at + 0.01, c[1])), of=WHITE)
+        m.box((a, b), 0.005, (c[0], c[1]), on=at, of=CLEAR_PLASTIC)
+        m.box((a, b), 0.014, 0.012, on=at - 0.004, against=c[1] - 0.012, of=WHITE)
 
 
 def door_racks(m: Maker, x: Pair, y: Pair, z: float) -> None:
@@ -591,10 +567,10 @@ def door_racks(m: Maker, x: Pair, y: Pair, z: float) -> None:
     for k in range(n):
         at = y[0] + 0.08 + (y[1] - y[0] - 0.12) * k / n
         with m.of(WHITE):
-            m.add(slab((x[0], at, z - 0.07), (x[1], at + 0.006, z + 0.006)))
-            m.add(slab((x[0], at + 0.006, z - 0.07), (x[1], at + 0.07, z - 0.066)))
+            m.box((x[0], x[1]), 0.006, 0.076, on=at, against=z - 0.07)
+            m.box((x[0], x[1]), 0.064, 0.004, on=at + 0.006, against=z - 0.07)
             for a in (x[0], x[1] - 0.004):
-                m.add(slab((a, at + 0.006, z - 0.066), (a + 0.004, at + 0.07, z + 0.006)))
+                m.box(0.004, 0.064, 0.072, left=a, on=at + 0.006, against=z - 0.066)
 
 
 def holed_plate(x: Pair, y: Pair, z: Pair, middle: Pair, r: float, *, n: int = 36) -> Surface:
@@ -616,63 +592,61 @@ def holed_plate(x: Pair, y: Pair, z: Pair, middle: Pair, r: float, *, n: int = 3
 
     def quads(a: int, b: int) -> I32:
         """Two triangles from ring a to ring b, seen from where a is left of b going round."""
-        return np.concatenate([np.stack([a + i, a + j, b + j], -1), np.stack([a + i, b + j, b + i], -1)])  # fmt: skip
+        return np.concatenate(
+            [np.stack([a + i, a + j, b + j], -1), np.stack([a + i, b + j, b + i], -1)]
+        )
 
-    faces = np.concatenate([
-        quads(front + outer, front + inner), quads(inner, outer), quads(outer, front + outer),
-        quads(front + inner, inner),
-    ])  # fmt: skip
+    faces = np.concatenate([quads(front + outer, front + inner), quads(inner, outer),
+        quads(outer, front + outer), quads(front + inner, inner)])
     return creased("plate", points, faces, radians(40))
 
 
 @family(group="washer", nyu40=OTHERFURNITURE, place=Place.FLOOR, variants=28,
-    size=lambda m: (m.pick(0.6, 0.6, 0.595), m.uniform(0.5, 0.64), m.uniform(0.84, 0.86)))  # fmt: skip
+    size=lambda m: (m.pick(0.6, 0.6, 0.595), m.uniform(0.5, 0.64), m.uniform(0.84, 0.86)))
 def washing_machine(m: Maker, size: Size) -> None:
     """A machine with a round door in its front: drawer, dial and display above it."""
     w, d, h = size
     hw = w / 2
     material = m.pick(ENAMEL, ENAMEL, ENAMEL, glossy("grey", (0.55, 0.56, 0.58), 0.3), STEEL,
-        glossy("black", (0.1, 0.1, 0.105), 0.3))  # fmt: skip
+        glossy("black", (0.1, 0.1, 0.105), 0.3))
     f, foot, strip = d / 2 - 0.045, 0.02, m.uniform(0.09, 0.13)
     with m.of(material):
-        m.add(board(w, d - 0.045, h - 0.028, h, 0.02, 0.006, z=-0.0225))
-        m.add(bevelled((-hw + 0.003, h - 0.03 - strip, f), (hw - 0.003, h - 0.032, f + 0.012),
-            0.003))  # fmt: skip
+        m.board(w, d - 0.045, h - 0.028, h, 0.02, 0.006, z=-0.0225)
+        m.box(w - 0.006, (h - 0.03 - strip, h - 0.032), 0.012, 0.003, against=f)
     y, r, x = (foot + (h - strip - foot) * m.uniform(0.5, 0.55), m.uniform(0.16, 0.2),
-        m.pick(0.0, 0.0, 0.0, -0.02))  # fmt: skip
+        m.pick(0.0, 0.0, 0.0, -0.02))
     frame = m.pick(CHROME, STEEL, material, glossy("dark hoop", (0.15, 0.15, 0.16), 0.3))
     # A body with a round hole in its front, and the drum behind it.
     shell(m, (-hw, hw), (foot, h - 0.03), (-d / 2, f - 0.012), 0.008, material)
     m.add(holed_plate((-hw, hw), (foot, h - 0.03), (f - 0.012, f), (x, y), r - 0.05), of=material)
     drum = min(0.24, hw - 0.03, y - foot - 0.02, h - 0.05 - y)
-    m.add(vessel([(0.0, 0.0), (drum, 0.0), (drum, d - 0.12), (r - 0.052, d - 0.09)], 0.004, n=36),
-        turn=LYING_ALONG_Z, at=(x, y, f - 0.003 - (d - 0.09)), of=STEEL)  # fmt: skip
+    m.vessel([(0.0, 0.0), (drum, 0.0), (drum, d - 0.12), (r - 0.052, d - 0.09)], 0.004, n=36,
+        turn=LYING_ALONG_Z, at=(x, y, f - 0.003 - (d - 0.09)), of=STEEL)
     with m.hinged("door", at=(x - r, y, f + 0.018), axis=(0.0, -1.0, 0.0), upper_rad=_MACHINE_RAD):
         with m.moved(at=(x, y, f), turn=LYING_ALONG_Z):
-            m.add(revolve([(r - 0.045, 0.0), (r, 0.0), (r, 0.018), (r - 0.012, 0.03),
-                (r - 0.04, 0.026), (r - 0.045, 0.012), (r - 0.045, 0.0)], n=36), of=frame)  # fmt: skip
-            m.add(revolve([(0.0, 0.0), (r - 0.044, 0.0), (r - 0.044, 0.013), (r * 0.45, 0.03),
-                (0.0, 0.036)], n=32), of=BLACK_GLASS)  # fmt: skip
+            m.revolve([(r - 0.045, 0.0), (r, 0.0), (r, 0.018), (r - 0.012, 0.03), (r - 0.04, 0.026),
+                (r - 0.045, 0.012), (r - 0.045, 0.0)], n=36, of=frame)
+            m.revolve([(0.0, 0.0), (r - 0.044, 0.0), (r - 0.044, 0.013), (r * 0.45, 0.03),
+                (0.0, 0.036)], n=32, of=BLACK_GLASS)
         if m.chance(0.7):
-            m.add(bevelled((x + r - 0.03, y - 0.04, f + 0.01), (x + r - 0.008, y + 0.04, f + 0.036),
-                0.004), of=frame)  # fmt: skip
+            m.box(0.022, 0.08, 0.026, 0.004, left=x + r - 0.03, on=y - 0.04, against=f + 0.01,
+                of=frame)
     # The drawer at the left, the dial in the middle or at the right, a display.
     drawer_y = (h - 0.03 - strip + 0.015, h - 0.045)
     with m.sliding("drawer", along=(0.0, 0.0, 1.0), upper_m=0.18):
-        m.add(bevelled((-hw + 0.02, drawer_y[0], f + 0.0115), (-hw + 0.18, drawer_y[1], f + 0.016),
-            0.003), of=material)  # fmt: skip
+        m.box(0.16, (drawer_y[0], drawer_y[1]), 0.0045, 0.003, left=-hw + 0.02, against=f + 0.0115,
+            of=material)
         drawer_box(m, (-hw + 0.01, -hw + 0.19), (drawer_y[0] - 0.01, drawer_y[1] + 0.02),
-            (f - 0.22, f + 0.0115), material)  # fmt: skip
-    m.add(revolve([(0.0, 0.0), (0.028, 0.0), (0.026, 0.014), (0.0, 0.016)], n=20),
-        turn=LYING_ALONG_Z, at=(m.pick(0.0, 0.06, 0.22 * w), h - 0.03 - strip / 2, f + 0.012),
-        of=m.pick(CHROME, material, RUBBER))  # fmt: skip
-    m.add(slab((hw - 0.2, h - 0.03 - strip / 2 - 0.018, f + 0.0119),
-        (hw - 0.1, h - 0.03 - strip / 2 + 0.018, f + 0.0128)), of=BLACK_GLASS)  # fmt: skip
+            (f - 0.22, f + 0.0115), material)
+    m.revolve([(0.0, 0.0), (0.028, 0.0), (0.026, 0.014), (0.0, 0.016)], n=20, turn=LYING_ALONG_Z,
+        at=(m.pick(0.0, 0.06, 0.22 * w), h - 0.03 - strip / 2, f + 0.012),
+        of=m.pick(CHROME, material, RUBBER))
+    m.box(0.1, 0.036, 0.0009, left=hw - 0.2, on=h - 0.03 - strip / 2 - 0.018, against=f + 0.0119,
+        of=BLACK_GLASS)
     for k in range(m.pick(2, 3, 4)):
-        m.add(slab((hw - 0.085 + k * 0.02, h - 0.03 - strip / 2 - 0.005, f + 0.0119),
-            (hw - 0.073 + k * 0.02, h - 0.03 - strip / 2 + 0.005, f + 0.015)),
-            of=m.pick(CHROME, RUBBER))  # fmt: skip
+        m.box(0.012, 0.01, 0.0031, left=hw - 0.085 + k * 0.02, on=h - 0.03 - strip / 2 - 0.005,
+            against=f + 0.0119, of=m.pick(CHROME, RUBBER))
     if m.chance(0.5):
-        m.add(slab((-hw + 0.05, foot + 0.03, f), (-hw + 0.17, foot + 0.09, f + 0.003)), of=material)
+        m.box(0.12, 0.06, 0.003, left=-hw + 0.05, on=foot + 0.03, against=f, of=material)
     for x, z in product((-hw + 0.05, hw - 0.05), (-d / 2 + 0.05, f - 0.05)):
-        m.add(cylinder(0.022, 0.0, foot + 0.005, n=10), at=(x, 0.0, z), of=RUBBER)
+        m.cylinder(0.022, 0.0, foot + 0.005, n=10, at=(x, 0.0, z), of=RUBBER)

@@ -8,19 +8,7 @@ from pbrs_farm.core.catalogue import Place
 from pbrs_farm.core.classes import LAMP
 from pbrs_farm.core.frames import LYING_ALONG_Z, rotation_x, rotation_z
 from pbrs_farm.core.house import Material
-from pbrs_farm.furnishings.things.bodies import (
-    bevelled,
-    board,
-    cylinder,
-    frustum,
-    hoop,
-    loft,
-    revolve,
-    slab,
-    sphere,
-    stretched,
-    tube,
-)
+from pbrs_farm.furnishings.things.bodies import sphere, stretched
 from pbrs_farm.furnishings.things.maker import Maker, Size, family
 from pbrs_farm.furnishings.things.materials import (
     BLACK_STEEL,
@@ -33,25 +21,35 @@ from pbrs_farm.furnishings.things.materials import (
     glossy,
     plain,
 )
-from pbrs_farm.furnishings.things.outlines import bent, d_shape, fluted, oval, rect, rings, scaled
+from pbrs_farm.furnishings.things.outlines import (
+    bent,
+    d_shape,
+    fluted,
+    oval,
+    polar,
+    rect,
+    rings,
+    scaled,
+)
+
+# fmt: off
 
 
 def lamp_shade(m: Maker, r0: float, r1: float, y0: float, y1: float, material: Material) -> None:
     """A shade of cloth or card r0 wide below, r1 above, from y0 to y1, its bulb in it."""
-    m.add(revolve([(r0, y0), (r1, y1), (r1 - 0.003, y1), (r0 - 0.003, y0), (r0, y0)], n=28),
-        of=material)  # fmt: skip
-    m.add(sphere((0.0, (y0 + y1) / 2, 0.0), min(0.035, 0.5 * r1), n=12), of=OPAL)
+    m.revolve([(r0, y0), (r1, y1), (r1 - 0.003, y1), (r0 - 0.003, y0), (r0, y0)], n=28, of=material)
+    m.sphere((0.0, (y0 + y1) / 2, 0.0), min(0.035, 0.5 * r1), n=12, of=OPAL)
 
 
 def shade_spokes(m: Maker, r: float, k1: float, tall: float, h: float, material: Material) -> None:
     """Three wires that carry a shade r wide below, k1 r above, `tall`, its top at h."""
     for k in range(3):
-        m.add(tube([(0.0, h - 0.5 * tall - 0.05, 0.0), ((r + k1 * r) / 2.1 * cos(2.1 * k),
-            h - 0.5 * tall, (r + k1 * r) / 2.1 * sin(2.1 * k))], 0.003, n=5), of=material)  # fmt: skip
+        m.tube([(0.0, h - 0.5 * tall - 0.05, 0.0), polar((r + k1 * r) / 2.1, h - 0.5 * tall,
+            2.1 * k)], 0.003, n=5, of=material)
 
 
 @family(group="floor_lamp", nyu40=LAMP, place=Place.FLOOR, called="floor_lamp", variants=36,
-    size=lambda m: (*m.pick((0.36, 0.36), (0.4, 0.4), (0.46, 0.46)), m.uniform(1.4, 1.72)))  # fmt: skip
+    size=lambda m: (*m.pick((0.36, 0.36), (0.4, 0.4), (0.46, 0.46)), m.uniform(1.4, 1.72)))
 def standing_lamp(m: Maker, size: Size) -> None:
     """A lamp that stands on the floor.
 
@@ -61,41 +59,39 @@ def standing_lamp(m: Maker, size: Size) -> None:
     r = w / 2
     material = m.pick(m.metal, BLACK_STEEL, BRASS, m.timber, WHITE_STEEL, m.dark_timber)
     fabric = plain("shade fabric", m.pick((0.9, 0.87, 0.8), (0.9, 0.88, 0.85), m.textile(),
-        m.style.accent), 0.9)  # fmt: skip
+        m.style.accent), 0.9)
     form = m.pick(0, 0, 0, 1, 1, 1, 4, 5)
     tall, k1 = m.uniform(0.2, 0.32), m.uniform(0.6, 1.0)
     match form:
         case 0:  # a shade on a pole
-            m.add(revolve([(0.0, 0.0), (r * 0.72, 0.0), (r * 0.72, 0.014), (0.02, 0.03),
-                (0.011, 0.05), (0.011, h - 0.5 * tall - 0.05), (0.0, h - 0.5 * tall - 0.05)], n=28),
-                of=material)  # fmt: skip
+            m.revolve([(0.0, 0.0), (r * 0.72, 0.0), (r * 0.72, 0.014), (0.02, 0.03), (0.011, 0.05),
+                (0.011, h - 0.5 * tall - 0.05), (0.0, h - 0.5 * tall - 0.05)], n=28, of=material)
             lamp_shade(m, r, r * k1, h - tall, h, fabric)
             shade_spokes(m, r, k1, tall, h, material)
         case 1:  # on three legs
             for k in range(3):
-                m.add(tube([(0.96 * r * cos(2.0944 * k), 0.006, 0.96 * r * sin(2.0944 * k)),
-                    (0.02 * cos(2.0944 * k), h - tall - 0.06, 0.02 * sin(2.0944 * k))], 0.012, n=8,
-                    end=0.016), of=material)  # fmt: skip
-            m.add(revolve([(0.0, h - tall - 0.1), (0.035, h - tall - 0.1), (0.035, h - tall - 0.05),
+                m.tube([polar(0.96 * r, 0.006, 2.0944 * k), polar(0.02, h - tall - 0.06,
+                    2.0944 * k)], 0.012, end=0.016, of=material)
+            m.revolve([(0.0, h - tall - 0.1), (0.035, h - tall - 0.1), (0.035, h - tall - 0.05),
                 (0.01, h - tall - 0.03), (0.01, h - 0.5 * tall - 0.04),
-                (0.0, h - 0.5 * tall - 0.04)], n=16), of=material)  # fmt: skip
+                (0.0, h - 0.5 * tall - 0.04)], of=material)
             lamp_shade(m, r, r * k1, h - tall, h, fabric)
             shade_spokes(m, r, k1, tall, h, material)
         case 4:  # a column that shines
             q = m.pick(0.11, 0.13, 0.15)
-            m.add(board(w, d, 0.0, 0.03, m.pick(0.02, 0.12, r), 0.004), of=material)
-            m.add(tube([(0.0, 0.031, 0.0), (0.0, h - 0.02, 0.0)], q, n=24), of=OPAL)
+            m.board(w, d, 0.0, 0.03, m.pick(0.02, 0.12, r), 0.004, of=material)
+            m.rod(0.0, (0.031, h - 0.02), 0.0, q, n=24, of=OPAL)
             for y in (0.03, 0.36 * h, 0.68 * h, h - 0.022):
-                m.add(revolve([(q - 0.002, y), (q + 0.012, y), (q + 0.012, y + 0.022),
-                    (q - 0.002, y + 0.022), (q - 0.002, y)], n=24), of=material)  # fmt: skip
+                m.revolve([(q - 0.002, y), (q + 0.012, y), (q + 0.012, y + 0.022),
+                    (q - 0.002, y + 0.022), (q - 0.002, y)], n=24, of=material)
         case 5:  # a ball, or three, on a pole
-            m.add(revolve([(0.0, 0.0), (r, 0.0), (r, 0.012), (0.014, 0.024), (0.01, h - 0.24),
-                (0.0, h - 0.24)], n=28), of=material)  # fmt: skip
-            m.add(sphere((0.0, h - 0.13, 0.0), 0.13, n=20), of=OPAL)
+            m.revolve([(0.0, 0.0), (r, 0.0), (r, 0.012), (0.014, 0.024), (0.01, h - 0.24),
+                (0.0, h - 0.24)], n=28, of=material)
+            m.sphere((0.0, h - 0.13, 0.0), 0.13, n=20, of=OPAL)
 
 
 @family(group="floor_lamp", nyu40=LAMP, place=Place.FLOOR, called="reading_lamp", variants=16,
-    size=lambda m: (m.pick(0.44, 0.48), m.pick(0.26, 0.28), m.uniform(1.4, 1.65)))  # fmt: skip
+    size=lambda m: (m.pick(0.44, 0.48), m.pick(0.26, 0.28), m.uniform(1.4, 1.65)))
 def arc_lamp(m: Maker, size: Size) -> None:
     """A lamp that stands and leans over: an arc, or two arms to read by."""
     w, d, h = size
@@ -103,33 +99,32 @@ def arc_lamp(m: Maker, size: Size) -> None:
     material, form = m.pick(m.metal, BLACK_STEEL, BRASS, WHITE_STEEL), 2 + m.weighted(0.5, 0.5)
     match form:
         case 2:  # an arc
-            m.add(revolve([(0.0, 0.0), (q, 0.0), (q, 0.03), (0.0, 0.035)], n=26),
-                at=(-r + q, 0.0, 0.0),
-                of=m.pick(material, glossy("stone", (0.86, 0.85, 0.82), 0.25)))  # fmt: skip
-            m.add(tube(bent([(-r + 0.1, 0.02, 0.0), (-r + 0.03, h * 0.7, 0.0),
-                (0.0, h - 0.006, 0.0), (r - 0.1, h - 0.08, 0.0), (r - 0.1, h - 0.2, 0.0)], 0.35,
-                n=6), 0.008, n=8), of=material)  # fmt: skip
+            m.revolve([(0.0, 0.0), (q, 0.0), (q, 0.03), (0.0, 0.035)], n=26, at=(-r + q, 0.0, 0.0),
+                of=m.pick(material, glossy("stone", (0.86, 0.85, 0.82), 0.25)))
+            m.tube(bent([(-r + 0.1, 0.02, 0.0), (-r + 0.03, h * 0.7, 0.0), (0.0, h - 0.006, 0.0),
+                (r - 0.1, h - 0.08, 0.0), (r - 0.1, h - 0.2, 0.0)], 0.35, n=6), 0.008, of=material)
             with m.moved(at=(r - 0.1, h - 0.34, 0.0)):
-                m.add(revolve([(0.1, 0.0), (0.085, 0.07), (0.04, 0.13), (0.01, 0.15), (0.0, 0.15),
-                    (0.0, 0.145), (0.037, 0.126), (0.082, 0.067), (0.097, 0.0), (0.1, 0.0)], n=24),
-                    of=material)  # fmt: skip
-                m.add(sphere((0.0, 0.05, 0.0), 0.03, n=12), of=OPAL)
+                m.revolve([(0.1, 0.0), (0.085, 0.07), (0.04, 0.13), (0.01, 0.15), (0.0, 0.15),
+                    (0.0, 0.145), (0.037, 0.126), (0.082, 0.067), (0.097, 0.0), (0.1, 0.0)], n=24,
+                    of=material)
+                m.sphere((0.0, 0.05, 0.0), 0.03, n=12, of=OPAL)
         case 3:  # a reading lamp: two arms and a small head
-            m.add(revolve([(0.0, 0.0), (q, 0.0), (q - 0.005, 0.015), (0.012, 0.022),
-                (0.01, 0.62 * h), (0.0, 0.62 * h)], n=26), at=(-r + q, 0.0, 0.0), of=material)  # fmt: skip
+            m.revolve([(0.0, 0.0), (q, 0.0), (q - 0.005, 0.015), (0.012, 0.022), (0.01, 0.62 * h),
+                (0.0, 0.62 * h)], n=26, at=(-r + q, 0.0, 0.0), of=material)
             with m.of(material):
-                m.add(tube([(-r + q, 0.61 * h, 0.0), (-0.2 * r, h - 0.02, 0.0)], 0.009, n=8))
-                m.add(tube([(-0.22 * r, h - 0.014, 0.0), (r - 0.06, h - 0.16, 0.0)], 0.009, n=8))
+                m.tube([(-r + q, 0.61 * h, 0.0), (-0.2 * r, h - 0.02, 0.0)], 0.009)
+                m.tube([(-0.22 * r, h - 0.014, 0.0), (r - 0.06, h - 0.16, 0.0)], 0.009)
                 for x, y in ((-r + q, 0.61 * h), (-0.21 * r, h - 0.018)):
-                    m.add(sphere((x, y, 0.0), 0.018, n=10))
-                m.add(revolve([(0.075, 0.0), (0.04, 0.1), (0.02, 0.13), (0.0, 0.13), (0.0, 0.125),
-                    (0.036, 0.095), (0.072, 0.0), (0.075, 0.0)], n=22), turn=rotation_z(0.35),
-                    at=(r - 0.1, h - 0.28, 0.0))  # fmt: skip
-            m.add(sphere((r - 0.085, h - 0.235, 0.0), 0.025, n=10), of=OPAL)
+                    m.sphere((x, y, 0.0), 0.018, n=10)
+                m.revolve([(0.075, 0.0), (0.04, 0.1), (0.02, 0.13), (0.0, 0.13), (0.0, 0.125),
+                    (0.036, 0.095), (0.072, 0.0), (0.075, 0.0)], n=22, turn=rotation_z(0.35),
+                    at=(r - 0.1, h - 0.28, 0.0))
+            m.sphere((r - 0.085, h - 0.235, 0.0), 0.025, n=10, of=OPAL)
 
 
 @family(group="table_lamp", nyu40=LAMP, place=Place.SURFACE, called="table_lamp", variants=36,
-    size=lambda m: (*m.pick((0.2, 0.2), (0.24, 0.24), (0.28, 0.28), (0.32, 0.32)), m.uniform(0.32, 0.52)))  # fmt: skip
+    size=lambda m: (*m.pick((0.2, 0.2), (0.24, 0.24), (0.28, 0.28), (0.32, 0.32)),
+    m.uniform(0.32, 0.52)))
 def shade_lamp(m: Maker, size: Size) -> None:
     """A lamp on a table.
 
@@ -138,9 +133,9 @@ def shade_lamp(m: Maker, size: Size) -> None:
     w, _d, h = size
     r = w / 2
     material = m.pick(m.china(), m.china(), m.metal, BRASS, BLACK_STEEL, m.timber,
-        glass((0.8, 0.9, 0.88), 0.25), plain("clay", m.any_colour(), 0.7))  # fmt: skip
+        glass((0.8, 0.9, 0.88), 0.25), plain("clay", m.any_colour(), 0.7))
     fabric = plain("shade fabric", m.pick((0.9, 0.87, 0.8), (0.9, 0.88, 0.85), m.textile(),
-        m.style.accent), 0.9)  # fmt: skip
+        m.style.accent), 0.9)
     form = m.weighted(0.64, 0.18, 0.18)
     tall, k1 = h * m.uniform(0.38, 0.5), m.uniform(0.55, 1.0)
     match form:
@@ -150,54 +145,55 @@ def shade_lamp(m: Maker, size: Size) -> None:
             with m.of(material):
                 match foot:
                     case 0:  # turned of clay
-                        m.add(revolve(scaled(q, f, [(0, 0), (0.8, 0), (1, 0.2), (0.9, 0.5),
-                            (0.35, 0.85), (0.2, 1), (0, 1)]), n=24))  # fmt: skip
+                        m.revolve(scaled(q, f, [(0, 0), (0.8, 0), (1, 0.2), (0.9, 0.5),
+                            (0.35, 0.85), (0.2, 1), (0, 1)]), n=24)
                     case 1:  # a ball
-                        m.add(sphere((0.0, q, 0.0), q, n=18))
+                        m.sphere((0.0, q, 0.0), q, n=18)
                     case 2:  # a rod on a plate
-                        m.add(revolve([(0.0, 0.0), (q, 0.0), (q, 0.015), (0.012, 0.03), (0.01, f),
-                            (0.0, f)], n=24))  # fmt: skip
+                        m.revolve([(0.0, 0.0), (q, 0.0), (q, 0.015), (0.012, 0.03), (0.01, f),
+                            (0.0, f)], n=24)
                     case 3:  # a square block
-                        m.add(loft(rings(rect, [(q * 1.5, q * 1.5, 0.006, 0.0),
-                            (q * 1.5, q * 1.5, 0.006, 0.75 * f),
-                            (q * 0.5, q * 0.5, 0.006, 0.85 * f)], n=2)))  # fmt: skip
+                        m.loft(rings(rect, [(q * 1.5, q * 1.5, 0.006, 0.0),
+                            (q * 1.5, q * 1.5, 0.006, 0.75 * f), (q * 0.5, q * 0.5, 0.006,
+                            0.85 * f)], n=2))
                     case 4:  # three balls
                         for k in range(3):
-                            m.add(sphere((0.0, q * (0.75 + 1.15 * k * 0.8), 0.0),
-                                q * (0.75 - 0.12 * k), n=14))  # fmt: skip
+                            m.sphere(
+                                (0.0, q * (0.75 + 1.15 * k * 0.8), 0.0), q * (0.75 - 0.12 * k), n=14
+                            )
                     case 5:  # three legs
                         for k in range(3):
-                            m.add(tube([(q * cos(2.0944 * k), 0.004, q * sin(2.0944 * k)),
-                                (0.01 * cos(2.0944 * k), f, 0.01 * sin(2.0944 * k))], 0.008, n=7))  # fmt: skip
+                            m.tube([polar(q, 0.004, 2.0944 * k), polar(0.01, f, 2.0944 * k)], 0.008,
+                                n=7)
                     case 6:  # fluted
-                        m.add(loft(rings(fluted, [(1.6 * q, 12, 0.08, 0.0),
-                            (2 * q, 12, 0.08, 0.4 * f), (1.1 * q, 12, 0.08, 0.85 * f),
-                            (0.6 * q, 12, 0.08, 0.9 * f)]), sharp=70.0))  # fmt: skip
+                        m.loft(rings(fluted, [(1.6 * q, 12, 0.08, 0.0), (2 * q, 12, 0.08, 0.4 * f),
+                            (1.1 * q, 12, 0.08, 0.85 * f), (0.6 * q, 12, 0.08, 0.9 * f)]),
+                            sharp=70.0)
                     case 7:  # turned of wood
-                        m.add(revolve([(0.0, 0.0), (q, 0.0), (q, 0.02), (q * 0.4, 0.06),
+                        m.revolve([(0.0, 0.0), (q, 0.0), (q, 0.02), (q * 0.4, 0.06),
                             (q * 0.55, 0.3 * f), (q * 0.3, 0.5 * f), (q * 0.5, 0.7 * f),
-                            (q * 0.2, 0.9 * f), (q * 0.2, f), (0.0, f)], n=20))  # fmt: skip
-            m.add(tube([(0.0, 0.3 * f, 0.0), (0.0, h - 0.5 * tall, 0.0)], 0.007, n=8), of=m.metal)
+                            (q * 0.2, 0.9 * f), (q * 0.2, f), (0.0, f)], n=20)
+            m.rod(0.0, (0.3 * f, h - 0.5 * tall), 0.0, 0.007, of=m.metal)
             lamp_shade(m, r, r * k1, h - tall, h, fabric)
             for k in range(3):
-                m.add(tube([(0.0, h - 0.5 * tall - 0.02, 0.0), ((r + k1 * r) / 2.1 * cos(2.1 * k),
-                    h - 0.5 * tall, (r + k1 * r) / 2.1 * sin(2.1 * k))], 0.002, n=5), of=m.metal)  # fmt: skip
+                m.tube([(0.0, h - 0.5 * tall - 0.02, 0.0), polar((r + k1 * r) / 2.1, h - 0.5 * tall,
+                    2.1 * k)], 0.002, n=5, of=m.metal)
         case 1:  # a ball on a foot
             q = min(r, 0.3 * h)
-            m.add(revolve([(0.0, 0.0), (r, 0.0), (r, 0.012), (r * 0.3, 0.025),
-                (r * 0.25, h - 1.9 * q), (0.0, h - 1.9 * q)], n=24), of=material)  # fmt: skip
-            m.add(sphere((0.0, h - q, 0.0), q, n=20), of=OPAL)
+            m.revolve([(0.0, 0.0), (r, 0.0), (r, 0.012), (r * 0.3, 0.025), (r * 0.25, h - 1.9 * q),
+                (0.0, h - 1.9 * q)], n=24, of=material)
+            m.sphere((0.0, h - q, 0.0), q, n=20, of=OPAL)
         case 2:  # a mushroom: a dome over a foot
-            m.add(revolve([(0.0, 0.0), (r * 0.6, 0.0), (r * 0.55, 0.02), (r * 0.25, 0.1 * h),
-                (r * 0.2, 0.6 * h), (r * 0.3, 0.66 * h), (0.0, 0.66 * h)], n=22), of=material)  # fmt: skip
-            m.add(revolve([(r * 0.93, 0.62 * h), (r, 0.63 * h), (r * 0.9, 0.8 * h),
-                (r * 0.6, 0.94 * h), (0.0, h), (0.0, h - 0.004), (r * 0.57, 0.93 * h),
-                (r * 0.87, 0.79 * h), (r * 0.93, 0.62 * h)], n=28), of=material)  # fmt: skip
-            m.add(sphere((0.0, 0.72 * h, 0.0), 0.035, n=12), of=OPAL)
+            m.revolve([(0.0, 0.0), (r * 0.6, 0.0), (r * 0.55, 0.02), (r * 0.25, 0.1 * h),
+                (r * 0.2, 0.6 * h), (r * 0.3, 0.66 * h), (0.0, 0.66 * h)], n=22, of=material)
+            m.revolve([(r * 0.93, 0.62 * h), (r, 0.63 * h), (r * 0.9, 0.8 * h), (r * 0.6, 0.94 * h),
+                (0.0, h), (0.0, h - 0.004), (r * 0.57, 0.93 * h), (r * 0.87, 0.79 * h),
+                (r * 0.93, 0.62 * h)], n=28, of=material)
+            m.sphere((0.0, 0.72 * h, 0.0), 0.035, n=12, of=OPAL)
 
 
 @family(group="table_lamp", nyu40=LAMP, place=Place.SURFACE, called="desk_lamp", variants=16,
-    size=lambda m: (m.pick(0.3, 0.36, 0.42), 0.15, m.uniform(0.36, 0.5)))  # fmt: skip
+    size=lambda m: (m.pick(0.3, 0.36, 0.42), 0.15, m.uniform(0.36, 0.5)))
 def arm_lamp(m: Maker, size: Size) -> None:
     """A lamp on a desk.
 
@@ -205,35 +201,37 @@ def arm_lamp(m: Maker, size: Size) -> None:
     """
     w, _d, h = size
     r = w / 2
-    material = m.pick(m.metal, BRASS, BLACK_STEEL, WHITE_STEEL,
-        glossy("enamel", m.any_colour(), 0.35))  # fmt: skip
+    material = m.pick(
+        m.metal, BRASS, BLACK_STEEL, WHITE_STEEL, glossy("enamel", m.any_colour(), 0.35)
+    )
     with m.of(material):
         if m.chance(0.7):
-            m.add(revolve([(0.0, 0.0), (0.075, 0.0), (0.07, 0.02), (0.01, 0.026), (0.0, 0.026)],
-                n=22), at=(-r + 0.075, 0.0, 0.0))  # fmt: skip
+            m.revolve([(0.0, 0.0), (0.075, 0.0), (0.07, 0.02), (0.01, 0.026), (0.0, 0.026)], n=22,
+                at=(-r + 0.075, 0.0, 0.0))
         else:
-            m.add(board(0.15, 0.15, 0.0, 0.018, 0.01, 0.003, x=-r + 0.075))
+            m.board(0.15, 0.15, 0.0, 0.018, 0.01, 0.003, x=-r + 0.075)
         if m.chance(0.6):
-            m.add(tube([(-r + 0.075, 0.02, 0.0), (-r + 0.03, 0.55 * h, 0.0)], 0.006, n=8))
-            m.add(tube([(-r + 0.03, 0.55 * h, 0.0), (0.1 * r, h - 0.012, 0.0)], 0.006, n=8))
+            m.tube([(-r + 0.075, 0.02, 0.0), (-r + 0.03, 0.55 * h, 0.0)], 0.006)
+            m.tube([(-r + 0.03, 0.55 * h, 0.0), (0.1 * r, h - 0.012, 0.0)], 0.006)
             for x, y in ((-r + 0.03, 0.55 * h), (0.1 * r, h - 0.012)):
-                m.add(sphere((x, y, 0.0), 0.012, n=8))
-            m.add(tube([(0.1 * r, h - 0.012, 0.0), (r - 0.055, h - 0.07, 0.0)], 0.006, n=8))
+                m.sphere((x, y, 0.0), 0.012, n=8)
+            m.tube([(0.1 * r, h - 0.012, 0.0), (r - 0.055, h - 0.07, 0.0)], 0.006)
         else:
-            m.add(tube(bent([(-r + 0.075, 0.015, 0.0), (-r + 0.05, h - 0.007, 0.0),
-                (r - 0.05, h - 0.007, 0.0), (r - 0.045, h - 0.08, 0.0)], 0.14, n=6), 0.007, n=8))  # fmt: skip
+            m.tube(bent([(-r + 0.075, 0.015, 0.0), (-r + 0.05, h - 0.007, 0.0),
+                (r - 0.05, h - 0.007, 0.0), (r - 0.045, h - 0.08, 0.0)], 0.14, n=6), 0.007)
         with m.moved(at=(r - 0.056, h - 0.15, 0.0)):
             if m.chance(0.6):
-                m.add(revolve([(0.055, 0.0), (0.05, 0.05), (0.02, 0.09), (0.0, 0.09), (0.0, 0.087),
-                    (0.018, 0.086), (0.047, 0.048), (0.052, 0.0), (0.055, 0.0)], n=20))  # fmt: skip
+                m.revolve([(0.055, 0.0), (0.05, 0.05), (0.02, 0.09), (0.0, 0.09), (0.0, 0.087),
+                    (0.018, 0.086), (0.047, 0.048), (0.052, 0.0), (0.055, 0.0)], n=20)
             else:
-                m.add(revolve([(0.035, 0.0), (0.035, 0.08), (0.0, 0.09), (0.0, 0.086),
-                    (0.032, 0.078), (0.032, 0.0), (0.035, 0.0)], n=18))  # fmt: skip
-            m.add(sphere((0.0, 0.032, 0.0), 0.02, n=10), of=OPAL)
+                m.revolve([(0.035, 0.0), (0.035, 0.08), (0.0, 0.09), (0.0, 0.086), (0.032, 0.078),
+                    (0.032, 0.0), (0.035, 0.0)], n=18)
+            m.sphere((0.0, 0.032, 0.0), 0.02, n=10, of=OPAL)
 
 
 @family(group="ceiling_lamp", nyu40=LAMP, place=Place.CEILING, called="ceiling_lamp", variants=48,
-    size=lambda m: (*m.pick((0.3, 0.3), (0.38, 0.38), (0.46, 0.46), (0.56, 0.56)), m.pick(0.1, 0.13, 0.15, 0.5, 0.6, 0.7)))  # fmt: skip
+    size=lambda m: (*m.pick((0.3, 0.3), (0.38, 0.38), (0.46, 0.46), (0.56, 0.56)),
+    m.pick(0.1, 0.13, 0.15, 0.5, 0.6, 0.7)))
 def hanging_lamp(m: Maker, size: Size) -> None:
     """A lamp under the ceiling.
 
@@ -241,140 +239,136 @@ def hanging_lamp(m: Maker, size: Size) -> None:
     """
     w, d, h = size
     r = w / 2
-    material = m.pick(m.metal, BLACK_STEEL, BRASS, WHITE_STEEL,
-        glossy("enamel", m.style.accent, 0.3), m.timber)  # fmt: skip
+    material = m.pick(
+        m.metal, BLACK_STEEL, BRASS, WHITE_STEEL, glossy("enamel", m.style.accent, 0.3), m.timber
+    )
     fabric = plain("shade fabric", m.pick((0.9, 0.87, 0.8), (0.9, 0.88, 0.85), m.textile(),
-        m.style.accent), 0.9)  # fmt: skip
+        m.style.accent), 0.9)
     # Flat ones: a dish, a drum, a square, spots on a bar, a ring of metal round a plate.
     if h < 0.2:
         form = m.weighted(0.3, 0.25, 0.15, 0.15, 0.15)
         match form:
             case 0:  # a bowl at the ceiling
-                m.add(cylinder(r, h - 0.025, h, n=32), of=material)
-                m.add(revolve([(0.0, 0.0), (r * 0.5, 0.1 * h), (r * 0.85, 0.4 * h),
-                    (r * 0.95, h - 0.026), (0.0, h - 0.026)], n=32), of=OPAL)  # fmt: skip
+                m.cylinder(r, h - 0.025, h, n=32, of=material)
+                m.revolve([(0.0, 0.0), (r * 0.5, 0.1 * h), (r * 0.85, 0.4 * h),
+                    (r * 0.95, h - 0.026), (0.0, h - 0.026)], n=32, of=OPAL)
             case 1:  # a drum of cloth
-                m.add(revolve([(r - 0.004, 0.0), (r, 0.0), (r, h), (0.0, h), (0.0, h - 0.004),
-                    (r - 0.004, h - 0.004), (r - 0.004, 0.0)], n=32), of=fabric)  # fmt: skip
-                m.add(cylinder(r - 0.005, 0.015, 0.02, n=32), of=OPAL)
+                m.revolve([(r - 0.004, 0.0), (r, 0.0), (r, h), (0.0, h), (0.0, h - 0.004),
+                    (r - 0.004, h - 0.004), (r - 0.004, 0.0)], n=32, of=fabric)
+                m.cylinder(r - 0.005, 0.015, 0.02, n=32, of=OPAL)
             case 2:  # a square plate
-                m.add(board(w, d, h - 0.03, h, 0.01, 0.002), of=material)
-                m.add(board(w - 0.04, d - 0.04, 0.0, h - 0.031, 0.02, 0.006), of=OPAL)
+                m.board(w, d, h - 0.03, h, 0.01, 0.002, of=material)
+                m.board(w - 0.04, d - 0.04, 0.0, h - 0.031, 0.02, 0.006, of=OPAL)
             case 3:  # a bar with three spots
-                m.add(bevelled((-r, h - 0.03, -0.03), (r, h, 0.03), 0.002), of=material)
+                m.box(2 * r, (h - 0.03, h), 0.06, 0.002, of=material)
                 for x in (-0.7, 0.0, 0.7):
                     with m.moved(at=(x * r, 0.0, 0.0), turn=rotation_x(x * 0.5)):
-                        m.add(revolve([(0.0, h - 0.03), (0.012, h - 0.03), (0.03, h - 0.045),
-                            (0.032, 0.012), (0.0, 0.012)], n=16), of=material)  # fmt: skip
-                        m.add(cylinder(0.026, 0.002, 0.0115, n=16), of=OPAL)
-                m.add(cylinder(d / 2, h - 0.02, h - 0.001, n=24), of=material)
+                        m.revolve([(0.0, h - 0.03), (0.012, h - 0.03), (0.03, h - 0.045),
+                            (0.032, 0.012), (0.0, 0.012)], of=material)
+                        m.cylinder(0.026, 0.002, 0.0115, of=OPAL)
+                m.cylinder(d / 2, h - 0.02, h - 0.001, n=24, of=material)
             case 4:  # a drum of glass in a rim
-                m.add(cylinder(0.06, h - 0.02, h, n=20), of=material)
-                m.add(cylinder(r * 0.9, 0.02, h - 0.021, n=32), of=OPAL)
-                m.add(revolve([(r * 0.9, 0.0), (r, 0.0), (r, h - 0.01), (r * 0.9, h - 0.01),
-                    (r * 0.9, 0.0)], n=32), of=material)  # fmt: skip
+                m.cylinder(0.06, h - 0.02, h, n=20, of=material)
+                m.cylinder(r * 0.9, 0.02, h - 0.021, n=32, of=OPAL)
+                m.revolve([(r * 0.9, 0.0), (r, 0.0), (r, h - 0.01), (r * 0.9, h - 0.01),
+                    (r * 0.9, 0.0)], n=32, of=material)
     # Hanging ones, from a canopy by a cord.
     if h > 0.2:
         form = m.integers(0, 10)
-        m.add(frustum((0.045, h - 0.03), (0.05, h), n=22), of=material)
+        m.frustum((0.045, h - 0.03), (0.05, h), n=22, of=material)
         low = 0.36 * h
         if form not in (5, 6, 8):
-            m.add(tube([(0.0, low, 0.0), (0.0, h - 0.025, 0.0)], 0.0035, n=6), of=RUBBER)
+            m.rod(0.0, (low, h - 0.025), 0.0, 0.0035, n=6, of=RUBBER)
         match form:
             case 0:  # a cone of metal
-                m.add(revolve([(r, 0.0), (r * 0.55, 0.2 * h), (0.03, low), (0.0, low),
+                m.revolve([(r, 0.0), (r * 0.55, 0.2 * h), (0.03, low), (0.0, low),
                     (0.0, low - 0.004), (0.027, low - 0.004), (r * 0.55 - 0.004, 0.2 * h - 0.002),
-                    (r - 0.003, 0.0), (r, 0.0)], n=32), of=material)  # fmt: skip
-                m.add(sphere((0.0, 0.14 * h, 0.0), 0.036, n=14), of=OPAL)
+                    (r - 0.003, 0.0), (r, 0.0)], n=32, of=material)
+                m.sphere((0.0, 0.14 * h, 0.0), 0.036, n=14, of=OPAL)
             case 1:  # a drum of cloth
-                m.add(revolve([(r, 0.0), (r * 0.98, low), (r * 0.98 - 0.003, low), (r - 0.003, 0.0),
-                    (r, 0.0)], n=32), of=fabric)  # fmt: skip
-                m.add(sphere((0.0, 0.18 * h, 0.0), 0.045, n=14), of=OPAL)
+                m.revolve([(r, 0.0), (r * 0.98, low), (r * 0.98 - 0.003, low), (r - 0.003, 0.0),
+                    (r, 0.0)], n=32, of=fabric)
+                m.sphere((0.0, 0.18 * h, 0.0), 0.045, n=14, of=OPAL)
                 for k in range(3):
-                    m.add(tube([(0.0, low - 0.004, 0.0), (r * 0.975 * cos(2.1 * k), low - 0.004,
-                        r * 0.975 * sin(2.1 * k))], 0.0025, n=5), of=material)  # fmt: skip
+                    m.tube([(0.0, low - 0.004, 0.0), polar(r * 0.975, low - 0.004, 2.1 * k)],
+                        0.0025, n=5, of=material)
             case 2:  # a dome
-                m.add(revolve([(r, 0.0), (r * 0.95, 0.12 * h), (r * 0.7, 0.26 * h), (0.03, low),
+                m.revolve([(r, 0.0), (r * 0.95, 0.12 * h), (r * 0.7, 0.26 * h), (0.03, low),
                     (0.0, low), (0.0, low - 0.004), (0.028, low - 0.005),
                     (r * 0.7 - 0.003, 0.26 * h - 0.004), (r * 0.95 - 0.004, 0.12 * h),
-                    (r - 0.004, 0.0), (r, 0.0)], n=36), of=material)  # fmt: skip
-                m.add(sphere((0.0, 0.16 * h, 0.0), 0.045, n=14), of=OPAL)
+                    (r - 0.004, 0.0), (r, 0.0)], n=36, of=material)
+                m.sphere((0.0, 0.16 * h, 0.0), 0.045, n=14, of=OPAL)
             case 3:  # a ball of opal, pressed
                 m.add(stretched(sphere((0, 0, 0), 1.0, n=22), (r, 0.5 * low, r)),
-                    at=(0.0, 0.5 * low, 0.0), of=OPAL)  # fmt: skip
-                m.add(frustum((0.04, low - 0.006), (0.03, low + 0.02), n=16), of=material)
+                    at=(0.0, 0.5 * low, 0.0), of=OPAL)
+                m.frustum((0.04, low - 0.006), (0.03, low + 0.02), of=material)
             case 4:  # a basket of hoops round a bulb
                 for k in range(7):
-                    m.add(hoop(oval(w * sin(0.35 + 2.4 * k / 6) - 0.014,
+                    m.hoop(oval(w * sin(0.35 + 2.4 * k / 6) - 0.014,
                         d * sin(0.35 + 2.4 * k / 6) - 0.014, n=24), 0.007 + (low - 0.014) * k / 6,
-                        0.006, n=5), of=m.pick(WICKER, WICKER, material))  # fmt: skip
+                        0.006, n=5, of=m.pick(WICKER, WICKER, material))
                 for k in range(10):
-                    m.add(tube(bent([(0.04 * cos(0.628 * k), low - 0.004, 0.04 * sin(0.628 * k)),
-                        ((r - 0.01) * cos(0.628 * k), 0.5 * low, (r - 0.01) * sin(0.628 * k)),
-                        (0.3 * r * cos(0.628 * k), 0.006, 0.3 * r * sin(0.628 * k))], 0.3, n=5),
-                        0.003, n=4), of=WICKER)  # fmt: skip
-                m.add(sphere((0.0, 0.55 * low, 0.0), 0.045, n=14), of=OPAL)
+                    m.tube(bent([polar(0.04, low - 0.004, 0.628 * k),
+                        polar(r - 0.01, 0.5 * low, 0.628 * k), polar(0.3 * r, 0.006, 0.628 * k)],
+                        0.3, n=5), 0.003, n=4, of=WICKER)
+                m.sphere((0.0, 0.55 * low, 0.0), 0.045, n=14, of=OPAL)
             case 5:  # a ring on three wires
-                m.add(hoop(oval(w - 0.03, d - 0.03, n=40), 0.015, 0.015, n=8), of=material)
-                m.add(hoop(oval(w - 0.07, d - 0.07, n=40), 0.012, 0.0115, n=6), of=OPAL)
+                m.hoop(oval(w - 0.03, d - 0.03, n=40), 0.015, 0.015, n=8, of=material)
+                m.hoop(oval(w - 0.07, d - 0.07, n=40), 0.012, 0.0115, of=OPAL)
                 for k in range(3):
-                    m.add(tube([((r - 0.015) * cos(2.0944 * k), 0.02,
-                        (r - 0.015) * sin(2.0944 * k)), (0.02 * cos(2.0944 * k), h - 0.025,
-                        0.02 * sin(2.0944 * k))], 0.0015, n=5), of=material)  # fmt: skip
+                    m.tube([polar(r - 0.015, 0.02, 2.0944 * k), polar(0.02, h - 0.025, 2.0944 * k)],
+                        0.0015, n=5, of=material)
             case 6:  # a cluster of small balls at several heights
                 n = m.integers(4, 7)  # three would fill five sixths of the width alone
                 for k in range(n):
                     a, y = 2 * pi * k / n, 0.0 if k == 0 else h * m.uniform(0.0, 0.35)
                     x, z, q = (r - 0.06) * cos(a), (d / 2 - 0.06) * sin(a), 0.06
-                    m.add(tube([(x, y + 2 * q - 0.004, z), (x, h - 0.1, z),
-                        (0.02 * cos(a), h - 0.026, 0.02 * sin(a))], 0.003, n=5), of=RUBBER)  # fmt: skip
-                    m.add(sphere((x, y + q, z), q, n=14), of=OPAL)
-                    m.add(frustum((0.018, 0.0), (0.014, 0.03), n=12), at=(x, y + 2 * q - 0.008, z),
-                        of=material)  # fmt: skip
+                    m.tube([(x, y + 2 * q - 0.004, z), (x, h - 0.1, z), polar(0.02, h - 0.026, a)],
+                        0.003, n=5, of=RUBBER)
+                    m.sphere((x, y + q, z), q, n=14, of=OPAL)
+                    m.frustum(
+                        (0.018, 0.0), (0.014, 0.03), n=12, at=(x, y + 2 * q - 0.008, z), of=material
+                    )
             case 7:  # arms that bend up, a bulb on each
                 n = m.integers(3, 7)
-                m.add(sphere((0.0, 0.4 * low, 0.0), 0.03, n=12), of=material)
-                m.add(tube([(0.0, 0.4 * low, 0.0), (0.0, low + 0.02, 0.0)], 0.008, n=8),
-                    of=material)  # fmt: skip
+                m.sphere((0.0, 0.4 * low, 0.0), 0.03, n=12, of=material)
+                m.rod(0.0, (0.4 * low, low + 0.02), 0.0, 0.008, of=material)
                 for k in range(n):
                     a = 2 * pi * k / n
-                    m.add(tube(bent([(0.0, 0.4 * low, 0.0),
-                        (0.5 * r * cos(a), 0.02, 0.5 * r * sin(a)),
-                        ((r - 0.03) * cos(a), 0.1 * low, (r - 0.03) * sin(a)), ((r - 0.03) * cos(a),
-                        0.45 * low, (r - 0.03) * sin(a))], 0.08, n=4), 0.006, n=7), of=material)  # fmt: skip
-                    m.add(frustum((0.022, 0.45 * low), (0.026, 0.5 * low), n=12),
-                        at=((r - 0.03) * cos(a), 0.0, (r - 0.03) * sin(a)), of=material)  # fmt: skip
-                    m.add(revolve([(0.0, 0.505 * low), (0.014, 0.505 * low), (0.02, 0.65 * low),
-                        (0.0, 0.85 * low)], n=12),
-                        at=((r - 0.03) * cos(a), 0.0, (r - 0.03) * sin(a)), of=OPAL)  # fmt: skip
-                m.add(revolve([(0.0, 0.0), (0.012, 0.006), (0.0, 0.3 * low)], n=10), of=material)
+                    m.tube(bent([(0.0, 0.4 * low, 0.0), polar(0.5 * r, 0.02, a),
+                        polar(r - 0.03, 0.1 * low, a), polar(r - 0.03, 0.45 * low, a)], 0.08, n=4),
+                        0.006, n=7, of=material)
+                    m.frustum((0.022, 0.45 * low), (0.026, 0.5 * low), n=12,
+                        at=polar(r - 0.03, 0.0, a), of=material)
+                    m.revolve([(0.0, 0.505 * low), (0.014, 0.505 * low), (0.02, 0.65 * low),
+                        (0.0, 0.85 * low)], n=12, at=polar(r - 0.03, 0.0, a), of=OPAL)
+                m.revolve([(0.0, 0.0), (0.012, 0.006), (0.0, 0.3 * low)], n=10, of=material)
             case 8:  # a bar with three shades
-                m.add(bevelled((-r, low - 0.02, -0.012), (r, low, 0.012), 0.002), of=material)
+                m.box(2 * r, (low - 0.02, low), 0.024, 0.002, of=material)
                 for x in (-0.5, 0.5):
-                    m.add(tube([(x * r, low - 0.002, 0.0), (0.0, h - 0.026, 0.0)], 0.002, n=5),
-                        of=material)  # fmt: skip
+                    m.tube(
+                        [(x * r, low - 0.002, 0.0), (0.0, h - 0.026, 0.0)], 0.002, n=5, of=material
+                    )
                 for x in (-0.72, 0.0, 0.72):
                     with m.moved(at=(x * r, 0.0, 0.0)):
-                        m.add(tube([(0.0, 0.5 * low, 0.0), (0.0, low - 0.018, 0.0)], 0.003, n=5),
-                            of=RUBBER)  # fmt: skip
-                        m.add(revolve([(0.075, 0.0), (0.06, 0.3 * low), (0.015, 0.55 * low),
+                        m.rod(0.0, (0.5 * low, low - 0.018), 0.0, 0.003, n=5, of=RUBBER)
+                        m.revolve([(0.075, 0.0), (0.06, 0.3 * low), (0.015, 0.55 * low),
                             (0.0, 0.55 * low), (0.0, 0.53 * low), (0.013, 0.53 * low),
-                            (0.057, 0.3 * low), (0.072, 0.0), (0.075, 0.0)], n=20), of=material)  # fmt: skip
-                        m.add(sphere((0.0, 0.2 * low, 0.0), 0.03, n=10), of=OPAL)
-                m.add(cylinder(d / 2, h - 0.012, h - 0.001, n=24), of=material)
+                            (0.057, 0.3 * low), (0.072, 0.0), (0.075, 0.0)], n=20, of=material)
+                        m.sphere((0.0, 0.2 * low, 0.0), 0.03, n=10, of=OPAL)
+                m.cylinder(d / 2, h - 0.012, h - 0.001, n=24, of=material)
             case 9:  # leaves of a flower: three plates over each other
                 for k in range(3):
                     q, y = r * (1.0 - 0.24 * k), 0.1 * low + 0.3 * low * k
-                    m.add(revolve([(q, y), (q * 0.6, y + 0.22 * low), (0.02, y + 0.3 * low),
+                    m.revolve([(q, y), (q * 0.6, y + 0.22 * low), (0.02, y + 0.3 * low),
                         (0.02, y + 0.29 * low), (q * 0.6 - 0.002, y + 0.21 * low),
-                        (q - 0.003, y - 0.002), (q, y)], n=30), of=material)  # fmt: skip
-                m.add(sphere((0.0, 0.22 * low, 0.0), 0.04, n=12), of=OPAL)
-                m.add(revolve([(0.0, 0.0), (0.05, 0.005), (0.05, 0.03), (0.0, 0.03)], n=18),
-                    of=material)  # fmt: skip
+                        (q - 0.003, y - 0.002), (q, y)], n=30, of=material)
+                m.sphere((0.0, 0.22 * low, 0.0), 0.04, n=12, of=OPAL)
+                m.revolve([(0.0, 0.0), (0.05, 0.005), (0.05, 0.03), (0.0, 0.03)], n=18, of=material)
 
 
 @family(group="wall_lamp", nyu40=LAMP, place=Place.WALL, called="wall_lamp", variants=24,
-    size=lambda m: (m.pick(0.12, 0.16, 0.2), m.pick(0.1, 0.14, 0.18), m.pick(0.16, 0.2, 0.26)))  # fmt: skip
+    size=lambda m: (m.pick(0.12, 0.16, 0.2), m.pick(0.1, 0.14, 0.18), m.pick(0.16, 0.2, 0.26)))
 def sconce(m: Maker, size: Size) -> None:
     """A lamp on a wall.
 
@@ -383,40 +377,40 @@ def sconce(m: Maker, size: Size) -> None:
     w, d, h = size
     hw = w / 2
     material, form = (m.pick(m.metal, BLACK_STEEL, BRASS, WHITE_STEEL, m.timber),
-        m.weighted(0.3, 0.2, 0.2, 0.15, 0.15))  # fmt: skip
+        m.weighted(0.3, 0.2, 0.2, 0.15, 0.15))
     fabric = plain("shade fabric", m.pick((0.9, 0.87, 0.8), (0.9, 0.88, 0.85), m.textile()), 0.9)
     match form:
         case 0:  # a shade on an arm
             r = min(w, d) / 2 - 0.002
-            m.add(bevelled((-0.035, 0.0, 0.0), (0.035, 0.1, 0.015), 0.002), of=material)
-            m.add(tube(bent([(0.0, 0.05, 0.01), (0.0, 0.03, d - r), (0.0, 0.4 * h, d - r)], 0.03,
-                n=3), 0.006, n=8), of=material)  # fmt: skip
-            m.add(revolve([(r, 0.35 * h), (r * 0.75, h), (r * 0.75 - 0.003, h),
-                (r - 0.003, 0.35 * h), (r, 0.35 * h)], n=24), at=(0.0, 0.0, d - r), of=fabric)  # fmt: skip
+            m.box(0.07, 0.1, (0.0, 0.015), 0.002, of=material)
+            m.tube(bent([(0.0, 0.05, 0.01), (0.0, 0.03, d - r), (0.0, 0.4 * h, d - r)], 0.03, n=3),
+                0.006, of=material)
+            m.revolve([(r, 0.35 * h), (r * 0.75, h), (r * 0.75 - 0.003, h), (r - 0.003, 0.35 * h),
+                (r, 0.35 * h)], n=24, at=(0.0, 0.0, d - r), of=fabric)
             for k in range(3):
-                m.add(tube([(0.0, 0.4 * h, d - r), (r * 0.96 * cos(2.1 * k), 0.4 * h,
-                    d - r + r * 0.96 * sin(2.1 * k))], 0.002, n=5), of=material)  # fmt: skip
-            m.add(sphere((0.0, 0.55 * h, d - r), 0.026, n=10), of=OPAL)
-            m.add(bevelled((-hw, 0.04, 0.0), (hw, 0.06, 0.008), 0.002), of=material)
+                m.tube([(0.0, 0.4 * h, d - r), polar(r * 0.96, 0.4 * h, 2.1 * k, z=d - r)], 0.002,
+                    n=5, of=material)
+            m.sphere((0.0, 0.55 * h, d - r), 0.026, n=10, of=OPAL)
+            m.box(w, (0.04, 0.06), (0.0, 0.008), 0.002, of=material)
         case 1:  # a ball on an arm
             r = min(0.4 * h, d / 2 - 0.01, hw)
             if w < h:
-                m.add(revolve([(0.0, 0.0), (hw, 0.0), (hw, 0.012), (0.0, 0.018)], n=24),
-                    turn=LYING_ALONG_Z, at=(0.0, h - hw, 0.0), of=material)  # fmt: skip
-            m.add(bevelled((-hw, 0.0, 0.0), (hw, h, 0.01), 0.003), of=material)
-            m.add(tube([(0.0, h / 2, 0.01), (0.0, h / 2, d - r)], 0.012, n=8), of=material)
-            m.add(sphere((0.0, h / 2, d - r), r, n=18), of=OPAL)
+                m.revolve([(0.0, 0.0), (hw, 0.0), (hw, 0.012), (0.0, 0.018)], n=24,
+                    turn=LYING_ALONG_Z, at=(0.0, h - hw, 0.0), of=material)
+            m.box(w, h, (0.0, 0.01), 0.003, of=material)
+            m.rod(0.0, h / 2, (0.01, d - r), 0.012, of=material)
+            m.sphere((0.0, h / 2, d - r), r, n=18, of=OPAL)
         case 2:  # a box that shines up and down
-            m.add(bevelled((-hw, 0.012, 0.0), (hw, h - 0.012, d), 0.003), of=material)
+            m.box(w, (0.012, h - 0.012), (0.0, d), 0.003, of=material)
             for y in (0.0, h - 0.0115):
-                m.add(slab((-hw + 0.02, y, 0.02), (hw - 0.02, y + 0.0115, d - 0.02)), of=OPAL)
+                m.box(w - 0.04, 0.0115, (0.02, d - 0.02), on=y, of=OPAL)
         case 3:  # a half bowl
-            m.add(loft([(d_shape(w * 0.3, d * 0.4, back=0.0), 0.0),
+            m.loft([(d_shape(w * 0.3, d * 0.4, back=0.0), 0.0),
                 (d_shape(w * 0.8, d * 0.8, back=0.0), 0.4 * h), (d_shape(w, d, back=0.0), h),
-                (d_shape(w - 0.01, d - 0.006, back=0.003), h),
-                (d_shape(w * 0.7, d * 0.7, back=0.006), 0.45 * h)]), of=material)  # fmt: skip
-            m.add(sphere((0.0, 0.7 * h, d * 0.42), 0.025, n=10), of=OPAL)
+                (d_shape(w - 0.01, d - 0.006, back=0.003), h), (d_shape(w * 0.7, d * 0.7,
+                back=0.006), 0.45 * h)], of=material)
+            m.sphere((0.0, 0.7 * h, d * 0.42), 0.025, n=10, of=OPAL)
         case 4:  # a lit panel
-            m.add(bevelled((-hw, 0.0, 0.0), (hw, h, 0.03), 0.004), of=material)
-            m.add(board(w * 0.9, d - 0.0305, 0.05 * h, 0.95 * h, 0.012, 0.004,
-                z=(d - 0.0305) / 2 + 0.0302), of=OPAL)  # fmt: skip
+            m.box(w, h, (0.0, 0.03), 0.004, of=material)
+            m.board(w * 0.9, d - 0.0305, 0.05 * h, 0.95 * h, 0.012, 0.004,
+                z=(d - 0.0305) / 2 + 0.0302, of=OPAL)

@@ -24,6 +24,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from itertools import product
 from types import ModuleType
 from typing import Any, Concatenate, Generic, ParamSpec, TypeVar, overload
 
@@ -45,13 +46,12 @@ from pbrs_farm.furnishings.things.assembly import (
     transformed,
 )
 from pbrs_farm.furnishings.things.materials import any_colour, metal, plain
+from pbrs_farm.furnishings.things.shapes import Shapes, Triple
 from pbrs_farm.home.masses import mass_kg
 
 P = ParamSpec("P")
 T = TypeVar("T")
 S = TypeVar("S")  # what a set draws once for all its families
-Triple = tuple[float, float, float]
-Pair = tuple[float, float]
 Size = Triple
 """Width, depth and height of a variation, metres."""
 
@@ -59,7 +59,7 @@ _PAINTS = ("whites", "greys", "paints", "darks", "boards")
 _PAINT_SHARES = (0.42, 0.18, 0.2, 0.1, 0.1)
 
 
-class Maker:
+class Maker(Shapes):
     """What a thing is made with: random draws, the materials of a home's style, and its parts so far.
 
     rng: every draw of the thing comes from it. style: the home's or the room's taste.
@@ -155,18 +155,33 @@ class Maker:
         return known[int(self.rng.integers(len(known)))]
 
     def add(
-        self, solid: Surface, *, of: Material | None = None, at: Triple | None = None,
-        turn: F64 | None = None, name: str = "",
-    ) -> None:  # fmt: skip
-        """Put a solid there.
+        self,
+        solid: Surface,
+        *,
+        of: Material | None = None,
+        at: Triple | None = None,
+        turn: F64 | None = None,
+        name: str = "",
+        mirrored: str = "",
+    ) -> None:
+        """Add a solid to the thing.
 
-        of: its material; else that of the nearest `with m.of(...)` around it. turn: a rotation
-        (3, 3) about the origin. at: where its origin comes to after that, metres. name: of its
-        surface, where something must find it again.
+        of: its material; by default that of the nearest enclosing `with m.of(...)`. turn: a
+        rotation (3, 3) about the origin. at: the position of its origin after that, metres. name:
+        of its surface, for later searches. mirrored: "x", "z" or "xz" adds copies at the mirrored
+        positions.
         """
-        if at is not None or turn is not None:
-            solid = transformed(solid, np.eye(3) if turn is None else turn, at or (0, 0, 0))
-        self._parts.append((replace(solid, name=name) if name else solid, of))
+        if name:
+            solid = replace(solid, name=name)
+        if at is None and turn is None:
+            self._parts.append((solid, of))
+            return
+        x, y, z = at or (0, 0, 0)
+        for a, b in product(
+            (x, -x) if "x" in mirrored else (x,), (z, -z) if "z" in mirrored else (z,)
+        ):
+            moved = transformed(solid, np.eye(3) if turn is None else turn, (a, y, b))
+            self._parts.append((moved, of))
 
     @contextmanager
     def of(self, material: Material) -> Iterator[None]:
@@ -318,18 +333,35 @@ def thing(
 
 @overload
 def family(
-    *, group: str, variants: int, size: Callable[[Maker], Size], nyu40: int = ...,
-    place: Place = ..., called: str = ...,
-) -> Callable[[Callable[[Maker, Size], None]], Family]: ...  # fmt: skip
+    *,
+    group: str,
+    variants: int,
+    size: Callable[[Maker], Size],
+    nyu40: int = ...,
+    place: Place = ...,
+    called: str = ...,
+) -> Callable[[Callable[[Maker, Size], None]], Family]: ...
 @overload
 def family(
-    *, group: str, variants: int, size: Callable[[Maker, S], Size], of_set: Callable[[Maker], S],
-    nyu40: int = ..., place: Place = ..., called: str = ...,
-) -> Callable[[Callable[[Maker, Size, S], None]], Family]: ...  # fmt: skip
+    *,
+    group: str,
+    variants: int,
+    size: Callable[[Maker, S], Size],
+    of_set: Callable[[Maker], S],
+    nyu40: int = ...,
+    place: Place = ...,
+    called: str = ...,
+) -> Callable[[Callable[[Maker, Size, S], None]], Family]: ...
 def family(
-    *, group: str, variants: int, size: Callable[..., Size], nyu40: int = OTHERPROP,
-    place: Place = Place.SURFACE, called: str = "", of_set: Callable[[Maker], Any] | None = None,
-) -> Callable[[Callable[..., None]], Family]:  # fmt: skip
+    *,
+    group: str,
+    variants: int,
+    size: Callable[..., Size],
+    nyu40: int = OTHERPROP,
+    place: Place = Place.SURFACE,
+    called: str = "",
+    of_set: Callable[[Maker], Any] | None = None,
+) -> Callable[[Callable[..., None]], Family]:
     """The decorator of a function that describes a family of the generated catalogue.
 
     variants: how many there are. size: draws width, depth and height of one. called: what its
@@ -340,9 +372,7 @@ def family(
 
     def described(build: Callable[..., None]) -> Family:
         name = build.__name__
-        return Family(
-            name, called or name, group, nyu40, place, variants, size, build, of_set
-        )  # fmt: skip
+        return Family(name, called or name, group, nyu40, place, variants, size, build, of_set)
 
     return described
 

@@ -18,9 +18,12 @@ def plain(name: str, colour: Rgb, roughness: float) -> Material:
 def glossy(name: str, colour: Rgb, roughness: float = 0.35) -> Material:
     """A lacquer, enamel or glaze of one colour, which the part `parts` leaves as it is."""
     return Material(
-        f"coated {name}", diffuse=_printable(colour), specular=(0.4, 0.4, 0.4),
-        shininess=round(2.0 / max(roughness, 0.1) ** 4 - 2.0, 1), roughness=roughness,
-    )  # fmt: skip
+        f"coated {name}",
+        diffuse=_printable(colour),
+        specular=(0.4, 0.4, 0.4),
+        shininess=round(2.0 / max(roughness, 0.1) ** 4 - 2.0, 1),
+        roughness=roughness,
+    )
 
 
 def glass(tint: Rgb = (0.83, 0.91, 0.88), opacity: float = 0.12) -> Material:

@@ -34,10 +34,12 @@ def rect(
     found = []
     for k, (sx, sz) in enumerate(((1, -1), (-1, -1), (-1, 1), (1, 1))):
         for t in np.pi / 2 * (k + np.arange(n + 1) / n):
-            found.append((
-                float(x + sx * (w / 2 - r) + r * np.cos(t)),
-                float(z + sz * (d / 2 - r) - r * np.sin(t)),
-            ))  # fmt: skip
+            found.append(
+                (
+                    float(x + sx * (w / 2 - r) + r * np.cos(t)),
+                    float(z + sz * (d / 2 - r) - r * np.sin(t)),
+                )
+            )
     return found
 
 
@@ -53,9 +55,11 @@ def gathered(w: float, d: float, fold: float, deep: float) -> list[tuple[float, 
     """A rectangle w by d whose sides go in and out by `deep`, a fold about so long: cloth that is gathered."""
     found = []
     for (x, z), (dx, dz), side in (
-        ((-w / 2, d / 2), (1.0, 0.0), w), ((w / 2, d / 2), (0.0, -1.0), d),
-        ((w / 2, -d / 2), (-1.0, 0.0), w), ((-w / 2, -d / 2), (0.0, 1.0), d),
-    ):  # fmt: skip
+        ((-w / 2, d / 2), (1.0, 0.0), w),
+        ((w / 2, d / 2), (0.0, -1.0), d),
+        ((w / 2, -d / 2), (-1.0, 0.0), w),
+        ((-w / 2, -d / 2), (0.0, 1.0), d),
+    ):
         n = 2 * max(2, round(side / fold))
         for k in range(n):
             # In and out by turns; outwards is to the right of the way round.
@@ -118,6 +122,14 @@ def ring_path(r: float, *, y: float = 0.0, n: int = 24, share: float = 1.0) -> l
     """Points on a level circle about the origin, or on a share of it; the first comes again at the end."""
     t = 2 * np.pi * share * np.arange(n + 1) / n
     return [(float(r * np.cos(a)), float(y), float(-r * np.sin(a))) for a in t]
+
+
+def polar(
+    r: float | tuple[float, float], y: float, angle: float, *, x: float = 0.0, z: float = 0.0
+) -> Triple:
+    """The point at height y and an angle (radians) of a circle about (x, z); r: or (r along x, along z)."""
+    rx, rz = r if isinstance(r, tuple) else (r, r)
+    return (float(x + rx * np.cos(angle)), y, float(z + rz * np.sin(angle)))
 
 
 def spaced(low: float, high: float, n: int) -> list[float]:

@@ -11,6 +11,8 @@ from pbrs_farm.furnishings.things.bodies import slab
 from pbrs_farm.furnishings.things.maker import Maker, thing
 from pbrs_farm.furnishings.things.materials import plain
 
+# fmt: off
+
 _INK = plain("print", (0.3, 0.3, 0.32), 0.8)
 
 
@@ -21,20 +23,21 @@ def white_paper(m: Maker) -> Material:
 
 def printed(m: Maker, w: float, h: float, z: float, ground: Material) -> None:
     """A sheet w by h about the origin, 0.4 mm thick from z on: a heading, a picture, lines."""
-    m.add(slab((-w / 2, -h / 2, z), (w / 2, h / 2, z + 0.0004)), of=ground)
+    m.box(w, h, 0.0004, on=-h / 2, against=z, of=ground)
     top, edge = h / 2 - 0.08 * h, 0.1 * w
     if m.chance(0.5):
-        m.add(slab((-w / 2 + edge, top - 0.08 * h, z + 0.0004), (m.uniform(0.0, 0.4) * w, top, z + 0.0006)),
-            of=m.pick(_INK, plain("print", m.any_colour(), 0.7)))  # fmt: skip
+        m.add(slab((-w / 2 + edge, top - 0.08 * h, z + 0.0004),
+            (m.uniform(0.0, 0.4) * w, top, z + 0.0006)), of=m.pick(_INK,
+            plain("print", m.any_colour(), 0.7)))
         top -= 0.14 * h
     if m.chance(0.5):
         high = m.uniform(0.25, 0.45) * h
-        m.add(slab((-w / 2 + edge, top - high, z + 0.0004), (w / 2 - edge, top, z + 0.0006)),
-            of=plain("print", m.any_colour(), 0.7))  # fmt: skip
+        m.box(w - 2 * edge, (top - high, top), 0.0002, against=z + 0.0004,
+            of=plain("print", m.any_colour(), 0.7))
         top -= high + 0.06 * h
     while top > -h / 2 + 0.12 * h:
-        m.add(slab((-w / 2 + edge, top - 0.022 * h, z + 0.0004), (m.uniform(0.1, 0.4) * w, top, z + 0.0006)),
-            of=_INK)  # fmt: skip
+        m.add(slab((-w / 2 + edge, top - 0.022 * h, z + 0.0004),
+            (m.uniform(0.1, 0.4) * w, top, z + 0.0006)), of=_INK)
         top -= 0.075 * h
 
 
@@ -49,11 +52,13 @@ def standing_card(m: Maker) -> None:
             if m.chance(0.7):
                 half = m.uniform(0.35, 0.75)
                 for s in (-1.0, 1.0):
-                    with m.moved(turn=rotation_y(s * half), at=(0.0, 0.0, 0.0)), m.moved(at=(s * (w / 2 + 0.0004), h / 2, 0.0)):  # fmt: skip
+                    with (m.moved(turn=rotation_y(s * half), at=(0.0, 0.0, 0.0)),
+                        m.moved(at=(s * (w / 2 + 0.0004), h / 2, 0.0))):
                         printed(m, w, h, 0.0, ground)
             else:
                 for turned in (0.0, pi):
-                    with m.moved(turn=rotation_y(turned)), m.moved(turn=rotation_x(-0.28), at=(0.0, 0.0, 0.275 * h)), m.moved(at=(0.0, h / 2, 0.0)):  # fmt: skip
+                    with (m.moved(turn=rotation_y(turned)), m.moved(turn=rotation_x(-0.28),
+                        at=(0.0, 0.0, 0.275 * h)), m.moved(at=(0.0, h / 2, 0.0))):
                         printed(m, w, h, 0.0002, ground)
 
 
@@ -63,5 +68,6 @@ def floor_papers(m: Maker) -> None:
     for k in range(m.integers(2, 5)):
         w, h = m.pick((0.21, 0.297), (0.21, 0.297), (0.148, 0.21), (0.1, 0.21))
         ground = white_paper(m) if m.chance(0.6) else plain("leaflet", m.any_colour(), 0.5)
-        with m.moved(at=(m.normal(0, 0.07), 0.0007 * k, m.normal(0, 0.07)), turn=rotation_y(m.uniform(0, 6.28))), m.moved(turn=rotation_x(-pi / 2)):  # fmt: skip
+        with (m.moved(at=(m.normal(0, 0.07), 0.0007 * k, m.normal(0, 0.07)),
+            turn=rotation_y(m.uniform(0, 6.28))), m.moved(turn=rotation_x(-pi / 2))):
             printed(m, w, h, 0.0, ground)

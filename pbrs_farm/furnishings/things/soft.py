@@ -7,11 +7,11 @@ from itertools import product
 from pbrs_farm.core.classes import CLOTHES, PILLOW, TOWEL
 from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.dress.style import Rgb, mix, shade
-from pbrs_farm.furnishings.things.bodies import hoop, revolve, rounded, slab, sphere, tube
-from pbrs_farm.furnishings.things.cloth import bulged
 from pbrs_farm.furnishings.things.maker import Maker, thing
 from pbrs_farm.furnishings.things.materials import plain
 from pbrs_farm.furnishings.things.outlines import rect, scaled
+
+# fmt: off
 
 
 @thing(group="pillow", nyu40=PILLOW)
@@ -22,45 +22,43 @@ def cushion(m: Maker) -> None:
     """
     form, edge, colour = m.integers(0, 8), m.pick(0.38, 0.42, 0.46), m.textile()
     colour, thick = m.style.accent if m.chance(0.3) else colour, m.uniform(0.11, 0.15)
-    material, trim = (plain("cushion", colour, 0.95), plain("piping", m.pick(m.style.accent,
-        shade(colour, 0.7), (0.9, 0.88, 0.84)), 0.95))  # fmt: skip
+    material, trim = (plain("cushion", colour, 0.95), plain("piping",
+        m.pick(m.style.accent, shade(colour, 0.7), (0.9, 0.88, 0.84)), 0.95))
     with m.of(material):
         match form:
             case 0 | 1:  # square
-                m.add(bulged((edge, thick, edge), n=12 if form == 0 else 11))
+                m.bulged((edge, thick, edge), n=12 if form == 0 else 11)
             case 2:  # long
-                m.add(bulged((edge * 1.25, thick, edge * 0.8), n=12))
+                m.bulged((edge * 1.25, thick, edge * 0.8))
             case 3:  # with piping
-                m.add(bulged((edge, thick, edge), n=9))
-                m.add(hoop(rect(edge * 0.94, edge * 0.94, 0.03, n=2), 0.0, 0.006, n=5), of=trim)
+                m.bulged((edge, thick, edge), n=9)
+                m.hoop(rect(edge * 0.94, edge * 0.94, 0.03, n=2), 0.0, 0.006, n=5, of=trim)
             case 4:  # round, with a button
                 # Both sides are drawn in towards the middle, where the button holds them.
                 upper = [(0.2, 0), (0.196, 0.02), (0.184, 0.04), (0.162, 0.057), (0.132, 0.066),
-                    (0.1, 0.068), (0.066, 0.062), (0.036, 0.05), (0.014, 0.038), (0, 0.034)]  # fmt: skip
+                    (0.1, 0.068), (0.066, 0.062), (0.036, 0.05), (0.014, 0.038), (0, 0.034)]
                 lower = [(r, -y) for r, y in reversed(upper)]
-                m.add(revolve([*lower, *upper[1:]], n=28))
-                m.add(revolve([(0, 0.032), (0.016, 0.036), (0.013, 0.044), (0, 0.047)], n=12),
-                    of=trim)  # fmt: skip
+                m.revolve([*lower, *upper[1:]], n=28)
+                m.revolve([(0, 0.032), (0.016, 0.036), (0.013, 0.044), (0, 0.047)], n=12, of=trim)
             case 5:  # a roll
-                m.add(tube([(-edge / 2, 0, 0), (-edge / 2 + 0.01, 0, 0), (edge / 2 - 0.01, 0, 0),
-                    (edge / 2, 0, 0)], 0.08, n=18))  # fmt: skip
+                m.tube([(-edge / 2, 0, 0), (-edge / 2 + 0.01, 0, 0), (edge / 2 - 0.01, 0, 0),
+                    (edge / 2, 0, 0)], 0.08, n=18)
             case 6:  # with tassels
-                m.add(bulged((edge, thick, edge), n=8))
+                m.bulged((edge, thick, edge), n=8)
                 for x, z in product((-1.0, 1.0), (-1.0, 1.0)):
-                    m.add(sphere((x * edge * 0.48, 0, z * edge * 0.48), 0.014, n=8), of=trim)
+                    m.sphere((x * edge * 0.48, 0, z * edge * 0.48), 0.014, n=8, of=trim)
             case 7:  # with three bands
-                m.add(bulged((edge, thick * 0.9, edge), n=10, edge=0.3, bulge=3.2))
+                m.bulged((edge, thick * 0.9, edge), n=10, edge=0.3, bulge=3.2)
                 for x in (-0.22, 0.0, 0.22):
-                    m.add(slab((x * edge - 0.008, 0.445 * thick - 0.004, -0.28 * edge),
-                        (x * edge + 0.008, 0.445 * thick + 0.004, 0.28 * edge)), of=trim)  # fmt: skip
+                    m.box(0.016, 0.008, 0.56 * edge, x=x * edge, on=0.445 * thick - 0.004, of=trim)
 
 
 @thing(group="ottoman")
 def pouf(m: Maker) -> None:
     """A round seat of cloth, as high as a knee at most."""
     r, tall = m.uniform(0.2, 0.29), m.uniform(0.28, 0.4)
-    m.add(revolve(scaled(r, tall, [(0, 0), (0.86, 0), (0.97, 0.15), (1, 0.5), (0.96, 0.85),
-        (0.84, 0.97), (0.5, 1), (0, 1)]), n=28), of=plain("pouf", m.textile(), 0.95))  # fmt: skip
+    m.revolve(scaled(r, tall, [(0, 0), (0.86, 0), (0.97, 0.15), (1, 0.5), (0.96, 0.85),
+        (0.84, 0.97), (0.5, 1), (0, 1)]), n=28, of=plain("pouf", m.textile(), 0.95))
 
 
 @thing(group="pillow", nyu40=PILLOW, called="pillow")
@@ -69,7 +67,7 @@ def bed_pillow(m: Maker) -> None:
     # A long pillow or a square one, white or of a calm colour, washed pale.
     wide, deep = (0.68, 0.46) if m.chance(0.6) else (0.58, 0.58)
     linen = mix((0.91, 0.9, 0.88), m.textile(3), 0.35) if m.chance(0.4) else (0.91, 0.9, 0.88)
-    m.add(bulged((wide, m.uniform(0.12, 0.16), deep), bulge=2.6), of=plain("pillow", linen, 0.95))
+    m.bulged((wide, m.uniform(0.12, 0.16), deep), bulge=2.6, of=plain("pillow", linen, 0.95))
 
 
 def folded(m: Maker, w: float, h: float, d: float, n: int, colour: Rgb, name: str) -> None:
@@ -77,9 +75,9 @@ def folded(m: Maker, w: float, h: float, d: float, n: int, colour: Rgb, name: st
     # A gap of half a per cent is between layers; each lies a little askew, and its folds are round.
     for k in range(n):
         x, z = w / 2 - abs(m.normal(0, 0.004)), d / 2 - abs(m.normal(0, 0.004))
-        m.add(rounded((-x, 0, -z), (x, h, z), 0.48 * h, n=1), turn=rotation_y(m.normal(0, 0.015)),
+        m.rounded(2 * x, h, 2 * z, 0.48 * h, n=1, turn=rotation_y(m.normal(0, 0.015)),
             at=(m.normal(0, 0.003), k * h * 1.005, m.normal(0, 0.003)),
-            of=plain(name, shade(colour, 1.0 - 0.03 * (k % 2)), 0.95))  # fmt: skip
+            of=plain(name, shade(colour, 1.0 - 0.03 * (k % 2)), 0.95))
 
 
 @thing(group="towel", nyu40=TOWEL)
@@ -108,7 +106,7 @@ def folded_clothes(m: Maker) -> None:
     for _k in range(m.integers(2, 6)):
         # Any tint, drawn towards the style so that no pile stands out.
         colour, h = (mix(m.colour_within(0.15, 0.85), m.style.textiles[0], 0.4),
-            m.uniform(0.02, 0.035))  # fmt: skip
+            m.uniform(0.02, 0.035))
         with m.moved(at=(0, y, 0)):
             folded(m, 0.28, h, 0.22, 1, colour, "clothes")
         y += h * 1.01

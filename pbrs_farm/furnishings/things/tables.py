@@ -4,22 +4,11 @@ from __future__ import annotations
 
 from itertools import product
 
-from numpy import cos, pi, sin
+from numpy import pi
 
 from pbrs_farm.core.catalogue import Place
 from pbrs_farm.core.classes import DESK, NIGHT_STAND, OTHERFURNITURE, TABLE, TELEVISION
 from pbrs_farm.core.house import Material
-from pbrs_farm.furnishings.things.bodies import (
-    bevelled,
-    board,
-    disc,
-    hoop,
-    loft,
-    revolve,
-    slab,
-    square_tube,
-    tube,
-)
 from pbrs_farm.furnishings.things.joints import Inside, Look, four_legs, fronts_of, hollow, leg
 from pbrs_farm.furnishings.things.maker import Maker, Size, family
 from pbrs_farm.furnishings.things.materials import (
@@ -33,11 +22,14 @@ from pbrs_farm.furnishings.things.materials import (
     glass,
     glossy,
 )
-from pbrs_farm.furnishings.things.outlines import bent, oval, rect, rings
+from pbrs_farm.furnishings.things.outlines import bent, oval, polar, rect, rings
+
+# fmt: off
 
 
-def under_top(m: Maker, kind: str, w: float, d: float, high: float, material: Material,
-    leg_kind: str) -> None:  # fmt: skip
+def under_top(
+    m: Maker, kind: str, w: float, d: float, high: float, material: Material, leg_kind: str
+) -> None:
     """What carries a top w by d at `high`.
 
     Four legs with or without rails, frames, trestles, one foot, crossed legs, panels.
@@ -45,114 +37,105 @@ def under_top(m: Maker, kind: str, w: float, d: float, high: float, material: Ma
     hw, hd = w / 2, d / 2
     match kind:
         case "legs" | "rails":
-            four_legs(m, leg_kind, w, d, high, 0.055,
-                0.07 if leg_kind in ("tapered", "hairpin") else 0.035,
-                0.03 if leg_kind == "tapered" else 0.0, material)  # fmt: skip
+            four_legs(m, leg_kind, w, d, high, 0.055, 0.07 if leg_kind in ("tapered",
+                "hairpin") else 0.035, 0.03 if leg_kind == "tapered" else 0.0, material)
             if kind == "rails":
                 with m.of(material):
-                    for z in (-hd + 0.045, hd - 0.065):
-                        m.add(bevelled((-hw + 0.04, high - 0.085, z), (hw - 0.04, high, z + 0.02),
-                            0.002))  # fmt: skip
-                    for x in (-hw + 0.045, hw - 0.065):
-                        m.add(bevelled((x, high - 0.085, -hd + 0.065), (x + 0.02, high, hd - 0.065),
-                            0.002))  # fmt: skip
+                    m.box(w - 0.08, (high - 0.085, high), 0.02, 0.002, against=0.045 - d / 2,
+                        mirrored="z")
+                    m.box(0.02, (high - 0.085, high), d - 0.13, 0.002, left=0.045 - w / 2,
+                        mirrored="x")
         case "frames":
             with m.of(material):
                 for s in (-1.0, 1.0):
                     x = s * (hw - 0.16)
-                    for z in (-hd + 0.05, hd - 0.05):
-                        m.add(bevelled((x - 0.03, 0.0, z - 0.02), (x + 0.03, high, z + 0.02),
-                            0.002))  # fmt: skip
-                    m.add(bevelled((x - 0.03, 0.0, -hd + 0.07), (x + 0.03, 0.03, hd - 0.07), 0.002))
-                    m.add(bevelled((x - 0.03, high - 0.03, -hd + 0.07), (x + 0.03, high, hd - 0.07),
-                        0.002))  # fmt: skip
+                    m.box(0.06, high, 0.04, 0.002, x=x, against=0.03 - d / 2, mirrored="z")
+                    m.box(0.06, 0.03, d - 0.14, 0.002, x=x)
+                    m.box(0.06, (high - 0.03, high), d - 0.14, 0.002, x=x)
         case "crossed":
             with m.of(material):
                 for s in (-1.0, 1.0):
                     x = s * (hw - 0.2)
-                    m.add(square_tube((x, 0.012, -hd + 0.06), (x, high - 0.012, hd - 0.06), 0.07,
-                        0.035))  # fmt: skip
-                    m.add(square_tube((x + s * 0.036, 0.012, hd - 0.06),
-                        (x + s * 0.036, high - 0.012, -hd + 0.06), 0.07, 0.035))  # fmt: skip
-                m.add(bevelled((-hw + 0.2, high / 2 - 0.03, -0.02),
-                    (hw - 0.2, high / 2 + 0.03, 0.02), 0.003))  # fmt: skip
+                    m.square_tube((x, 0.012, -hd + 0.06), (x, high - 0.012, hd - 0.06), 0.07, 0.035)
+                    m.square_tube((x + s * 0.036, 0.012, hd - 0.06),
+                        (x + s * 0.036, high - 0.012, -hd + 0.06), 0.07, 0.035)
+                m.box(w - 0.4, 0.06, 0.04, 0.003, on=high / 2 - 0.03)
         case "trestles":
             with m.of(material):
                 for s in (-1.0, 1.0):
                     x = s * (hw - 0.22)
                     for e, z in product((-1.0, 1.0), (-hd + 0.06, hd - 0.06)):
-                        m.add(square_tube((x + e * 0.14, 0.008, z), (x + e * 0.03, high - 0.02, z),
-                            0.03, 0.04))  # fmt: skip
-                    m.add(bevelled((x - 0.05, high - 0.05, -hd + 0.03), (x + 0.05, high, hd - 0.03),
-                        0.003))  # fmt: skip
-                    for z in (-hd + 0.06, hd - 0.06):
-                        m.add(bevelled((x - 0.11, 0.2, z - 0.01), (x + 0.11, 0.235, z + 0.01),
-                            0.002))  # fmt: skip
+                        m.square_tube(
+                            (x + e * 0.14, 0.008, z), (x + e * 0.03, high - 0.02, z), 0.03, 0.04
+                        )
+                    m.box(0.1, (high - 0.05, high), d - 0.06, 0.003, x=x)
+                    m.box(0.22, (0.2, 0.235), 0.02, 0.002, x=x, against=0.05 - d / 2, mirrored="z")
         case "foot":
             with m.of(material):
                 r = 0.34 * min(w, d)
                 if m.chance(0.5):
-                    m.add(revolve([(0.0, 0.0), (r, 0.0), (r, 0.012), (r * 0.3, 0.04), (0.045, 0.09),
+                    m.revolve([(0.0, 0.0), (r, 0.0), (r, 0.012), (r * 0.3, 0.04), (0.045, 0.09),
                         (0.04, high - 0.06), (r * 0.4, high - 0.005), (r * 0.4, high), (0.0, high)],
-                        n=28))  # fmt: skip
+                        n=28)
                 else:
-                    m.add(revolve([(0.0, 0.12), (0.05, 0.12), (0.035, 0.25), (0.06, 0.4),
-                        (0.045, high - 0.03), (0.1, high), (0.0, high)], n=18))  # fmt: skip
+                    m.revolve([(0.0, 0.12), (0.05, 0.12), (0.035, 0.25), (0.06, 0.4),
+                        (0.045, high - 0.03), (0.1, high), (0.0, high)], n=18)
                     for k in range(4):
-                        m.add(tube(bent([(0.0, 0.2, 0.0), (0.5 * r * cos(k * pi / 2 + pi / 4), 0.16,
-                            0.5 * r * sin(k * pi / 2 + pi / 4)),
-                            (1.2 * r * cos(k * pi / 2 + pi / 4), 0.02,
-                            1.2 * r * sin(k * pi / 2 + pi / 4))], 0.1, n=3), 0.028, n=8, end=0.018))  # fmt: skip
+                        m.tube(bent([(0.0, 0.2, 0.0), polar(0.5 * r, 0.16, k * pi / 2 + pi / 4),
+                            polar(1.2 * r, 0.02, k * pi / 2 + pi / 4)], 0.1, n=3), 0.028, end=0.018)
         case "panels":
             with m.of(material):
-                for x in (-hw + 0.02, hw - 0.05):
-                    m.add(bevelled((x, 0.0, -hd + 0.02), (x + 0.03, high, hd - 0.02), 0.002))
-                m.add(bevelled((-hw + 0.05, high - 0.3, -0.012), (hw - 0.05, high, 0.012), 0.002))
+                m.box(0.03, high, d - 0.04, 0.002, left=0.02 - w / 2, mirrored="x")
+                m.box(w - 0.1, (high - 0.3, high), 0.024, 0.002)
 
 
-def top_of(m: Maker, kind: str, w: float, d: float, low: float, high: float,
-    material: Material) -> None:  # fmt: skip
+def top_of(
+    m: Maker, kind: str, w: float, d: float, low: float, high: float, material: Material
+) -> None:
     """A top w by d between low and high: rectangle, round corners, oval, or boards side by side."""
     with m.of(material):
         match kind:
             case "rect":
-                m.add(board(w, d, low, high, 0.004, 0.003, n=1))
+                m.board(w, d, low, high, 0.004, 0.003, n=1)
             case "round_rect":
-                m.add(board(w, d, low, high, 0.08, 0.006))
+                m.board(w, d, low, high, 0.08, 0.006)
             case "oval":
-                m.add(disc(w, d, low, high, 0.006, n=40, power=2.4))
+                m.disc(w, d, low, high, 0.006, n=40, power=2.4)
             case "round":
-                m.add(disc(w, d, low, high, 0.006, n=40))
+                m.disc(w, d, low, high, 0.006, n=40)
             case "boards":
                 for k in range(5):
-                    m.add(bevelled((-w / 2, low, -d / 2 + k * d / 5 + 0.0005),
-                        (w / 2, high, -d / 2 + (k + 1) * d / 5 - 0.0005), 0.003))  # fmt: skip
+                    m.box(w, (low, high), (-d / 2 + k * d / 5 + 0.0005,
+                        -d / 2 + (k + 1) * d / 5 - 0.0005), 0.003)
 
 
 @family(group="dining_table", nyu40=TABLE, place=Place.FLOOR, variants=36,
-    size=lambda m: (*m.pick((0.7, 0.7), (0.8, 0.8), (1.0, 1.0), (1.1, 1.1), (1.2, 0.75), (1.2, 0.8), (1.4, 0.8), (1.4, 0.85), (1.6, 0.9), (1.8, 0.9), (2.0, 0.95), (2.2, 1.0)), m.uniform(0.73, 0.77)))  # fmt: skip
+    size=lambda m: (*m.pick((0.7, 0.7), (0.8, 0.8), (1.0, 1.0), (1.1, 1.1), (1.2, 0.75), (1.2, 0.8),
+    (1.4, 0.8), (1.4, 0.85), (1.6, 0.9), (1.8, 0.9), (2.0, 0.95), (2.2, 1.0)),
+    m.uniform(0.73, 0.77)))
 def dining_table(m: Maker, size: Size) -> None:
     """A table for two to eight: square, long, round or oval on legs, frames, trestles or one foot."""
     w, d, h = size
     is_square = w == d
-    top = m.pick("round", "round", "rect", "round_rect") if is_square else m.pick("rect", "rect",
-        "boards", "round_rect", "oval")  # fmt: skip
+    top = (m.pick("round", "round", "rect", "round_rect") if is_square else m.pick("rect", "rect",
+        "boards", "round_rect", "oval"))
     t = m.pick(0.02, 0.025, 0.03, 0.04)
-    kind = m.pick("foot", "legs", "legs") if top in ("round", "oval") else m.pick("legs", "rails",
-        "rails", "frames", "crossed", "trestles") if w > 1.1 else m.pick("rails", "legs", "foot")  # fmt: skip
+    kind = (m.pick("foot", "legs", "legs") if top in ("round", "oval") else m.pick("legs", "rails",
+        "rails", "frames", "crossed", "trestles") if w > 1.1 else m.pick("rails", "legs", "foot"))
     body = m.pick(m.timber, m.timber, m.dark_timber, WHITE, glossy("paint", m.paint(), 0.4))
     frame = body if kind == "rails" else m.pick(body, body, BLACK_STEEL, m.metal, WHITE)
-    leg_kind = m.pick("square", "tapered", "turned", "round",
-        "hairpin") if kind == "legs" else m.pick("square", "square", "turned", "tapered")  # fmt: skip
+    leg_kind = (m.pick("square", "tapered", "turned", "round",
+        "hairpin") if kind == "legs" else m.pick("square", "square", "turned", "tapered"))
     inset = 0.72 if top in ("round", "oval") else 1.0
-    top_of(m, top, w, d, h - t, h,
-        m.pick(body, body, body, m.timber) if kind != "foot" else m.pick(body,
-        glossy("stone", (0.88, 0.87, 0.84), 0.25), body))  # fmt: skip
+    top_of(m, top, w, d, h - t, h, m.pick(body, body, body,
+        m.timber) if kind != "foot" else m.pick(body, glossy("stone", (0.88, 0.87, 0.84), 0.25),
+        body))
     under_top(m, kind, w * inset, d * inset, h - t + 0.001, frame, leg_kind)
 
 
 @family(group="coffee_table", nyu40=TABLE, place=Place.FLOOR, variants=36,
-    size=lambda m: (*m.pick((0.8, 0.8), (0.85, 0.5), (0.9, 0.55), (1.0, 0.6), (1.1, 0.6), (1.2, 0.65), (0.9, 0.8)), m.uniform(0.38, 0.46)))  # fmt: skip
+    size=lambda m: (*m.pick((0.8, 0.8), (0.85, 0.5), (0.9, 0.55), (1.0, 0.6), (1.1, 0.6),
+    (1.2, 0.65), (0.9, 0.8)), m.uniform(0.38, 0.46)))
 def coffee_table(m: Maker, size: Size) -> None:
     """A low table before a sofa.
 
@@ -162,71 +145,68 @@ def coffee_table(m: Maker, size: Size) -> None:
     hw, hd = w / 2, d / 2
     form = m.weighted(0.4, 0.2, 0.14, 0.12, 0.14)
     body = m.pick(m.timber, m.timber, m.dark_timber, WHITE, glossy("paint", m.paint(), 0.4))
-    top = m.pick("rect", "round_rect",
-        "boards") if abs(w - d) > 0.05 and m.chance(0.7) else m.pick("oval", "oval", "round_rect")  # fmt: skip
+    top = (m.pick("rect", "round_rect",
+        "boards") if abs(w - d) > 0.05 and m.chance(0.7) else m.pick("oval", "oval", "round_rect"))
     t = m.pick(0.018, 0.025, 0.035)
     match form:
         case 0:  # a top on legs
             glassy = m.chance(0.2)
-            top_of(m, top, w, d, h - t, h,
-                glass((0.85, 0.93, 0.92), 0.3) if glassy else m.pick(body, body, body,
-                glossy("stone", (0.86, 0.85, 0.82), 0.25)))  # fmt: skip
+            top_of(m, top, w, d, h - t, h, glass((0.85, 0.93, 0.92),
+                0.3) if glassy else m.pick(body, body, body, glossy("stone", (0.86, 0.85, 0.82),
+                0.25)))
             kind = m.pick("legs", "legs", "frames") if top not in ("oval", "round") else "legs"
             under_top(m, kind, w * (0.72 if top == "oval" else 1.0),
                 d * (0.72 if top == "oval" else 1.0), h - t + 0.001,
-                m.pick(body, BLACK_STEEL, m.metal), m.pick("tapered", "hairpin", "round", "square"))  # fmt: skip
+                m.pick(body, BLACK_STEEL, m.metal), m.pick("tapered", "hairpin", "round", "square"))
             if kind == "legs" and top != "oval" and m.chance(0.4):
-                m.add(board(w - 0.16, d - 0.16, 0.14, 0.158, 0.01, 0.003), of=body)
+                m.board(w - 0.16, d - 0.16, 0.14, 0.158, 0.01, 0.003, of=body)
         case 1:  # drawers or niches below the top
             look = Look("flat", m.pick(body, WHITE), body, body,
-                m.pick("knob", "bar", "edge", "disc"), m.metal)  # fmt: skip
+                m.pick("knob", "bar", "edge", "disc"), m.metal)
             top_of(m, "rect", w, d, h - t, h, body)
             if m.chance(0.6):
                 hollow(m, (-hw + 0.02, hw - 0.02), (h - t - 0.16, h - t), (-hd + 0.02, hd - 0.045),
-                    0.016, body)  # fmt: skip
+                    0.016, body)
                 fronts_of(m, look, (-hw + 0.02, hw - 0.02), (h - t - 0.16, h - t - 0.002),
-                    hd - 0.045, [("flap",)] * m.pick(1, 2), False, Inside(-hd + 0.028))  # fmt: skip
+                    hd - 0.045, [("flap",)] * m.pick(1, 2), False, Inside(-hd + 0.028))
                 four_legs(m, m.pick("tapered", "square", "round"), w, d, h - t - 0.158, 0.05, 0.06,
-                    0.0, body)  # fmt: skip
+                    0.0, body)
             else:
-                for x in (-hw + 0.01, hw - 0.035):
-                    m.add(bevelled((x, 0.0, -hd + 0.01), (x + 0.025, h - t, hd - 0.01), 0.002),
-                        of=body)  # fmt: skip
-                m.add(slab((-hw + 0.035, 0.08, -hd + 0.02), (hw - 0.035, 0.1, hd - 0.02)), of=body)
+                m.box(0.025, h - t, d - 0.02, 0.002, left=0.01 - w / 2, mirrored="x", of=body)
+                m.box(w - 0.07, (0.08, 0.1), d - 0.04, of=body)
                 if m.chance(0.5):
-                    m.add(slab((-0.01, 0.1, -hd + 0.03), (0.01, h - t, hd - 0.03)), of=body)
+                    m.box(0.02, (0.1, h - t), d - 0.06, of=body)
         case 2:  # a drum, ribbed or plain
-            m.add(loft(rings(oval, [(w * 0.9, d * 0.9, 0.0), (w * 0.94, d * 0.94, h * 0.5),
-                (w * 0.9, d * 0.9, h - t)], n=36)), of=body)  # fmt: skip
-            m.add(disc(w, d, h - t, h, 0.006, n=40), of=m.pick(body, m.timber,
-                glossy("stone", (0.86, 0.85, 0.82), 0.25)))  # fmt: skip
+            m.loft(rings(oval, [(w * 0.9, d * 0.9, 0.0), (w * 0.94, d * 0.94, h * 0.5),
+                (w * 0.9, d * 0.9, h - t)], n=36), of=body)
+            m.disc(w, d, h - t, h, 0.006, n=40, of=m.pick(body, m.timber,
+                glossy("stone", (0.86, 0.85, 0.82), 0.25)))
             for k in range(24) if m.chance(0.5) else ():
-                m.add(tube([(0.47 * w * cos(k * pi / 12), 0.0, 0.47 * d * sin(k * pi / 12)),
-                    (0.47 * w * cos(k * pi / 12), h - t, 0.47 * d * sin(k * pi / 12))], 0.018, n=6),
-                    of=body)  # fmt: skip
+                m.tube([polar((0.47 * w, 0.47 * d), 0.0, k * pi / 12),
+                    polar((0.47 * w, 0.47 * d), h - t, k * pi / 12)], 0.018, n=6, of=body)
         case 3:  # two that nest
             with m.moved(at=(-0.12 * w, 0.0, -0.08 * d)):
-                m.add(disc(w * 0.76, d * 0.84, h - t, h, 0.005, n=36), of=body)
+                m.disc(w * 0.76, d * 0.84, h - t, h, 0.005, n=36, of=body)
                 four_legs(m, "round", w * 0.6, d * 0.62, h - t + 0.001, 0.024, 0.0, 0.0,
-                    m.pick(BLACK_STEEL, m.metal, body))  # fmt: skip
+                    m.pick(BLACK_STEEL, m.metal, body))
             with m.moved(at=(0.27 * w, 0.0, 0.19 * d)):
-                m.add(disc(w * 0.46, d * 0.62, h * 0.72 - t, h * 0.72, 0.005, n=36),
-                    of=m.pick(body, WHITE, m.timber))  # fmt: skip
+                m.disc(w * 0.46, d * 0.62, h * 0.72 - t, h * 0.72, 0.005, n=36,
+                    of=m.pick(body, WHITE, m.timber))
                 four_legs(m, "round", w * 0.34, d * 0.44, h * 0.72 - t + 0.001, 0.024, 0.0, 0.0,
-                    m.pick(BLACK_STEEL, m.metal, body))  # fmt: skip
+                    m.pick(BLACK_STEEL, m.metal, body))
         case 4:  # a tray on crossed legs, a block
             if m.chance(0.5):
                 under_top(m, "crossed", w, d, h - 0.02, body, "square")
-                m.add(board(w, d, h - 0.04, h - 0.02, 0.03, 0.004), of=body)
-                m.add(hoop(rect(w - 0.02, d - 0.02, 0.03, n=3), h - 0.01, 0.01, n=6), of=body)
+                m.board(w, d, h - 0.04, h - 0.02, 0.03, 0.004, of=body)
+                m.hoop(rect(w - 0.02, d - 0.02, 0.03, n=3), h - 0.01, 0.01, of=body)
             else:
-                m.add(bevelled((-hw, 0.05, -hd), (hw, h, hd), 0.006), of=body)
-                m.add(slab((-hw + 0.06, 0.0, -hd + 0.06), (hw - 0.06, 0.05, hd - 0.06)), of=RUBBER)
+                m.box(w, (0.05, h), d, 0.006, of=body)
+                m.box(w - 0.12, 0.05, d - 0.12, of=RUBBER)
 
 
 @family(group="desk", nyu40=DESK, place=Place.FLOOR, variants=36,
     size=lambda m: (m.pick(0.95, 1.1, 1.2, 1.3, 1.4, 1.6), m.pick(0.55, 0.6, 0.65, 0.7),
-    m.uniform(0.73, 0.77)))  # fmt: skip
+    m.uniform(0.73, 0.77)))
 def desk(m: Maker, size: Size) -> None:
     """A desk.
 
@@ -236,47 +216,47 @@ def desk(m: Maker, size: Size) -> None:
     hw, hd = w / 2, d / 2
     body = m.pick(m.timber, m.timber, m.dark_timber, WHITE, WHITE, glossy("paint", m.paint(), 0.4))
     look = Look(m.pick("flat", "flat", "raised", "shaker"), m.pick(body, body, WHITE), body, body,
-        m.pick("knob", "bar", "edge", "disc", "square", "bow"), m.metal)  # fmt: skip
+        m.pick("knob", "bar", "edge", "disc", "square", "bow"), m.metal)
     t, form = m.pick(0.02, 0.025, 0.03), m.weighted(0.25, 0.25, 0.15, 0.2, 0.15)
-    top_of(m, m.pick("rect", "rect", "round_rect", "boards"), w, d, h - t, h,
-        m.pick(body, m.timber))  # fmt: skip
+    top_of(
+        m, m.pick("rect", "rect", "round_rect", "boards"), w, d, h - t, h, m.pick(body, m.timber)
+    )
     y = h - t + 0.001
     match form:
         case 0:  # on legs
             under_top(m, m.pick("legs", "rails", "frames", "trestles", "crossed"), w, d, y,
                 m.pick(body, BLACK_STEEL, WHITE_STEEL, m.metal),
-                m.pick("square", "tapered", "hairpin", "round"))  # fmt: skip
+                m.pick("square", "tapered", "hairpin", "round"))
         case 1 | 2:  # drawers at one side
             for s in (m.pick(-1.0, 1.0),) if form == 1 else (-1.0, 1.0):
                 a, b = (min(s * (hw - 0.01), s * (hw - 0.01 - (0.4 if form == 1 else 0.32))),
-                    max(s * (hw - 0.01), s * (hw - 0.01 - (0.4 if form == 1 else 0.32))))  # fmt: skip
+                    max(s * (hw - 0.01), s * (hw - 0.01 - (0.4 if form == 1 else 0.32))))
                 hollow(m, (a, b), (0.05, y), (-hd + 0.02, hd - 0.05), 0.016, body)
-                m.add(slab((a + 0.02, 0.0, -hd + 0.04), (b - 0.02, 0.05, hd - 0.09)), of=body)
+                m.box((a + 0.02, b - 0.02), 0.05, (-hd + 0.04, hd - 0.09), of=body)
                 fronts_of(m, look, (a, b), (0.06, h - t - 0.003), hd - 0.05,
                     [m.pick(("low", "drawer", "drawer"), ("drawer", "drawer", "drawer"),
-                    ("low", "door"), ("door",))], False, Inside(-hd + 0.028))  # fmt: skip
+                    ("low", "door"), ("door",))], False, Inside(-hd + 0.028))
                 if form == 1:
                     for z in (-hd + 0.05, hd - 0.05):
                         leg(m, m.pick("square", "square", "round"), (-s * (hw - 0.05), z),
-                            (-s * (hw - 0.05), z), y, 0.045, m.pick(body, BLACK_STEEL))  # fmt: skip
+                            (-s * (hw - 0.05), z), y, 0.045, m.pick(body, BLACK_STEEL))
             if m.chance(0.6):
-                m.add(slab((-hw + 0.06, h - t - 0.3, -hd + 0.03), (hw - 0.06, y, -hd + 0.045)),
-                    of=body)  # fmt: skip
+                m.box(w - 0.12, (h - t - 0.3, y), 0.015, against=-hd + 0.03, of=body)
         case 3:  # a drawer or two under the whole top
-            hollow(m, (-hw + 0.02, hw - 0.02), (h - t - 0.11, y), (-hd + 0.02, hd - 0.05), 0.012,
-                body)  # fmt: skip
+            hollow(
+                m, (-hw + 0.02, hw - 0.02), (h - t - 0.11, y), (-hd + 0.02, hd - 0.05), 0.012, body
+            )
             fronts_of(m, look, (-hw + 0.02, hw - 0.02), (h - t - 0.11, h - t - 0.002), hd - 0.05,
-                [("flap",)] * m.pick(1, 2, 3), False, Inside(-hd + 0.028))  # fmt: skip
+                [("flap",)] * m.pick(1, 2, 3), False, Inside(-hd + 0.028))
             four_legs(m, m.pick("tapered", "square", "turned", "round", "hairpin"), w, d,
-                h - t - 0.108, 0.05, 0.06, 0.0, m.pick(body, body, BLACK_STEEL))  # fmt: skip
+                h - t - 0.108, 0.05, 0.06, 0.0, m.pick(body, body, BLACK_STEEL))
         case 4:  # with a shelf below
             under_top(m, "panels", w, d, y, body, "square")
-            m.add(slab((-hw + 0.05, h - t - 0.14, -hd + 0.04),
-                (hw - 0.05, h - t - 0.125, hd - 0.04)), of=body)  # fmt: skip
+            m.box(w - 0.1, 0.015, d - 0.08, on=h - t - 0.14, of=body)
 
 
 @family(group="nightstand", nyu40=NIGHT_STAND, place=Place.FLOOR, variants=40,
-    size=lambda m: (m.uniform(0.36, 0.52), m.uniform(0.34, 0.42), m.uniform(0.42, 0.6)))  # fmt: skip
+    size=lambda m: (m.uniform(0.36, 0.52), m.uniform(0.34, 0.42), m.uniform(0.42, 0.6)))
 def nightstand(m: Maker, size: Size) -> None:
     """What stands beside a bed.
 
@@ -286,73 +266,71 @@ def nightstand(m: Maker, size: Size) -> None:
     hw, hd = w / 2, d / 2
     body = m.pick(m.timber, m.timber, m.dark_timber, WHITE, glossy("paint", m.paint(), 0.4))
     look = Look(m.pick("flat", "flat", "shaker", "raised", "grooved"), m.pick(body, body, WHITE),
-        body, body, m.pick("knob", "bar", "edge", "disc", "ring", "cup", "bow"), m.metal)  # fmt: skip
+        body, body, m.pick("knob", "bar", "edge", "disc", "ring", "cup", "bow"), m.metal)
     form = m.weighted(0.42, 0.2, 0.12, 0.12, 0.14)
     t = m.pick(0.016, 0.02, 0.025)
     if form < 2:
         legs = m.pick("tapered", "square", "round", "bun", "plinth", "hairpin")
-        low = 0.04 if legs == "plinth" else 0.06 if legs == "bun" else min(m.uniform(0.1, 0.22),
-            0.4 * h)  # fmt: skip
+        low = (0.04 if legs == "plinth" else 0.06 if legs == "bun" else min(m.uniform(0.1, 0.22),
+            0.4 * h))
         if legs == "plinth":
-            m.add(slab((-hw + 0.01, 0.0, -hd), (hw - 0.01, low, hd - 0.06)), of=body)
+            m.box(w - 0.02, low, (-hd, hd - 0.06), of=body)
         else:
             four_legs(m, legs, w, d - 0.03, low + 0.001, 0.045, 0.045,
-                0.02 if legs == "tapered" else 0.0, m.pick(body, body, BLACK_STEEL, m.metal))  # fmt: skip
-        m.add(board(w, d - 0.012, h - t, h, 0.006, 0.004, z=-0.006, n=2), of=body)
+                0.02 if legs == "tapered" else 0.0, m.pick(body, body, BLACK_STEEL, m.metal))
+        m.board(w, d - 0.012, h - t, h, 0.006, 0.004, z=-0.006, n=2, of=body)
         if form == 0:
             hollow(m, (-hw + 0.005, hw - 0.005), (low, h - t), (-hd, hd - 0.05), 0.016, body)
             fronts_of(m, look, (-hw + 0.005, hw - 0.005), (low, h - t - 0.002), hd - 0.05,
                 [m.pick(("drawer",), ("drawer", "drawer"), ("drawer", "drawer", "drawer"),
-                ("door",), ("low", "door"))], False, Inside(-hd + 0.008))  # fmt: skip
+                ("door",), ("low", "door"))], False, Inside(-hd + 0.008))
         else:
             # A niche over a drawer, or under it.
             mid, is_low = low + (h - low) * m.uniform(0.4, 0.55), m.chance(0.5)
             with m.of(body):
-                m.add(slab((-hw + 0.005, low, -hd), (hw - 0.005, h - t, -hd + 0.008)))
-                for x in (-hw + 0.005, hw - 0.021):
-                    m.add(slab((x, low, -hd + 0.008), (x + 0.016, h - t, hd - 0.045)))
+                m.box(w - 0.01, (low, h - t), 0.008, against=-hd)
+                m.box(
+                    0.016, (low, h - t), (-hd + 0.008, hd - 0.045), left=0.005 - w / 2, mirrored="x"
+                )
                 for y in (low, mid):
-                    m.add(slab((-hw + 0.021, y, -hd + 0.008), (hw - 0.021, y + 0.016, hd - 0.05)))
-            fronts_of(m, look, (-hw + 0.006, hw - 0.006),
-                (low, mid + 0.008) if is_low else (mid + 0.008, h - t - 0.002), hd - 0.045,
-                [("drawer",)], False, Inside(-hd + 0.008))  # fmt: skip
+                    m.box(w - 0.042, 0.016, (-hd + 0.008, hd - 0.05), on=y)
+            fronts_of(m, look, (-hw + 0.006, hw - 0.006), (low,
+                mid + 0.008) if is_low else (mid + 0.008, h - t - 0.002), hd - 0.045, [("drawer",)],
+                False, Inside(-hd + 0.008))
     match form:
         case 2:  # round, with a rim
-            m.add(disc(w, d, h - t, h, 0.004, n=32), of=body)
+            m.disc(w, d, h - t, h, 0.004, of=body)
             if m.chance(0.5):
-                under_top(m, "foot", w, d, h - t + 0.001, m.pick(body, BLACK_STEEL, m.metal),
-                    "round")  # fmt: skip
+                under_top(
+                    m, "foot", w, d, h - t + 0.001, m.pick(body, BLACK_STEEL, m.metal), "round"
+                )
             else:
                 four_legs(m, "tapered", w * 0.8, d * 0.8, h - t + 0.001, 0.03, 0.06, 0.04, body)
-                m.add(disc(w * 0.7, d * 0.7, h * 0.4, h * 0.4 + 0.014, 0.003, n=28), of=body)
+                m.disc(w * 0.7, d * 0.7, h * 0.4, h * 0.4 + 0.014, 0.003, n=28, of=body)
         case 3:  # a cube of boards, open to the front
             with m.of(body):
                 for y in (0.0, h - 0.02):
-                    m.add(bevelled((-hw, y, -hd), (hw, y + 0.02, hd), 0.002))
-                for x in (-hw, hw - 0.02):
-                    m.add(bevelled((x, 0.0201, -hd), (x + 0.02, h - 0.0201, hd), 0.002))
+                    m.box(w, 0.02, d, 0.002, on=y)
+                m.box(0.02, (0.0201, h - 0.0201), d, 0.002, left=-w / 2, mirrored="x")
                 for k in range(m.pick(1, 2)):
-                    m.add(slab((-hw + 0.02, 0.0 + h * (k + 1) / 3, -hd + 0.01),
-                        (hw - 0.02, 0.016 + h * (k + 1) / 3, hd - 0.01)))  # fmt: skip
+                    m.box(w - 0.04, 0.016, d - 0.02, on=0.0 + h * (k + 1) / 3)
                 if m.chance(0.6):
-                    m.add(slab((-hw + 0.02, 0.02, -hd), (hw - 0.02, h - 0.02, -hd + 0.008)))
+                    m.box(w - 0.04, (0.02, h - 0.02), 0.008, against=-hd)
         case 4:  # a frame of metal with two boards
             bar = m.pick(BLACK_STEEL, m.metal, WHITE_STEEL, BRASS)
             with m.of(bar):
                 for x, z in product((-hw + 0.008, hw - 0.008), (-hd + 0.008, hd - 0.008)):
-                    m.add(bevelled((x - 0.008, 0.0, z - 0.008), (x + 0.008, h - 0.016, z + 0.008),
-                        0.001))  # fmt: skip
+                    m.box(0.016, h - 0.016, 0.016, 0.001, x=x, z=z)
                 for y in (0.12, h - 0.032):
-                    m.add(hoop(rect(w - 0.016, d - 0.016, 0.005, n=1), y, 0.007, n=4))
-            m.add(board(w, d, h - 0.016, h, 0.004, 0.003, n=1), of=m.pick(m.timber, body,
-                glossy("stone", (0.86, 0.85, 0.82), 0.25)))  # fmt: skip
-            m.add(slab((-hw + 0.017, 0.127, -hd + 0.01), (hw - 0.017, 0.139, hd - 0.01)),
-                of=m.pick(m.timber, body))  # fmt: skip
+                    m.hoop(rect(w - 0.016, d - 0.016, 0.005, n=1), y, 0.007, n=4)
+            m.board(w, d, h - 0.016, h, 0.004, 0.003, n=1, of=m.pick(m.timber, body,
+                glossy("stone", (0.86, 0.85, 0.82), 0.25)))
+            m.box(w - 0.034, (0.127, 0.139), d - 0.02, of=m.pick(m.timber, body))
 
 
 @family(group="tv_stand", nyu40=OTHERFURNITURE, place=Place.FLOOR, called="tv_stand", variants=32,
     size=lambda m: (m.pick(1.2, 1.4, 1.5, 1.6, 1.8), m.pick(0.38, 0.4, 0.42, 0.45),
-    m.uniform(0.4, 0.58)))  # fmt: skip
+    m.uniform(0.4, 0.58)))
 def tv_bench(m: Maker, size: Size) -> None:
     """A low bench for a television.
 
@@ -363,37 +341,38 @@ def tv_bench(m: Maker, size: Size) -> None:
     body = m.pick(m.timber, m.timber, m.dark_timber, WHITE, WHITE, glossy("paint", m.paint(), 0.4))
     look = Look(m.pick("flat", "flat", "shaker", "grooved", "glazed"),
         m.pick(body, body, WHITE, m.timber), body, body, m.pick("knob", "bar", "edge", "disc",
-        "none", "none", "square"), m.metal)  # fmt: skip
+        "none", "none", "square"), m.metal)
     legs = m.pick("tapered", "square", "round", "hairpin", "plinth", "plinth")
     low, t = 0.05 if legs == "plinth" else m.uniform(0.1, 0.18), m.pick(0.018, 0.025, 0.03)
     if legs == "plinth":
-        m.add(slab((-hw + 0.02, 0.0, -hd + 0.02), (hw - 0.02, low, hd - 0.07)), of=body)
+        m.box(w - 0.04, low, (-hd + 0.02, hd - 0.07), of=body)
     else:
         four_legs(m, legs, w, d - 0.03, low + 0.001, 0.05, 0.08, 0.03 if legs == "tapered" else 0.0,
-            m.pick(body, BLACK_STEEL, m.metal))  # fmt: skip
+            m.pick(body, BLACK_STEEL, m.metal))
     n = m.pick(2, 3, 3, 4)
     open = m.pick((), (0,), (1,), (n - 1,), (0, 1))
     f = hd - 0.05
     with m.of(body):
-        m.add(board(w, d - 0.02, h - t, h, 0.004, 0.003, z=-0.01, n=1))
-        m.add(slab((-hw + 0.003, low, -hd), (hw - 0.003, h - t, -hd + 0.008)))
-        m.add(slab((-hw + 0.003, low, -hd + 0.008), (hw - 0.003, low + 0.018, f)))
+        m.board(w, d - 0.02, h - t, h, 0.004, 0.003, z=-0.01, n=1)
+        m.box(w - 0.006, (low, h - t), 0.008, against=-hd)
+        m.box(w - 0.006, 0.018, (-hd + 0.008, f), on=low)
         for k in range(n + 1):
             x = -hw + 0.003 + k * (w - 0.024) / n
-            m.add(slab((x, low + 0.018, -hd + 0.008), (x + 0.018, h - t, f)))
+            m.box(0.018, (low + 0.018, h - t), (-hd + 0.008, f), left=x)
     for k in range(n):
         a, b = -hw + 0.003 + k * (w - 0.006) / n, -hw + 0.003 + (k + 1) * (w - 0.006) / n
         if k in open:
-            m.add(slab((a + 0.012, (low + h) / 2 - 0.008, -hd + 0.01),
-                (b - 0.012, (low + h) / 2 + 0.008, f - 0.01)), of=body)  # fmt: skip
+            m.box((a + 0.012, b - 0.012), 0.016, (-hd + 0.01, f - 0.01), on=(low + h) / 2 - 0.008,
+                of=body)
         else:
-            fronts_of(m, look, (a, b), (low, h - t - 0.002), f, [m.pick(("door",),
-                ("drawer", "drawer"), ("flap",), ("drawer",))], False, Inside(-hd + 0.008))  # fmt: skip
+            fronts_of(m, look, (a, b), (low, h - t - 0.002), f,
+                [m.pick(("door",), ("drawer", "drawer"), ("flap",), ("drawer",))], False,
+                Inside(-hd + 0.008))
 
 
 @family(group="tv", nyu40=TELEVISION, place=Place.SURFACE, called="television", variants=20,
     size=lambda m: m.pick((0.73, 0.2, 0.48), (0.97, 0.22, 0.63), (1.08, 0.24, 0.69),
-    (1.22, 0.26, 0.77)))  # fmt: skip
+    (1.22, 0.26, 0.77)))
 def screen(m: Maker, size: Size) -> None:
     """A television.
 
@@ -401,28 +380,28 @@ def screen(m: Maker, size: Size) -> None:
     """
     w, d, h = size
     hd = d / 2
-    black = glossy("screen case", m.pick((0.05, 0.05, 0.055), (0.05, 0.05, 0.055),
-        (0.35, 0.35, 0.36)), 0.35)  # fmt: skip
+    black = glossy(
+        "screen case", m.pick((0.05, 0.05, 0.055), (0.05, 0.05, 0.055), (0.35, 0.35, 0.36)), 0.35
+    )
     low, form, edge = (h - (w - 0.02) * 0.5625 - 0.025, m.weighted(0.35, 0.25, 0.2, 0.2),
-        m.pick(0.008, 0.012, 0.025))  # fmt: skip
-    m.add(bevelled((-w / 2, low, -0.012), (w / 2, h, 0.012), 0.003), of=black)
-    m.add(bevelled((-w * 0.36, low + 0.03, -0.05), (w * 0.36, h - 0.1, -0.011), 0.012), of=black)
-    m.add(slab((-w / 2 + edge, low + edge + 0.008, 0.012), (w / 2 - edge, h - edge, 0.0128)),
-        of=BLACK_GLASS)  # fmt: skip
+        m.pick(0.008, 0.012, 0.025))
+    m.box(w, (low, h), 0.024, 0.003, of=black)
+    m.box(0.72 * w, (low + 0.03, h - 0.1), 0.039, 0.012, against=-0.05, of=black)
+    m.box(w - 2 * edge, (low + edge + 0.008, h - edge), (0.012, 0.0128), of=BLACK_GLASS)
     match form:
         case 0:  # two feet
             for x, s in product((-0.36 * w, 0.36 * w), (-1.0, 1.0)):
-                m.add(tube([(x, low + 0.03, 0.0), (x, 0.006, s * (hd - 0.006))], 0.006, n=8),
-                    of=m.pick(black, STEEL))  # fmt: skip
+                m.tube([(x, low + 0.03, 0.0), (x, 0.006, s * (hd - 0.006))], 0.006,
+                    of=m.pick(black, STEEL))
         case 1:  # one foot
-            m.add(board(0.42 * w, d, 0.0, 0.012, 0.03, 0.003), of=m.pick(black, STEEL, BLACK_GLASS))
-            m.add(bevelled((-0.05, 0.011, -0.045), (0.05, low + 0.1, -0.02), 0.003), of=black)
+            m.board(0.42 * w, d, 0.0, 0.012, 0.03, 0.003, of=m.pick(black, STEEL, BLACK_GLASS))
+            m.box(0.1, (0.011, low + 0.1), 0.025, 0.003, against=-0.045, of=black)
         case 2:  # a bar
-            m.add(tube(bent([(-0.22 * w, 0.008, hd - 0.008), (-0.22 * w, 0.008, -hd + 0.008),
+            m.tube(bent([(-0.22 * w, 0.008, hd - 0.008), (-0.22 * w, 0.008, -hd + 0.008),
                 (0.22 * w, 0.008, -hd + 0.008), (0.22 * w, 0.008, hd - 0.008)], 0.04, n=4), 0.008,
-                n=8), of=m.pick(STEEL, BLACK_STEEL))  # fmt: skip
-            m.add(tube([(0.0, 0.008, -hd + 0.008), (0.0, low + 0.12, -0.03)], 0.014, n=10),
-                of=m.pick(STEEL, BLACK_STEEL))  # fmt: skip
+                of=m.pick(STEEL, BLACK_STEEL))
+            m.tube([(0.0, 0.008, -hd + 0.008), (0.0, low + 0.12, -0.03)], 0.014, n=10,
+                of=m.pick(STEEL, BLACK_STEEL))
         case 3:  # a round plate
-            m.add(disc(0.4 * w, d, 0.0, 0.014, 0.004), of=BLACK_GLASS)
-            m.add(tube([(0.0, 0.01, -0.02), (0.0, low + 0.08, -0.02)], 0.022, n=12), of=STEEL)
+            m.disc(0.4 * w, d, 0.0, 0.014, 0.004, of=BLACK_GLASS)
+            m.rod(0.0, (0.01, low + 0.08), -0.02, 0.022, n=12, of=STEEL)

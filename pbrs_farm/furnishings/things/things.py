@@ -32,9 +32,28 @@ from pbrs_farm.furnishings.things.maker import Thing, described_in
 
 THINGS: Final[Mapping[str, Thing[[]]]] = described_in(
     (
-        appliances, bath_things, bins, bottles, bowls, boxes, clocks, clothes, cups, desk_things,
-        floor_things, food, frames_and_candles, glasses, ornaments, papers, seating, soft, tableware, toys, vases,
+        appliances,
+        bath_things,
+        bins,
+        bottles,
+        bowls,
+        boxes,
+        clocks,
+        clothes,
+        cups,
+        desk_things,
+        floor_things,
+        food,
+        frames_and_candles,
+        glasses,
+        ornaments,
+        papers,
+        seating,
+        soft,
+        tableware,
+        toys,
+        vases,
     ),
     Thing,
-)  # fmt: skip
+)
 """What lies about: a style and a generator make one of them."""

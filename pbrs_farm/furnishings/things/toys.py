@@ -7,22 +7,12 @@ from itertools import product
 from numpy import pi
 
 from pbrs_farm.core.frames import LYING_ALONG_Z, rotation_y, rotation_z
-from pbrs_farm.furnishings.things.bodies import (
-    bevelled,
-    cylinder,
-    frustum,
-    hoop,
-    loft,
-    revolve,
-    rounded,
-    slab,
-    sphere,
-    stretched,
-    tube,
-)
+from pbrs_farm.furnishings.things.bodies import sphere, stretched
 from pbrs_farm.furnishings.things.maker import Maker, thing
 from pbrs_farm.furnishings.things.materials import plain
 from pbrs_farm.furnishings.things.outlines import bent, oval, rect, rings, scaled
+
+# fmt: off
 
 
 @thing(group="toy")
@@ -33,198 +23,188 @@ def toy(m: Maker) -> None:
     """
     form, s = m.integers(0, 13), m.uniform(0.85, 1.2)
     own, other, third = (plain("toy", m.any_colour(), 0.5), plain("toy", m.any_colour(), 0.5),
-        plain("toy", m.any_colour(), 0.5))  # fmt: skip
+        plain("toy", m.any_colour(), 0.5))
     grain = plain("toy wood", m.wood, 0.6)
     match form:
         case 0:
             m.name, fur = ("bear", plain("fur", m.pick((0.5, 0.33, 0.2), (0.75, 0.62, 0.45),
-                (0.4, 0.4, 0.42), (0.9, 0.87, 0.8)), 0.98))  # fmt: skip
+                (0.4, 0.4, 0.42), (0.9, 0.87, 0.8)), 0.98))
             with m.of(fur):
                 m.add(stretched(sphere((0, 0, 0), 1.0, n=14), (0.075 * s, 0.085 * s, 0.065 * s)),
-                    at=(0, 0.085 * s, 0))  # fmt: skip
-                m.add(sphere((0, 0.2 * s, 0.01), 0.062 * s, n=14))
+                    at=(0, 0.085 * s, 0))
+                m.sphere((0, 0.2 * s, 0.01), 0.062 * s, n=14)
                 for x in (-1.0, 1.0):
-                    m.add(sphere((x * 0.05 * s, 0.25 * s, 0), 0.022 * s, n=10))
+                    m.sphere((x * 0.05 * s, 0.25 * s, 0), 0.022 * s, n=10)
                     m.add(stretched(sphere((0, 0, 0), 1.0, n=10), (0.03 * s, 0.03 * s, 0.06 * s)),
-                        turn=rotation_y(x * 0.4), at=(x * 0.055 * s, 0.031 * s, 0.07 * s))  # fmt: skip
-                    m.add(stretched(sphere((0, 0, 0), 1.0, n=10),
-                        (0.024 * s, 0.055 * s, 0.026 * s)), turn=rotation_z(x * 0.7),
-                        at=(x * 0.088 * s, 0.12 * s, 0.02 * s))  # fmt: skip
+                        turn=rotation_y(x * 0.4), at=(x * 0.055 * s, 0.031 * s, 0.07 * s))
+                    m.add(stretched(sphere((0, 0, 0), 1.0, n=10), (0.024 * s, 0.055 * s,
+                        0.026 * s)), turn=rotation_z(x * 0.7), at=(x * 0.088 * s, 0.12 * s,
+                        0.02 * s))
             m.add(stretched(sphere((0, 0, 0), 1.0, n=10), (0.028 * s, 0.022 * s, 0.022 * s)),
-                at=(0, 0.188 * s, 0.062 * s), of=plain("snout", (0.85, 0.75, 0.6), 0.98))  # fmt: skip
+                at=(0, 0.188 * s, 0.062 * s), of=plain("snout", (0.85, 0.75, 0.6), 0.98))
             for x, y, r in ((-0.022, 0.218, 0.007), (0.022, 0.218, 0.007), (0.0, 0.196, 0.009)):
-                m.add(sphere((x * s, y * s, (0.068 if r < 0.008 else 0.083) * s), r * s, n=8),
-                    of=plain("button", (0.05, 0.04, 0.04), 0.3))  # fmt: skip
+                m.sphere((x * s, y * s, (0.068 if r < 0.008 else 0.083) * s), r * s, n=8,
+                    of=plain("button", (0.05, 0.04, 0.04), 0.3))
         case 1:
             m.name = "toy_blocks"
             for k in range(m.integers(4, 9)):
-                m.add(bevelled((-0.02, 0.0, -0.02), (0.02, 0.04, 0.02), 0.003),
-                    turn=rotation_y(m.uniform(-0.6, 0.6)), at=(0.05 * (k % 3), 0.0404 * (k // 3),
-                    m.uniform(-0.004, 0.004)), of=m.pick(own, other, third, grain))  # fmt: skip
+                m.box(0.04, 0.04, 0.04, 0.003, turn=rotation_y(m.uniform(-0.6, 0.6)),
+                    at=(0.05 * (k % 3), 0.0404 * (k // 3), m.uniform(-0.004, 0.004)),
+                    of=m.pick(own, other, third, grain))
         case 2:
             m.name = "toy_train"
             for k in range(m.integers(2, 4)):
                 with m.moved(at=(0, 0, -0.115 * k)):
-                    m.add(bevelled((-0.03, 0.016, -0.048), (0.03, 0.034, 0.048), 0.004),
-                        of=m.pick(own, grain))  # fmt: skip
+                    m.box(0.06, (0.016, 0.034), 0.096, 0.004, of=m.pick(own, grain))
                     for x, z in product((-0.031, 0.031), (-0.03, 0.03)):
-                        m.add(tube([(x - 0.005, 0.016, z), (x + 0.005, 0.016, z)], 0.016, n=12),
-                            of=third)  # fmt: skip
+                        m.rod((x - 0.005, x + 0.005), 0.016, z, 0.016, n=12, of=third)
                     if k == 0:
-                        m.add(tube([(0, 0.055, -0.02), (0, 0.055, 0.045)], 0.022, n=14), of=other)
-                        m.add(bevelled((-0.028, 0.0345, -0.047), (0.028, 0.095, -0.015), 0.004),
-                            of=own)  # fmt: skip
-                        m.add(frustum((0.009, 0.07), (0.012, 0.1), n=10), at=(0, 0, 0.028),
-                            of=third)  # fmt: skip
+                        m.rod(0, 0.055, (-0.02, 0.045), 0.022, n=14, of=other)
+                        m.box(0.056, (0.0345, 0.095), 0.032, 0.004, against=-0.047, of=own)
+                        m.frustum((0.009, 0.07), (0.012, 0.1), n=10, at=(0, 0, 0.028), of=third)
                     else:
-                        m.add(bevelled((-0.027, 0.0345, -0.042), (0.027, 0.07, 0.042), 0.004),
-                            of=m.pick(other, third, own))  # fmt: skip
+                        m.box(0.054, (0.0345, 0.07), 0.084, 0.004, of=m.pick(other, third, own))
         case 3:
             m.name = "toy_car"
-            m.add(bevelled((-0.04 * s, 0.018, -0.09 * s), (0.04 * s, 0.05 * s, 0.09 * s), 0.01),
-                of=own)  # fmt: skip
-            m.add(loft([(rect(0.074 * s, 0.1 * s, 0.01, z=-0.01), 0.0502 * s),
-                (rect(0.06 * s, 0.07 * s, 0.01, z=-0.012), 0.082 * s)]), of=m.pick(own, other))  # fmt: skip
+            m.box(0.08 * s, (0.018, 0.05 * s), 0.18 * s, 0.01, of=own)
+            m.loft([(rect(0.074 * s, 0.1 * s, 0.01, z=-0.01), 0.0502 * s),
+                (rect(0.06 * s, 0.07 * s, 0.01, z=-0.012), 0.082 * s)], of=m.pick(own, other))
             for x, z in product((-0.04, 0.04), (-0.055, 0.055)):
-                m.add(tube([((x - 0.008) * s, 0.02, z * s), ((x + 0.008) * s, 0.02, z * s)], 0.02,
-                    n=14), of=plain("tyre", (0.06, 0.06, 0.06), 0.8))  # fmt: skip
+                m.rod(((x - 0.008) * s, (x + 0.008) * s), 0.02, z * s, 0.02, n=14,
+                    of=plain("tyre", (0.06, 0.06, 0.06), 0.8))
             for x in (-0.025, 0.025):
-                m.add(sphere((x * s, 0.036 * s, 0.089 * s), 0.008, n=8),
-                    of=plain("lamp", (0.95, 0.9, 0.7), 0.2))  # fmt: skip
+                m.sphere((x * s, 0.036 * s, 0.089 * s), 0.008, n=8,
+                    of=plain("lamp", (0.95, 0.9, 0.7), 0.2))
         case 4:
             m.name = "stacking_rings"
-            m.add(revolve([(0, 0), (0.06, 0), (0.058, 0.012), (0.012, 0.014), (0.01, 0.15 * s),
-                (0, 0.16 * s)], n=18), of=grain)  # fmt: skip
+            m.revolve([(0, 0), (0.06, 0), (0.058, 0.012), (0.012, 0.014), (0.01, 0.15 * s),
+                (0, 0.16 * s)], n=18, of=grain)
             for k in range(5):
-                m.add(hoop(oval(0.085 - 0.011 * k, 0.085 - 0.011 * k, n=18), 0.03 + 0.0255 * s * k,
-                    0.0125 * s, n=7), of=m.pick(own, other, third))  # fmt: skip
+                m.hoop(oval(0.085 - 0.011 * k, 0.085 - 0.011 * k, n=18), 0.03 + 0.0255 * s * k,
+                    0.0125 * s, n=7, of=m.pick(own, other, third))
         case 5:
             m.name = "robot"
             with m.of(own):
-                m.add(bevelled((-0.04, 0.07, -0.025), (0.04, 0.15, 0.025), 0.004))
-                for x in (-0.022, 0.022):
-                    m.add(bevelled((x - 0.015, 0, -0.025), (x + 0.015, 0.07, 0.03), 0.004))
-                for x in (-0.052, 0.052):
-                    m.add(bevelled((x - 0.01, 0.08, -0.012), (x + 0.01, 0.145, 0.012), 0.003))
-            m.add(bevelled((-0.03, 0.156, -0.025), (0.03, 0.205, 0.025), 0.004), of=other)
+                m.box(0.08, (0.07, 0.15), 0.05, 0.004)
+                m.box(0.03, 0.07, 0.055, 0.004, left=-0.037, z=0.0025, mirrored="x")
+                m.box(0.02, (0.08, 0.145), 0.024, 0.003, left=-0.062, mirrored="x")
+            m.box(0.06, (0.156, 0.205), 0.05, 0.004, of=other)
             for x in (-0.013, 0.013):
-                m.add(cylinder(0.008, 0, 0.004, n=10), turn=LYING_ALONG_Z, at=(x, 0.185, 0.025),
-                    of=third)  # fmt: skip
-            m.add(tube([(0, 0.2, 0), (0, 0.235, 0)], 0.003, n=6), of=third)
-            m.add(sphere((0, 0.237, 0), 0.007, n=8), of=third)
-            m.add(bevelled((-0.012, 0.14, -0.012), (0.012, 0.157, 0.012), 0.002), of=third)
-            m.add(bevelled((-0.025, 0.095, 0.0245), (0.025, 0.13, 0.028), 0.001), of=other)
+                m.cylinder(
+                    0.008, 0, 0.004, n=10, turn=LYING_ALONG_Z, at=(x, 0.185, 0.025), of=third
+                )
+            m.rod(0, (0.2, 0.235), 0, 0.003, n=6, of=third)
+            m.sphere((0, 0.237, 0), 0.007, n=8, of=third)
+            m.box(0.024, (0.14, 0.157), 0.024, 0.002, of=third)
+            m.box(0.05, (0.095, 0.13), (0.0245, 0.028), 0.001, of=other)
         case 6:
             m.name = "plane"
-            m.add(tube([(0, 0.04, -0.1), (0, 0.045, 0.09)], 0.012, n=12, end=0.024), of=own)
-            m.add(bevelled((-0.13, 0.042, 0.0), (0.13, 0.05, 0.055), 0.003), of=other)
-            m.add(bevelled((-0.05, 0.042, -0.1), (0.05, 0.048, -0.07), 0.002), of=other)
-            m.add(bevelled((-0.003, 0.045, -0.105), (0.003, 0.09, -0.07), 0.001), of=third)
-            m.add(revolve([(0, 0), (0.01, 0), (0, 0.018)], n=10), turn=LYING_ALONG_Z,
-                at=(0, 0.045, 0.089), of=third)  # fmt: skip
-            m.add(bevelled((-0.06, 0.041, 0.095), (0.06, 0.049, 0.099), 0.001),
-                turn=rotation_z(0.3), at=(0.013, 0, 0), of=grain)  # fmt: skip
+            m.tube([(0, 0.04, -0.1), (0, 0.045, 0.09)], 0.012, n=12, end=0.024, of=own)
+            m.box(0.26, (0.042, 0.05), (0.0, 0.055), 0.003, of=other)
+            m.box(0.1, (0.042, 0.048), 0.03, 0.002, against=-0.1, of=other)
+            m.box(0.006, (0.045, 0.09), 0.035, 0.001, against=-0.105, of=third)
+            m.revolve([(0, 0), (0.01, 0), (0, 0.018)], n=10, turn=LYING_ALONG_Z,
+                at=(0, 0.045, 0.089), of=third)
+            m.box(0.12, (0.041, 0.049), (0.095, 0.099), 0.001, turn=rotation_z(0.3),
+                at=(0.013, 0, 0), of=grain)
             for x in (-0.035, 0.035):
-                m.add(tube([(x - 0.006, 0.014, 0.04), (x + 0.006, 0.014, 0.04)], 0.014, n=10),
-                    of=third)  # fmt: skip
+                m.rod((x - 0.006, x + 0.006), 0.014, 0.04, 0.014, n=10, of=third)
             for x in (-0.035, 0.035):
-                m.add(tube([(x, 0.014, 0.04), (x * 0.5, 0.045, 0.035)], 0.003, n=5), of=grain)
+                m.tube([(x, 0.014, 0.04), (x * 0.5, 0.045, 0.035)], 0.003, n=5, of=grain)
         case 7:
             m.name = "rocket"
-            m.add(revolve([(0, 0.02), (0.03, 0.02), (0.04, 0.08), (0.038, 0.15), (0.02, 0.2),
-                (0, 0.225)], n=18), of=own)  # fmt: skip
-            m.add(revolve([(0.037, 0.148), (0.0385, 0.148), (0.021, 0.2), (0, 0.228), (0, 0.224),
-                (0.018, 0.199), (0.037, 0.148)], n=18), of=other)  # fmt: skip
+            m.revolve([(0, 0.02), (0.03, 0.02), (0.04, 0.08), (0.038, 0.15), (0.02, 0.2),
+                (0, 0.225)], n=18, of=own)
+            m.revolve([(0.037, 0.148), (0.0385, 0.148), (0.021, 0.2), (0, 0.228), (0, 0.224),
+                (0.018, 0.199), (0.037, 0.148)], n=18, of=other)
             for k in range(3):
-                m.add(loft([([(0.02, -0.003), (0.02, 0.003), (0.07, 0.003), (0.07, -0.003)], 0.0),
+                m.loft([([(0.02, -0.003), (0.02, 0.003), (0.07, 0.003), (0.07, -0.003)], 0.0),
                     ([(0.02, -0.003), (0.02, 0.003), (0.045, 0.003), (0.045, -0.003)], 0.08)],
-                    sharp=10.0), turn=rotation_y(2.0944 * k), of=third)  # fmt: skip
-            m.add(cylinder(0.013, 0, 0.004, n=12), turn=LYING_ALONG_Z, at=(0, 0.12, 0.0375),
-                of=plain("window", (0.6, 0.8, 0.9), 0.2))  # fmt: skip
+                    sharp=10.0, turn=rotation_y(2.0944 * k), of=third)
+            m.cylinder(0.013, 0, 0.004, n=12, turn=LYING_ALONG_Z, at=(0, 0.12, 0.0375),
+                of=plain("window", (0.6, 0.8, 0.9), 0.2))
         case 8:
             m.name = "doll_house"
             w, h, d = m.uniform(0.22, 0.3), m.uniform(0.2, 0.28), 0.14
             with m.of(m.pick(grain, plain("toy white", (0.92, 0.91, 0.88), 0.5))):
-                m.add(slab((-w / 2, 0, -d / 2), (w / 2, h, -d / 2 + 0.006)))
-                for x in (-w / 2, w / 2 - 0.008):
-                    m.add(slab((x, 0, -d / 2 + 0.006), (x + 0.008, h, d / 2)))
+                m.box(w, h, 0.006, against=-d / 2)
+                m.box(0.008, h, (-d / 2 + 0.006, d / 2), left=-w / 2, mirrored="x")
                 for y in (0.0, h / 2):
-                    m.add(slab((-w / 2 + 0.008, y, -d / 2 + 0.006),
-                        (w / 2 - 0.008, y + 0.008, d / 2)))  # fmt: skip
-                m.add(slab((-0.004, 0.008, -d / 2 + 0.006), (0.004, h / 2, d / 2)))
-            m.add(loft(rings(rect, [(w + 0.03, d + 0.02, 0.001, h + 0.0002),
-                (0.01, d + 0.02, 0.001, h + 0.1)], n=1), sharp=20.0), of=own)  # fmt: skip
+                    m.box(w - 0.016, 0.008, (-d / 2 + 0.006, d / 2), on=y)
+                m.box(0.008, (0.008, h / 2), (-d / 2 + 0.006, d / 2))
+            m.loft(rings(rect, [(w + 0.03, d + 0.02, 0.001, h + 0.0002),
+                (0.01, d + 0.02, 0.001, h + 0.1)], n=1), sharp=20.0, of=own)
         case 9:
             m.name = "drum"
             r, h = m.uniform(0.07, 0.11), m.uniform(0.09, 0.14)
-            m.add(cylinder(r, 0, h, n=26), of=own)
+            m.cylinder(r, 0, h, n=26, of=own)
             for y in (0.01, h - 0.006):
-                m.add(hoop(oval(2 * r, 2 * r, n=24), y, 0.007, n=6), of=other)
+                m.hoop(oval(2 * r, 2 * r, n=24), y, 0.007, of=other)
             for k in range(2):
-                m.add(tube([(-0.1, h + 0.009, -0.02 + 0.04 * k),
-                    (0.11, h + 0.012, 0.02 - 0.01 * k)], 0.004, n=6), of=grain)  # fmt: skip
+                m.tube([(-0.1, h + 0.009, -0.02 + 0.04 * k), (0.11, h + 0.012, 0.02 - 0.01 * k)],
+                    0.004, n=6, of=grain)
         case 10:
             m.name = "pull_animal"
             with m.of(grain):
-                m.add(bevelled((-0.03, 0.02, -0.08), (0.03, 0.032, 0.08), 0.003))
+                m.box(0.06, (0.02, 0.032), 0.16, 0.003)
                 for x, z in product((-0.036, 0.036), (-0.055, 0.055)):
-                    m.add(tube([(x - 0.006, 0.02, z), (x + 0.006, 0.02, z)], 0.02, n=14))
+                    m.rod((x - 0.006, x + 0.006), 0.02, z, 0.02, n=14)
             with m.of(own):
-                m.add(rounded((-0.022, 0.05, -0.06), (0.022, 0.1, 0.05), 0.02, n=2))
+                m.rounded(0.044, (0.05, 0.1), (-0.06, 0.05), 0.02)
                 for z in (-0.045, 0.035):
-                    m.add(bevelled((-0.02, 0.0322, z - 0.012), (0.02, 0.07, z + 0.012), 0.003))
-                m.add(rounded((-0.02, 0.085, 0.035), (0.02, 0.13, 0.09), 0.018, n=2))
+                    m.box(0.04, (0.0322, 0.07), 0.024, 0.003, z=z)
+                m.rounded(0.04, (0.085, 0.13), (0.035, 0.09), 0.018)
             for x in (-1.0, 1.0):
                 m.add(stretched(sphere((0, 0, 0), 1.0, n=8), (0.005, 0.022, 0.013)),
-                    at=(x * 0.022, 0.115, 0.05), of=other)  # fmt: skip
-            m.add(tube(bent([(0, 0.026, 0.08), (0.01, 0.012, 0.13), (0.05, 0.006, 0.16),
-                (0.02, 0.006, 0.21)], 0.04, n=4), 0.003, n=5), of=third)  # fmt: skip
+                    at=(x * 0.022, 0.115, 0.05), of=other)
+            m.tube(bent([(0, 0.026, 0.08), (0.01, 0.012, 0.13), (0.05, 0.006, 0.16),
+                (0.02, 0.006, 0.21)], 0.04, n=4), 0.003, n=5, of=third)
         case 11:
             m.name = "puzzle_box"
-            m.add(bevelled((-0.15, 0, -0.11), (0.15, 0.05, 0.11), 0.001), of=own)
-            m.add(slab((-0.14, 0.05, -0.1), (0.14, 0.0506, 0.1)), of=other)
-            m.add(slab((-0.09, 0.0507, -0.03), (0.09, 0.0511, 0.03)), of=third)
+            m.box(0.3, 0.05, 0.22, 0.001, of=own)
+            m.box(0.28, (0.05, 0.0506), 0.2, of=other)
+            m.box(0.18, (0.0507, 0.0511), 0.06, of=third)
             if m.chance(0.5):
-                m.add(bevelled((-0.13, 0.0513, -0.095), (0.13, 0.09, 0.095), 0.001), of=third)
+                m.box(0.26, (0.0513, 0.09), 0.19, 0.001, of=third)
         case 12:
             m.name = "dinosaur"
             with m.of(own):
-                m.add(rounded((-0.03, 0.04, -0.05), (0.03, 0.1, 0.05), 0.028, n=2))
-                m.add(tube(bent([(0, 0.075, 0.04), (0, 0.1, 0.09), (0, 0.19, 0.1), (0, 0.2, 0.14)],
-                    0.04, n=4), 0.022, n=8, end=0.014))  # fmt: skip
-                m.add(tube(bent([(0, 0.075, -0.04), (0, 0.05, -0.1), (0, 0.02, -0.17)], 0.05, n=4),
-                    0.024, n=8, end=0.004))  # fmt: skip
+                m.rounded(0.06, (0.04, 0.1), 0.1, 0.028)
+                m.tube(bent([(0, 0.075, 0.04), (0, 0.1, 0.09), (0, 0.19, 0.1), (0, 0.2, 0.14)],
+                    0.04, n=4), 0.022, end=0.014)
+                m.tube(bent([(0, 0.075, -0.04), (0, 0.05, -0.1), (0, 0.02, -0.17)], 0.05, n=4),
+                    0.024, end=0.004)
                 for x, z in product((-0.02, 0.02), (-0.033, 0.033)):
-                    m.add(tube([(x * 1.2, 0, z), (x, 0.06, z)], 0.011, n=8, end=0.014))
+                    m.tube([(x * 1.2, 0, z), (x, 0.06, z)], 0.011, end=0.014)
                 for k in range(5):
-                    m.add(revolve([(0, 0), (0.01, 0), (0, 0.024)], n=6), at=(0,
-                        0.096 - 0.002 * (k - 2) * (k - 2), -0.04 + 0.02 * k), of=other)  # fmt: skip
+                    m.revolve([(0, 0), (0.01, 0), (0, 0.024)], n=6,
+                        at=(0, 0.096 - 0.002 * (k - 2) * (k - 2), -0.04 + 0.02 * k), of=other)
 
 
 @thing(group="ball")
 def ball(m: Maker) -> None:
     """A ball: plain, of two colours, with rings, with seams."""
     form, r = m.integers(0, 4), m.uniform(0.05, 0.115)
-    own, other = (plain("ball", m.any_colour(), 0.45), plain("ball", m.pick((0.9, 0.9, 0.88),
-        (0.08, 0.08, 0.09), m.any_colour()), 0.45))  # fmt: skip
+    own, other = (plain("ball", m.any_colour(), 0.45), plain("ball",
+        m.pick((0.9, 0.9, 0.88), (0.08, 0.08, 0.09), m.any_colour()), 0.45))
     match form:
         case 0:  # plain
-            m.add(sphere((0, r, 0), r, n=18), of=own)
+            m.sphere((0, r, 0), r, n=18, of=own)
         case 1:
             m.name = "ball_of_two_colours"
-            m.add(revolve(scaled(r, r, [(0, 0), (0.38, 0.08), (0.71, 0.3), (0.93, 0.63), (1, 1),
-                (0, 1)]), n=22), of=own)  # fmt: skip
-            m.add(revolve(scaled(r, r, [(0, 1), (1, 1), (0.93, 1.37), (0.71, 1.7), (0.38, 1.92),
-                (0, 2)]), n=22), of=other)  # fmt: skip
+            m.revolve(scaled(r, r, [(0, 0), (0.38, 0.08), (0.71, 0.3), (0.93, 0.63), (1, 1),
+                (0, 1)]), n=22, of=own)
+            m.revolve(scaled(r, r, [(0, 1), (1, 1), (0.93, 1.37), (0.71, 1.7), (0.38, 1.92),
+                (0, 2)]), n=22, of=other)
         case 2:
             m.name = "ringed_ball"
-            m.add(sphere((0, r, 0), r, n=18), of=own)
+            m.sphere((0, r, 0), r, n=18, of=own)
             for y in (0.62, 1.0, 1.38):
-                m.add(hoop(oval(2 * r * (1 - (1 - y) * (1 - y)) ** 0.5,
-                    2 * r * (1 - (1 - y) * (1 - y)) ** 0.5, n=22), y * r, 0.03 * r, n=5), of=other)  # fmt: skip
+                m.hoop(oval(2 * r * (1 - (1 - y) * (1 - y)) ** 0.5,
+                    2 * r * (1 - (1 - y) * (1 - y)) ** 0.5, n=22), y * r, 0.03 * r, n=5, of=other)
         case 3:
             m.name = "basket_ball"
-            m.add(sphere((0, r, 0), r, n=18), of=own)
+            m.sphere((0, r, 0), r, n=18, of=own)
             for a in (0.0, pi / 2):
-                m.add(hoop(oval(2 * r, 2 * r, n=24), 0.0, 0.012 * r, n=5),
-                    turn=rotation_y(a) @ rotation_z(pi / 2), at=(0, r, 0), of=other)  # fmt: skip
+                m.hoop(oval(2 * r, 2 * r, n=24), 0.0, 0.012 * r, n=5,
+                    turn=rotation_y(a) @ rotation_z(pi / 2), at=(0, r, 0), of=other)

@@ -1,0 +1,234 @@
+"""Vocabulary of solids: one method for each, which builds a solid and adds it to the thing; no effects.
+
+`Maker` inherits these methods. All take the keywords of `Put`. Metres, y up.
+
+    m.box(w, 0.03, d, 0.002, on=h - 0.03)            # a table top with edges cut by 2 mm
+    m.box(0.04, h, 0.04, left=-w / 2, mirrored="x")  # a post at the left, another at the right
+    for x in row(-w / 2, w / 2, 3, gap=0.004):       # three doors side by side
+        m.box(x, h, 0.018, against=d / 2)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TypedDict, Unpack
+
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.house import Material, Surface
+from pbrs_farm.furnishings.things import bodies
+from pbrs_farm.furnishings.things.cloth import bulged
+from pbrs_farm.furnishings.things.outlines import Outline, Profile, Triple
+
+Pair = tuple[float, float]
+Extent = float | Pair
+"""A size, or the two coordinates that a solid reaches from and to."""
+
+
+class Put(TypedDict, total=False):
+    """How a solid is added: the keywords of `Maker.add`."""
+
+    of: Material | None
+    at: Triple | None
+    turn: F64 | None
+    name: str
+    mirrored: str
+
+
+class Shapes:
+    """Methods that build solids; a subclass collects them in `add`."""
+
+    def add(
+        self,
+        solid: Surface,
+        *,
+        of: Material | None = None,
+        at: Triple | None = None,
+        turn: F64 | None = None,
+        name: str = "",
+        mirrored: str = "",
+    ) -> None:
+        """Add a solid to the thing."""
+        raise NotImplementedError
+
+    def box(
+        self,
+        w: Extent,
+        h: Extent,
+        d: Extent,
+        cut: float = 0.0,
+        *,
+        left: float | None = None,
+        x: float = 0.0,
+        on: float = 0.0,
+        against: float | None = None,
+        z: float = 0.0,
+        mirrored: str = "",
+        **put: Unpack[Put],
+    ) -> None:
+        """A box w wide (x), h high (y) and d deep (z).
+
+        Each extent is a size or a pair of coordinates. Sizes extend from `left`, `on` and
+        `against`, or to both sides of the middle x, z. cut: width of the bevel along all edges.
+        mirrored: "x", "z" or "xz" repeats the box on the other side of the origin.
+        """
+        for low, high in _corners((w, h, d), (left, on, against), (x, z), mirrored):
+            self.add(bodies.bevelled(low, high, cut) if cut else bodies.slab(low, high), **put)
+
+    def rounded(
+        self,
+        w: Extent,
+        h: Extent,
+        d: Extent,
+        r: float,
+        *,
+        n: int = 2,
+        left: float | None = None,
+        x: float = 0.0,
+        on: float = 0.0,
+        against: float | None = None,
+        z: float = 0.0,
+        mirrored: str = "",
+        **put: Unpack[Put],
+    ) -> None:
+        """A box as of `box`, its edges round with radius r in 2 n steps: cushions, upholstery."""
+        for low, high in _corners((w, h, d), (left, on, against), (x, z), mirrored):
+            self.add(bodies.rounded(low, high, r, n=n), **put)
+
+    def rod(
+        self,
+        x: Extent,
+        y: Extent,
+        z: Extent,
+        r: float,
+        *,
+        n: int = 8,
+        end: float | None = None,
+        **put: Unpack[Put],
+    ) -> None:
+        """A round bar along an axis: one of x, y, z is the pair that it runs from and to."""
+        starts, ends = zip(*(v if isinstance(v, tuple) else (v, v) for v in (x, y, z)), strict=True)
+        self.tube([starts, ends], r, n=n, end=end, **put)
+
+    def tube(
+        self,
+        path: Sequence[Triple],
+        r: float,
+        *,
+        n: int = 8,
+        end: float | None = None,
+        **put: Unpack[Put],
+    ) -> None:
+        """A round bar along a path; end: its radius there, where it tapers."""
+        self.add(bodies.tube(path, r, n=n, end=end), **put)
+
+    def square_tube(self, a: Triple, b: Triple, w: float, d: float, **put: Unpack[Put]) -> None:
+        """A straight bar of rectangular section from a to b."""
+        self.add(bodies.square_tube(a, b, w, d), **put)
+
+    def revolve(self, profile: Profile | F64, *, n: int = 16, **put: Unpack[Put]) -> None:
+        """A turned solid: a (radius, height) profile about the vertical, n sides."""
+        self.add(bodies.revolve(profile, n=n), **put)
+
+    def vessel(self, outside: Profile, wall_m: float, *, n: int = 16, **put: Unpack[Put]) -> None:
+        """A turned vessel, open at the top, from its outer profile."""
+        self.add(bodies.vessel(outside, wall_m, n=n), **put)
+
+    def cylinder(
+        self, r: float, low: float, high: float, *, n: int = 16, **put: Unpack[Put]
+    ) -> None:
+        """An upright cylinder between two heights."""
+        self.add(bodies.cylinder(r, low, high, n=n), **put)
+
+    def frustum(self, low: Pair, high: Pair, *, n: int = 16, **put: Unpack[Put]) -> None:
+        """A cone without its tip: (radius, height) of both ends."""
+        self.add(bodies.frustum(low, high, n=n), **put)
+
+    def sphere(self, centre: Triple, radius: float, *, n: int = 16, **put: Unpack[Put]) -> None:
+        """A ball, n sides round."""
+        self.add(bodies.sphere(centre, radius, n=n), **put)
+
+    def loft(
+        self, rings: Sequence[tuple[Outline, float]], *, sharp: float = 50.0, **put: Unpack[Put]
+    ) -> None:
+        """A solid through outlines at heights; sharp: degrees of turning that make an edge."""
+        self.add(bodies.loft(rings, sharp=sharp), **put)
+
+    def hoop(self, outline: Outline, y: float, r: float, *, n: int = 6, **put: Unpack[Put]) -> None:
+        """A ring of round section along an outline at height y."""
+        self.add(bodies.hoop(outline, y, r, n=n), **put)
+
+    def board(
+        self,
+        w: float,
+        d: float,
+        low: float,
+        high: float,
+        corner: float = 0.0,
+        edge: float = 0.003,
+        *,
+        x: float = 0.0,
+        z: float = 0.0,
+        n: int = 4,
+        **put: Unpack[Put],
+    ) -> None:
+        """A board between two heights, round corners in plan, edges cut: table tops, seats, lids."""
+        self.add(bodies.board(w, d, low, high, corner, edge, x=x, z=z, n=n), **put)
+
+    def disc(
+        self,
+        w: float,
+        d: float,
+        low: float,
+        high: float,
+        edge: float = 0.003,
+        *,
+        x: float = 0.0,
+        z: float = 0.0,
+        n: int = 32,
+        power: float = 2.0,
+        **put: Unpack[Put],
+    ) -> None:
+        """A round or oval board between two heights, its edges cut."""
+        self.add(bodies.disc(w, d, low, high, edge, x=x, z=z, n=n, power=power), **put)
+
+    def bulged(
+        self,
+        size: Triple,
+        *,
+        n: int = 12,
+        edge: float = 0.0,
+        bulge: float = 2.2,
+        **put: Unpack[Put],
+    ) -> None:
+        """A cushion (width, thickness, depth) about the origin, as of cloth.py."""
+        self.add(bulged(size, n=n, edge=edge, bulge=bulge), **put)
+
+
+def row(low: float, high: float, n: int, gap: float = 0.0) -> Iterator[Pair]:
+    """Extents of n equal parts side by side between two coordinates, `gap` metres apart."""
+    step = (high - low) / n
+    for k in range(n):
+        yield low + k * step + gap / 2, low + (k + 1) * step - gap / 2
+
+
+def _corners(
+    sizes: tuple[Extent, Extent, Extent],
+    starts: tuple[float | None, float, float | None],
+    middles: Pair,
+    mirrored: str,
+) -> Iterator[tuple[Triple, Triple]]:
+    """Lower and upper corner of a box and of its mirror images."""
+    x = _span(sizes[0], starts[0], middles[0])
+    y = _span(sizes[1], starts[1], 0.0)
+    z = _span(sizes[2], starts[2], middles[1])
+    for a, b in (x, (-x[1], -x[0])) if "x" in mirrored else (x,):
+        for c, d in (z, (-z[1], -z[0])) if "z" in mirrored else (z,):
+            yield (a, y[0], c), (b, y[1], d)
+
+
+def _span(extent: Extent, start: float | None, middle: float) -> Pair:
+    if isinstance(extent, tuple):
+        return extent
+    if start is not None:
+        return (start, start + extent)
+    return (middle - extent / 2, middle + extent / 2)
