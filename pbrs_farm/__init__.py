@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from pbrs_farm.scene.pictures import film as film
     from pbrs_farm.scene.pictures import render as render
     from pbrs_farm.scene.pictures import render_homes as render_homes
+    from pbrs_farm.scene.things import thing as thing
     from pbrs_farm.views.open_views import open_views as open
     from pbrs_farm.views.packing.pack_shards import pack as pack
     from pbrs_farm.views.packing.packing_plan import Packing as Packing
@@ -70,6 +71,7 @@ _PUBLIC: Final = {
     "open": "pbrs_farm.views.open_views:open_views",
     "render": "pbrs_farm.scene.pictures:render",
     "render_homes": "pbrs_farm.scene.pictures:render_homes",
+    "thing": "pbrs_farm.scene.things:thing",
 }
 
 __all__ = [
@@ -98,6 +100,7 @@ __all__ = [
     "pack",
     "render",
     "render_homes",
+    "thing",
 ]
 
 

@@ -121,7 +121,12 @@ def family_numbers() -> dict[str, tuple[str, int]]:
 
 def family_shape(piece: Piece) -> Shape:
     """The shape of a variation, as large as it says."""
-    return _lit(_sized(_drawn(piece), piece), piece)
+    return fitted_to_size(_drawn(piece), piece)
+
+
+def fitted_to_size(shape: Shape, piece: Piece) -> Shape:
+    """The shape scaled to the size of its piece; a lamp has its light."""
+    return _lit(_sized(shape, piece), piece)
 
 
 def drawn_size(piece: Piece) -> tuple[float, float, float]:

@@ -26,7 +26,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from itertools import product
 from types import ModuleType
-from typing import Any, Concatenate, Generic, ParamSpec, TypeVar, overload
+from typing import Any, Concatenate, Generic, ParamSpec, TypeVar
 
 import numpy as np
 
@@ -46,7 +46,8 @@ from pbrs_farm.furnishings.things.assembly import (
     transformed,
 )
 from pbrs_farm.furnishings.things.materials import any_colour, metal, plain
-from pbrs_farm.furnishings.things.shapes import Shapes, Triple
+from pbrs_farm.furnishings.things.outlines import Triple
+from pbrs_farm.furnishings.things.shapes import Shapes
 from pbrs_farm.home.masses import mass_kg
 
 P = ParamSpec("P")
@@ -273,20 +274,25 @@ class Thing(Generic[P]):
 
 @dataclass(frozen=True, slots=True)
 class Family:
-    """Furniture of the generated catalogue: as many variations of one thing."""
+    """Furniture of the generated catalogue: as many variations of one thing.
+
+    A set (a kitchen) shares values between its families. They follow the size in the arguments of
+    `draw_size`, `draw` and `build`; the drawn parameters are the last argument of `build`.
+    """
 
     name: str
-    called: str  # what its pieces are named after
+    called: str  # name of its pieces
     group: str
     nyu40: int
     place: Place
     variants: int
-    draw_size: Callable[..., Size]  # (maker, values of the set if it is of one)
-    build: Callable[..., None]  # (maker, size, values of the set if it is of one)
+    draw_size: Callable[..., Size]
+    build: Callable[..., None]
     of_set: Callable[[Maker], Any] | None = None
+    draw: Callable[..., Any] | None = None  # draws the parameters, a dataclass
 
     def shared(self, rng: np.random.Generator, style: Style) -> tuple[Any, ...]:
-        """What all families of its set have in common, as further arguments: () without a set."""
+        """The values that all families of its set share, as arguments; () without a set."""
         return () if self.of_set is None else (self.of_set(Maker(rng, style)),)
 
     def size(self, rng: np.random.Generator, style: Style, *shared: Any) -> Size:
@@ -296,10 +302,24 @@ class Family:
         )
         return width, depth, height
 
-    def make(self, rng: np.random.Generator, style: Style, size: Size, *shared: Any) -> Model:
-        """A variation of that size; BadInput where it has no solids."""
+    def make(
+        self,
+        rng: np.random.Generator,
+        style: Style,
+        size: Size,
+        *shared: Any,
+        change: Callable[[Any], Any] | None = None,
+    ) -> Model:
+        """A variation of that size; BadInput where it has no solids.
+
+        change: returns the parameters to build from, given those that were drawn.
+        """
         m = Maker(rng, style)
-        self.build(m, size, *shared)
+        if self.draw is None:
+            self.build(m, size, *shared)
+        else:
+            drawn = self.draw(m, size, *shared)
+            self.build(m, size, *shared, change(drawn) if change else drawn)
         return put_together(m, self)
 
 
@@ -331,27 +351,6 @@ def thing(
     return described
 
 
-@overload
-def family(
-    *,
-    group: str,
-    variants: int,
-    size: Callable[[Maker], Size],
-    nyu40: int = ...,
-    place: Place = ...,
-    called: str = ...,
-) -> Callable[[Callable[[Maker, Size], None]], Family]: ...
-@overload
-def family(
-    *,
-    group: str,
-    variants: int,
-    size: Callable[[Maker, S], Size],
-    of_set: Callable[[Maker], S],
-    nyu40: int = ...,
-    place: Place = ...,
-    called: str = ...,
-) -> Callable[[Callable[[Maker, Size, S], None]], Family]: ...
 def family(
     *,
     group: str,
@@ -361,18 +360,22 @@ def family(
     place: Place = Place.SURFACE,
     called: str = "",
     of_set: Callable[[Maker], Any] | None = None,
+    draw: Callable[..., Any] | None = None,
 ) -> Callable[[Callable[..., None]], Family]:
     """The decorator of a function that describes a family of the generated catalogue.
 
-    variants: how many there are. size: draws width, depth and height of one. called: what its
-    pieces are named after, the function's name unless given. of_set: draws what families have in
-    common that are sold together, a kitchen's units; those of one number share what it returns,
-    and `size` and the function take it as their last argument.
+    variants: how many there are. size: draws width, depth and height of one. called: the name of
+    its pieces, by default the function's name. of_set: draws what families of a set (the units of
+    a kitchen) share; those of one number get equal values, as the last argument of `size` and
+    after the size in `draw` and the function. draw: draws the parameters, a frozen dataclass
+    (parameters.py), which the function takes as its last argument; users may choose them.
     """
 
     def described(build: Callable[..., None]) -> Family:
         name = build.__name__
-        return Family(name, called or name, group, nyu40, place, variants, size, build, of_set)
+        return Family(
+            name, called or name, group, nyu40, place, variants, size, build, of_set, draw
+        )
 
     return described
 

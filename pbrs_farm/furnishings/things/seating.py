@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from itertools import product
+from typing import Annotated
 
 from numpy import cos, pi, sin
 
@@ -24,7 +27,9 @@ from pbrs_farm.furnishings.things.materials import (
     glossy,
     plain,
 )
-from pbrs_farm.furnishings.things.outlines import bent, gathered, oval, rect, rings
+from pbrs_farm.furnishings.things.outlines import bent, gathered, oval, rect, rings, spaced
+from pbrs_farm.furnishings.things.parameters import Choice, Range
+from pbrs_farm.furnishings.things.shapes import Pair, on_side, row
 
 # fmt: off
 
@@ -39,7 +44,7 @@ def ottoman(m: Maker) -> None:
         m.rounded(w - 0.012, (low, h - 0.08), d - 0.012, 0.02, n=1)
         m.bulged((w, 0.13, d), n=10, edge=0.7, bulge=5.0, at=(0.0, h - 0.065, 0.0))
         if form == 1:
-            skirt(m, w, d, low + 0.06)
+            skirt(m, w, d, low + 0.06, (m.uniform(0.1, 0.16), m.pick(0.003, 0.006, 0.009)))
         if m.chance(0.4):
             for x, z in product((-0.22, 0.0, 0.22), (-0.2, 0.2)):
                 m.sphere((x * w, h - 0.004, z * d), 0.011, n=6)
@@ -85,99 +90,142 @@ def seat_legs(m: Maker, kind: str, w: float, d: float, high: float, material: Ma
         leg(m, kind, (0.0, 0.0), (0.0, 0.0), high + 0.002, 0.05, material)
 
 
-def skirt(m: Maker, w: float, d: float, high: float) -> None:
-    """Cloth round what is w by d, from `high` almost down to the floor, in folds that open downwards."""
-    fold, deep = m.uniform(0.1, 0.16), m.pick(0.003, 0.006, 0.009)
-    m.loft([(gathered(w + 0.012, d + 0.012, fold, deep), 0.012),
-        (gathered(w + 0.012, d + 0.012, fold, 0.3 * deep), high)], sharp=80.0)
+def skirt(m: Maker, w: float, d: float, high: float, fold: Sequence[float]) -> None:
+    """Cloth round a seat w by d, from `high` almost down to the floor, its folds wider below.
+
+    fold: length and depth of a fold.
+    """
+    length, deep = fold
+    m.loft([(gathered(w + 0.012, d + 0.012, length, deep), 0.012),
+        (gathered(w + 0.012, d + 0.012, length, 0.3 * deep), high)], sharp=80.0)
 
 
-@family(group="sofa", nyu40=SOFA, place=Place.FLOOR, variants=56,
+@dataclass(frozen=True, slots=True)
+class Sofa:
+    """Parameters of a sofa."""
+
+    seats: Annotated[int, Range(1, 5)]
+    arms: Annotated[str, Choice("box", "round", "slope", "thin", "low", "wood")]
+    back: Annotated[str, Choice("cushions", "firm", "tufted", "one")]  # one: a single seat cushion, a plain back
+    cloth: Material
+    feet: Annotated[str, Choice("tapered", "square", "round", "sled", "plinth", "bun")]
+    feet_material: Material
+    foot_m: Annotated[float, Range(0.03, 0.3)]
+    seat_m: Annotated[float, Range(0.3, 0.6)]  # height
+    arm_width_m: Annotated[float, Range(0.06, 0.4)]
+    arm_m: Annotated[float, Range(0.45, 0.9)]  # height
+    back_m: Annotated[float, Range(0.08, 0.4)]  # thickness
+    seat_edges: tuple[Annotated[float, Range(0.01, 0.1)], ...]  # radius of each seat cushion
+    cushion_m: Annotated[float, Range(0.08, 0.3)]  # thickness of the back cushions
+    skirt: bool  # of cloth, round feet that are not tall
+    skirt_fold: tuple[Annotated[float, Range(0.001, 0.3)], ...]  # length and depth of its folds
+    throw: Annotated[str, Choice("none", "left", "right")]  # over an arm
+    throw_cloth: Material
+
+
+def draw_sofa(m: Maker, size: Size) -> Sofa:
+    """Draw a sofa's parameters."""
+    cloth = m.cloth()
+    feet = m.pick("tapered", "square", "round", "sled", "plinth", "bun")
+    feet_material = m.pick(m.timber, m.dark_timber, m.metal, BLACK_STEEL)
+    foot = 0.06 if feet in ("plinth", "bun") else m.pick(0.1, 0.14, 0.17)
+    seat = m.uniform(0.4, 0.45)
+    arms = m.pick("box", "box", "round", "slope", "thin", "low", "wood")
+    arm_width = 0.1 if arms in ("thin", "wood") else m.uniform(0.15, 0.24)
+    arm = seat + (0.1 if arms == "low" else m.uniform(0.16, 0.24))
+    n = 2 if size[0] < 1.8 else m.pick(2, 3, 3)
+    style = m.pick("cushions", "cushions", "firm", "tufted", "one")
+    back = m.uniform(0.14, 0.2)
+    edges = tuple(m.uniform(0.035, 0.06) for _ in range(1 if style == "one" else n))
+    cushion = m.uniform(0.15, 0.2) if style == "cushions" else 0.17
+    has_skirt, fold = False, (0.13, 0.006)
+    if arms != "wood" and feet in ("plinth", "bun", "square") and (has_skirt := m.chance(0.5)):
+        fold = (m.uniform(0.1, 0.16), m.pick(0.003, 0.006, 0.009))
+    throw, throw_colour = "none", m.style.accent
+    if arms in ("box", "round", "low") and m.chance(0.2):
+        throw = m.pick("left", "right")
+        throw_colour = m.style.accent if m.chance(0.4) else m.textile()
+    return Sofa(n, arms, style, cloth, feet, feet_material, foot, seat, arm_width, arm, back, edges,
+        cushion, has_skirt, fold, throw, plain("fabric throw", throw_colour, 0.95))
+
+
+@family(group="sofa", nyu40=SOFA, place=Place.FLOOR, variants=56, draw=draw_sofa,
     size=lambda m: (m.pick(1.45, 1.6, 1.7, 1.85, 1.95, 2.1, 2.2), m.uniform(0.82, 0.98),
     m.uniform(0.74, 0.88)))
-def sofa(m: Maker, size: Size) -> None:
+def sofa(m: Maker, size: Size, p: Sofa) -> None:
     """A sofa of two or three seats.
 
     Arms, backs, cushions and feet of many kinds; some have a throw over an arm.
     """
-    w, d, h = size
-    hw, hd = w / 2, d / 2
-    material = m.cloth()
-    feet = m.pick("tapered", "square", "round", "sled", "plinth", "bun")
-    feet_stuff = m.pick(m.timber, m.dark_timber, m.metal, BLACK_STEEL)
-    low, seat = 0.06 if feet in ("plinth", "bun") else m.pick(0.1, 0.14, 0.17), m.uniform(0.4, 0.45)
-    arm = m.pick("box", "box", "round", "slope", "thin", "low", "wood")
-    aw = 0.1 if arm in ("thin", "wood") else m.uniform(0.15, 0.24)
-    ah = seat + (0.1 if arm == "low" else m.uniform(0.16, 0.24))
-    n = 2 if w < 1.8 else m.pick(2, 3, 3)
-    style = m.pick("cushions", "cushions", "firm", "tufted", "one")
-    base = low + 0.12
-    seat_legs(m, feet, w, d, low, feet_stuff)
-    x0, x1, back = -hw + aw, hw - aw, m.uniform(0.14, 0.2)
-    with m.of(material):
-        m.rounded(w - 2 * (0.0 if arm != "wood" else 0.02), (low, base + 0.04),
-            (-hd + 0.01, hd - 0.015), 0.02, n=1)
-        # The back.
-        m.rounded((x0 - 0.02, x1 + 0.02), (low, h - (0.0 if style in ("firm", "one") else 0.07)),
-            back, 0.05, n=1, against=-hd)
-        # Seat cushions.
-        n_seats = 1 if style == "one" else n
-        for k in range(n_seats):
-            m.rounded((x0 + (x1 - x0) * k / n_seats + 0.003,
-                x0 + (x1 - x0) * (k + 1) / n_seats - 0.003), (base + 0.03, seat),
-                (-hd + back - 0.02, hd), m.uniform(0.035, 0.06), n=2 if n_seats < 3 else 1)
-        # Back cushions.
-        match style:
-            case "cushions":
-                t, bh = m.uniform(0.15, 0.2), h - seat + 0.02
-                for k in range(n):
-                    m.bulged(((x1 - x0) / n - 0.01, t, bh), n=7, edge=0.45, bulge=3.4,
-                        turn=rotation_x(pi / 2 - 0.16), at=(x0 + (x1 - x0) * (k + 0.5) / n,
-                        seat + bh / 2 - 0.02, -hd + back + t * 0.42))
-            case "firm":
-                for k in range(n):
-                    m.rounded((x0 + (x1 - x0) * k / n + 0.003,
-                        x0 + (x1 - x0) * (k + 1) / n - 0.003), (seat - 0.01, h - 0.015), 0.12, 0.04,
-                        against=-hd + back - 0.03)
-            case "tufted":
-                m.rounded((x0, x1), (seat - 0.01, h), 0.09, 0.04, against=-hd + back - 0.03)
-                for i, k in product(range(2), range(3 * n)):
-                    m.sphere((x0 + (x1 - x0) * (k + 0.5 + 0.25 * (i - 0.5)) / (3 * n),
-                        seat + (h - seat) * (0.38 + 0.32 * i), -hd + back + 0.062), 0.011, n=5)
-        # Arms.
+    w, d, _h = size
+    hw, hd, low, base = w / 2, d / 2, p.foot_m, p.foot_m + 0.12
+    seat_legs(m, p.feet, w, d, low, p.feet_material)
+    inset = 0.02 if p.arms == "wood" else 0.0
+    with m.of(p.cloth):
+        m.rounded(w - 2 * inset, (low, base + 0.04), (-hd + 0.01, hd - 0.015), 0.02, n=1)
+        sofa_cushions(m, size, p, base)
         for s in (-1.0, 1.0):
-            a, b = min(s * hw, s * (hw - aw)), max(s * hw, s * (hw - aw))
-            match arm:
-                case "box" | "thin" | "low":
-                    m.rounded(
-                        (a, b), (low, ah), (-hd + 0.005, hd - 0.01), 0.05 if arm == "low" else 0.03
-                    )
-                case "round":
-                    m.rounded(
-                        (a + 0.02, b - 0.02), (low, ah - 0.04), (-hd + 0.01, hd - 0.02), 0.02, n=1
-                    )
-                    m.rod((a + b) / 2, ah - aw * 0.5, (-hd + 0.005, hd - 0.01), aw * 0.5, n=16)
-                case "slope":
-                    m.loft([(rect(aw - 0.01, d - 0.02, 0.02, x=(a + b) / 2), low),
-                        (rect(aw, d - 0.01, 0.025, x=(a + b) / 2), low + 0.05),
-                        (rect(aw, d - 0.01, 0.025, x=(a + b) / 2), seat),
-                        (rect(aw, d * 0.75, 0.025, x=(a + b) / 2, z=-d * 0.12), ah - 0.02),
-                        (rect(aw - 0.03, d * 0.7, 0.02, x=(a + b) / 2, z=-d * 0.12), ah)])
-                case "wood":
-                    m.box((a + 0.01, b - 0.01), (ah - 0.035, ah), d - 0.04, 0.006, of=m.timber)
-                    for z in (-hd + 0.06, hd - 0.1):
-                        m.box(0.04, (low * 0.5, ah - 0.034), 0.045, 0.004, x=a / 2 + b / 2,
-                            against=z, of=m.timber)
-    # A skirt hides the feet, and what is under it.
-    if arm != "wood" and feet in ("plinth", "bun", "square") and m.chance(0.5):
-        with m.of(material):
-            skirt(m, w, d, base + 0.03)
-    # A throw over one arm.
-    if arm in ("box", "round", "low") and m.chance(0.2):
-        s, other = (m.pick(-1.0, 1.0), plain("fabric throw",
-            m.style.accent if m.chance(0.4) else m.textile(), 0.95))
-        m.rounded((s * (hw - aw / 2) - aw / 2 - 0.008, s * (hw - aw / 2) + aw / 2 + 0.008), 0.208,
-            0.38, 0.03, on=ah - 0.2, z=0.09, of=other)
+            sofa_arm(m, size, p, on_side(s, hw - p.arm_width_m, hw))
+        if p.skirt:
+            skirt(m, w, d, base + 0.03, p.skirt_fold)
+    if p.throw != "none":
+        x = (hw - p.arm_width_m / 2) * (1 if p.throw == "right" else -1)
+        m.rounded(p.arm_width_m + 0.016, 0.208, 0.38, 0.03, x=x, on=p.arm_m - 0.2, z=0.09,
+            of=p.throw_cloth)
+
+
+def sofa_cushions(m: Maker, size: Size, p: Sofa, base: float) -> None:
+    """The back, and the cushions of seats and back, between the arms."""
+    w, d, h = size
+    hd, n, seat = d / 2, p.seats, p.seat_m
+    x, back = (-w / 2 + p.arm_width_m, w / 2 - p.arm_width_m), -hd + p.back_m
+    wide = x[1] - x[0]
+    top = h - (0.0 if p.back in ("firm", "one") else 0.07)
+    m.rounded((x[0] - 0.02, x[1] + 0.02), (p.foot_m, top), p.back_m, 0.05, n=1, against=-hd)
+    n_seats = 1 if p.back == "one" else n
+    for k, part in enumerate(row(*x, n_seats, gap=0.006)):
+        m.rounded(part, (base + 0.03, seat), (back - 0.02, hd), p.seat_edges[k % len(p.seat_edges)],
+            n=2 if n_seats < 3 else 1)
+    match p.back:
+        case "cushions":
+            t, tall = p.cushion_m, h - seat + 0.02
+            for k in range(n):
+                m.bulged((wide / n - 0.01, t, tall), n=7, edge=0.45, bulge=3.4,
+                    turn=rotation_x(pi / 2 - 0.16), at=(x[0] + wide * (k + 0.5) / n,
+                    seat + tall / 2 - 0.02, back + t * 0.42))
+        case "firm":
+            for part in row(*x, n, gap=0.006):
+                m.rounded(part, (seat - 0.01, h - 0.015), 0.12, 0.04, against=back - 0.03)
+        case "tufted":
+            m.rounded(x, (seat - 0.01, h), 0.09, 0.04, against=back - 0.03)
+            for i, k in product(range(2), range(3 * n)):
+                m.sphere((x[0] + wide * (k + 0.5 + 0.25 * (i - 0.5)) / (3 * n),
+                    seat + (h - seat) * (0.38 + 0.32 * i), back + 0.062), 0.011, n=5)
+
+
+def sofa_arm(m: Maker, size: Size, p: Sofa, x: Pair) -> None:
+    """An arm between two x."""
+    _w, d, _h = size
+    hd, low, top, wide = d / 2, p.foot_m, p.arm_m, p.arm_width_m
+    middle = (x[0] + x[1]) / 2
+    match p.arms:
+        case "box" | "thin" | "low":
+            r = 0.05 if p.arms == "low" else 0.03
+            m.rounded(x, (low, top), (-hd + 0.005, hd - 0.01), r)
+        case "round":
+            m.rounded((x[0] + 0.02, x[1] - 0.02), (low, top - 0.04), (-hd + 0.01, hd - 0.02), 0.02,
+                n=1)
+            m.rod(middle, top - wide * 0.5, (-hd + 0.005, hd - 0.01), wide * 0.5, n=16)
+        case "slope":
+            upright = rect(wide, d - 0.01, 0.025, x=middle)
+            m.loft([(rect(wide - 0.01, d - 0.02, 0.02, x=middle), low), (upright, low + 0.05),
+                (upright, p.seat_m), (rect(wide, d * 0.75, 0.025, x=middle, z=-d * 0.12), top - 0.02),
+                (rect(wide - 0.03, d * 0.7, 0.02, x=middle, z=-d * 0.12), top)])
+        case "wood":
+            with m.of(m.timber):
+                m.box((x[0] + 0.01, x[1] - 0.01), (top - 0.035, top), d - 0.04, 0.006)
+                for z in (-hd + 0.06, hd - 0.1):
+                    m.box(0.04, (low * 0.5, top - 0.034), 0.045, 0.004, x=middle, against=z)
 
 
 @family(group="corner_sofa", nyu40=SOFA, place=Place.FLOOR, called="corner_sofa", variants=16,
@@ -303,111 +351,175 @@ def tub_back(m: Maker, w: float, d: float, y: float, low: float, high: float, t:
     m.add(tub(w, d, y, low, high, t))
 
 
-@family(group="chair", nyu40=CHAIR, place=Place.FLOOR, variants=36,
-    size=lambda m: (m.uniform(0.42, 0.5), m.uniform(0.46, 0.54), m.uniform(0.78, 0.98)))
-def chair(m: Maker, size: Size) -> None:
-    """A chair to eat at.
+@dataclass(frozen=True, slots=True)
+class Chair:
+    """Parameters of a chair to eat at."""
 
-    Slats, a ladder, spindles, a panel, a shell, cane, upholstered; many legs.
-    """
-    w, d, h = size
-    hw, hd = w / 2, d / 2
+    back: Annotated[str, Choice("slats", "ladder", "spindles", "panel", "shell", "soft", "cross", "bent")]
+    frame: Material
+    cloth: Material
+    seat_m: Annotated[float, Range(0.35, 0.6)]  # height
+    post_m: Annotated[float, Range(0.02, 0.06)]  # thickness of the legs of a frame
+    padded: bool  # a frame with a cushion on its seat
+    bars: Annotated[int, Range(1, 14)]  # slats, steps of the ladder, or spindles
+    panel: Material
+    stretchers: bool  # bars between the legs of a frame
+    shell: Material
+    legs: Annotated[str, Choice("tapered", "round", "sled")]  # of a shell
+    leg_materials: tuple[Material, ...]  # of a shell's legs, left and right
+    fittings: Material  # the tubes of a bent chair
+    pad: Material  # seat and back of a bent chair
+
+
+def draw_chair(m: Maker, size: Size) -> Chair:
+    """Draw a chair's parameters."""
     seat = m.uniform(0.44, 0.47)
-    form = m.pick("slats", "ladder", "spindles", "panel", "shell", "soft", "cross", "bent")
+    back = m.pick("slats", "ladder", "spindles", "panel", "shell", "soft", "cross", "bent")
     frame = m.pick(
         m.timber, m.timber, m.dark_timber, BLACK_STEEL, WHITE, glossy("paint", m.paint(), 0.4)
     )
     soft = m.cloth()
-    match form:
+    p = Chair(back, frame, soft, seat, 0.033, False, 2 if back == "ladder" else 5, frame, False,
+        soft, "tapered", (m.timber, m.timber), CHROME, soft)
+    match back:
         case "slats" | "ladder" | "panel" | "cross":
-            t, is_padded = m.uniform(0.028, 0.038), m.chance(0.4)
-            with m.of(frame):
-                for s in (-1.0, 1.0):
-                    m.square_tube((s * (hw - t / 2 - 0.01), 0.0, hd - 0.04),
-                        (s * (hw - t / 2 - 0.015), seat - 0.01, hd - 0.045), t, t)
-                    m.square_tube((s * (hw - t / 2 - 0.02), 0.001, -hd + t / 2 + 0.0),
-                        (s * (hw - t / 2 - 0.02), seat, -hd + 0.065), t, t)
-                    m.square_tube((s * (hw - t / 2 - 0.02), seat - 0.02, -hd + 0.065),
-                        (s * (hw - t / 2 - 0.02), h, -hd + t / 2 + 0.001), t, t * 0.9)
-                m.board(w, d - 0.07, seat - 0.022, seat, 0.03, 0.006, z=0.035)
-                for z in (-hd + 0.065, hd - 0.055):
-                    m.box(w - 0.08, 0.059, 0.02, 0.002, on=seat - 0.08, z=z)
-                m.box(0.02, 0.059, (-hd + 0.08, hd - 0.06), 0.002, left=0.03 - w / 2,
-                    on=seat - 0.08, mirrored="x")
-                # What is between the posts of the back, which lean: a frame of its own.
-                up, lean = h - seat, 0.045 / (h - seat)
-                with m.moved(turn=rotation_x(-lean), at=(0.0, seat, -hd + 0.065)):
-                    m.box(w - 0.07, 0.07, 0.022, 0.004, on=up - 0.075)
-                    match form:
-                        case "slats":
-                            n = m.integers(3, 7)
-                            for k in range(n):
-                                m.box(0.024, (0.09, up - 0.07), 0.012, 0.002,
-                                    x=(w - 0.1) * (k + 0.5) / n - w / 2 + 0.05)
-                            m.box(w - 0.07, (0.06, 0.095), 0.02, 0.003)
-                        case "ladder":
-                            n = m.integers(1, 4)
-                            for k in range(n):
-                                m.box(w - 0.07, 0.05, 0.016, 0.003, on=up * (0.2 + 0.55 * k / n))
-                        case "panel":
-                            m.rounded(w - 0.07, (up * 0.16, up - 0.07), 0.024, 0.008, n=1,
-                                of=m.pick(frame, soft, soft, WICKER))
-                        case "cross":
-                            for s in (-1.0, 1.0):
-                                m.square_tube((s * (hw - 0.05), 0.05, 0.0),
-                                    (-s * (hw - 0.05), up - 0.06, 0.0), 0.028, 0.014)
-            if is_padded:
-                m.bulged((w - 0.05, 0.05, d - 0.12), n=6, edge=0.5, bulge=5.0,
-                    at=(0.0, seat + 0.016, 0.03), of=soft)
-            if m.chance(0.4):
-                for s in (-1.0, 1.0):
-                    m.square_tube((s * (hw - 0.03), 0.16, hd - 0.045),
-                        (s * (hw - 0.035), 0.16, -hd + 0.035), 0.018, 0.022, of=frame)
+            p = replace(p, post_m=m.uniform(0.028, 0.038), padded=m.chance(0.4))
+            if back == "slats":
+                p = replace(p, bars=m.integers(3, 7))
+            elif back == "ladder":
+                p = replace(p, bars=m.integers(1, 4))
+            elif back == "panel":
+                p = replace(p, panel=m.pick(frame, soft, soft, WICKER))
+            return replace(p, stretchers=m.chance(0.4))
         case "spindles":
-            with m.of(frame):
-                m.loft(rings(oval, [(w - 0.01, d - 0.07, seat - 0.03), (w, d - 0.06, seat - 0.02),
-                    (w, d - 0.06, seat - 0.006), (w - 0.02, d - 0.08, seat)], z=0.03, power=2.6))
-                four_legs(m, "tapered", w, d - 0.04, seat - 0.02, 0.034, 0.1, 0.075, frame)
-                for z in (-0.12, 0.14):
-                    m.rod((-hw + 0.07, hw - 0.07), 0.2, z, 0.008, n=6)
-                n = m.integers(5, 9)
-                for k in range(n):
-                    t = -1 + 2 * k / (n - 1)
-                    m.tube([(t * 0.36 * w, seat - 0.015, -hd + 0.09 + 0.05 * t * t),
-                        (t * 0.44 * w, h - 0.03 - 0.07 * t * t, -hd + 0.015 + 0.04 * t * t)], 0.006,
-                        n=6)
-                m.tube(bent([(-0.46 * w, seat - 0.01, -hd + 0.15),
-                    (-0.5 * w + 0.012, h - 0.12, -hd + 0.06), (-0.3 * w, h - 0.012, -hd + 0.015),
-                    (0.3 * w, h - 0.012, -hd + 0.015), (0.5 * w - 0.012, h - 0.12, -hd + 0.06),
-                    (0.46 * w, seat - 0.01, -hd + 0.15)], 0.1, n=4), 0.012)
+            return replace(p, bars=m.integers(5, 9))
         case "shell" | "soft":
-            coat = (soft if form == "soft" else glossy("shell",
-                m.pick((0.92, 0.92, 0.9), (0.1, 0.1, 0.1), m.any_colour(), m.textile()), 0.35))
+            if back == "shell":
+                colour = m.pick((0.92, 0.92, 0.9), (0.1, 0.1, 0.1), m.any_colour(), m.textile())
+                p = replace(p, shell=glossy("shell", colour, 0.35))
             if m.chance(0.7):
-                four_legs(m, m.pick("tapered", "round"), w, d, seat - 0.02, 0.032, 0.13, 0.1,
-                    m.pick(m.timber, m.timber, BLACK_STEEL, CHROME))
-            else:
-                for x in (-hw + 0.05, hw - 0.05):
-                    m.tube(bent([(x * 0.8, seat - 0.03, -hd + 0.1), (x, 0.008, -hd + 0.04),
-                        (x, 0.008, hd - 0.03), (x * 0.8, seat - 0.03, hd - 0.12)], 0.03, n=3),
-                        0.008, of=m.pick(CHROME, BLACK_STEEL, STEEL))
-            with m.of(coat):
-                thick = 0.012 if form == "shell" else 0.05
-                m.add(chair_shell(w, d, seat, h, thick))
-        case "bent":
+                legs = m.pick("tapered", "round")
+                material = m.pick(m.timber, m.timber, BLACK_STEEL, CHROME)
+                return replace(p, legs=legs, leg_materials=(material, material))
+            tubes = tuple(m.pick(CHROME, BLACK_STEEL, STEEL) for _ in range(2))
+            return replace(p, legs="sled", leg_materials=tubes)
+        case _:
             fittings = m.pick(CHROME, BLACK_STEEL, m.timber)
-            with m.of(fittings):
-                for s in (-1.0, 1.0):
-                    m.tube(bent([(s * (hw - 0.015), h - 0.06, -hd + 0.012),
-                        (s * (hw - 0.015), seat - 0.02, -hd + 0.07),
-                        (s * (hw - 0.015), seat - 0.02, hd - 0.012),
-                        (s * (hw - 0.015), 0.012, hd - 0.06), (s * (hw - 0.015), 0.012,
-                        -hd + 0.05)], 0.06, n=4), 0.012)
-                m.rod((-hw + 0.015, hw - 0.015), 0.012, -hd + 0.05, 0.012)
-            pad = m.pick(soft, WICKER, m.timber)
-            m.rounded(w - 0.04, 0.04, (-hd + 0.08, hd - 0.02), 0.018, n=1, on=seat - 0.03, of=pad)
-            m.rounded(w - 0.04, (h - seat) * 0.62, 0.032, 0.014, n=1, turn=rotation_x(-0.12),
-                at=(0.0, seat + (h - seat) * 0.385, -hd + 0.057), of=pad)
+            return replace(p, fittings=fittings, pad=m.pick(soft, WICKER, m.timber))
+
+
+@family(group="chair", nyu40=CHAIR, place=Place.FLOOR, variants=36, draw=draw_chair,
+    size=lambda m: (m.uniform(0.42, 0.5), m.uniform(0.46, 0.54), m.uniform(0.78, 0.98)))
+def chair(m: Maker, size: Size, p: Chair) -> None:
+    """A chair to eat at.
+
+    Slats, a ladder, spindles, a panel, a shell, cane, upholstered; many legs.
+    """
+    match p.back:
+        case "slats" | "ladder" | "panel" | "cross":
+            framed_chair(m, size, p)
+        case "spindles":
+            with m.of(p.frame):
+                spindle_chair(m, size, p)
+        case "shell" | "soft":
+            shell_chair(m, size, p)
+        case "bent":
+            bent_chair(m, size, p)
+
+
+def framed_chair(m: Maker, size: Size, p: Chair) -> None:
+    """A chair of four posts, those behind leaning back above the seat."""
+    w, d, h = size
+    hw, hd, seat, t = w / 2, d / 2, p.seat_m, p.post_m
+    with m.of(p.frame):
+        for s in (-1.0, 1.0):
+            x = s * (hw - t / 2 - 0.02)
+            m.square_tube((s * (hw - t / 2 - 0.01), 0.0, hd - 0.04),
+                (s * (hw - t / 2 - 0.015), seat - 0.01, hd - 0.045), t, t)
+            m.square_tube((x, 0.001, -hd + t / 2 + 0.0), (x, seat, -hd + 0.065), t, t)
+            m.square_tube((x, seat - 0.02, -hd + 0.065), (x, h, -hd + t / 2 + 0.001), t, t * 0.9)
+        m.board(w, d - 0.07, seat - 0.022, seat, 0.03, 0.006, z=0.035)
+        for z in (-hd + 0.065, hd - 0.055):
+            m.box(w - 0.08, 0.059, 0.02, 0.002, on=seat - 0.08, z=z)
+        m.box(0.02, 0.059, (-hd + 0.08, hd - 0.06), 0.002, left=0.03 - hw, on=seat - 0.08,
+            mirrored="x")
+        with m.moved(turn=rotation_x(-0.045 / (h - seat)), at=(0.0, seat, -hd + 0.065)):
+            chair_back(m, p, w, h - seat)
+    if p.padded:
+        m.bulged((w - 0.05, 0.05, d - 0.12), n=6, edge=0.5, bulge=5.0, at=(0.0, seat + 0.016, 0.03),
+            of=p.cloth)
+    for s in (-1.0, 1.0) if p.stretchers else ():
+        m.square_tube((s * (hw - 0.03), 0.16, hd - 0.045), (s * (hw - 0.035), 0.16, -hd + 0.035),
+            0.018, 0.022, of=p.frame)
+
+
+def chair_back(m: Maker, p: Chair, w: float, up: float) -> None:
+    """The parts between the posts of the back, `up` high, before they lean."""
+    n = p.bars
+    m.box(w - 0.07, 0.07, 0.022, 0.004, on=up - 0.075)
+    match p.back:
+        case "slats":
+            for k in range(n):
+                x = (w - 0.1) * (k + 0.5) / n - w / 2 + 0.05
+                m.box(0.024, (0.09, up - 0.07), 0.012, 0.002, x=x)
+            m.box(w - 0.07, (0.06, 0.095), 0.02, 0.003)
+        case "ladder":
+            for k in range(n):
+                m.box(w - 0.07, 0.05, 0.016, 0.003, on=up * (0.2 + 0.55 * k / n))
+        case "panel":
+            m.rounded(w - 0.07, (up * 0.16, up - 0.07), 0.024, 0.008, n=1, of=p.panel)
+        case "cross":
+            for x in (-w / 2 + 0.05, w / 2 - 0.05):
+                m.square_tube((x, 0.05, 0.0), (-x, up - 0.06, 0.0), 0.028, 0.014)
+
+
+def spindle_chair(m: Maker, size: Size, p: Chair) -> None:
+    """A chair with a shaped seat, thin rods and a bow behind."""
+    w, d, h = size
+    hw, hd, seat = w / 2, d / 2, p.seat_m
+    m.loft(rings(oval, [(w - 0.01, d - 0.07, seat - 0.03), (w, d - 0.06, seat - 0.02),
+        (w, d - 0.06, seat - 0.006), (w - 0.02, d - 0.08, seat)], z=0.03, power=2.6))
+    four_legs(m, "tapered", w, d - 0.04, seat - 0.02, 0.034, 0.1, 0.075, p.frame)
+    for z in (-0.12, 0.14):
+        m.rod((-hw + 0.07, hw - 0.07), 0.2, z, 0.008, n=6)
+    for t in spaced(-1.0, 1.0, p.bars):
+        m.tube([(t * 0.36 * w, seat - 0.015, -hd + 0.09 + 0.05 * t * t),
+            (t * 0.44 * w, h - 0.03 - 0.07 * t * t, -hd + 0.015 + 0.04 * t * t)], 0.006, n=6)
+    m.tube(bent([(-0.46 * w, seat - 0.01, -hd + 0.15), (-0.5 * w + 0.012, h - 0.12, -hd + 0.06),
+        (-0.3 * w, h - 0.012, -hd + 0.015), (0.3 * w, h - 0.012, -hd + 0.015),
+        (0.5 * w - 0.012, h - 0.12, -hd + 0.06), (0.46 * w, seat - 0.01, -hd + 0.15)], 0.1, n=4),
+        0.012)
+
+
+def shell_chair(m: Maker, size: Size, p: Chair) -> None:
+    """A chair whose seat and back are one sheet, padded or not, on legs or two sleds."""
+    w, d, h = size
+    hw, hd, seat = w / 2, d / 2, p.seat_m
+    if p.legs == "sled":
+        for x, material in zip((-hw + 0.05, hw - 0.05), p.leg_materials, strict=True):
+            m.tube(bent([(x * 0.8, seat - 0.03, -hd + 0.1), (x, 0.008, -hd + 0.04),
+                (x, 0.008, hd - 0.03), (x * 0.8, seat - 0.03, hd - 0.12)], 0.03, n=3), 0.008,
+                of=material)
+    else:
+        four_legs(m, p.legs, w, d, seat - 0.02, 0.032, 0.13, 0.1, p.leg_materials[0])
+    is_hard = p.back == "shell"
+    sheet = chair_shell(w, d, seat, h, 0.012 if is_hard else 0.05)
+    m.add(sheet, of=p.shell if is_hard else p.cloth)
+
+
+def bent_chair(m: Maker, size: Size, p: Chair) -> None:
+    """A chair of two bent tubes without hind legs."""
+    w, d, h = size
+    hw, hd, seat = w / 2, d / 2, p.seat_m
+    with m.of(p.fittings):
+        for x in (-hw + 0.015, hw - 0.015):
+            m.tube(bent([(x, h - 0.06, -hd + 0.012), (x, seat - 0.02, -hd + 0.07),
+                (x, seat - 0.02, hd - 0.012), (x, 0.012, hd - 0.06), (x, 0.012, -hd + 0.05)], 0.06,
+                n=4), 0.012)
+        m.rod((-hw + 0.015, hw - 0.015), 0.012, -hd + 0.05, 0.012)
+    m.rounded(w - 0.04, 0.04, (-hd + 0.08, hd - 0.02), 0.018, n=1, on=seat - 0.03, of=p.pad)
+    m.rounded(w - 0.04, (h - seat) * 0.62, 0.032, 0.014, n=1, turn=rotation_x(-0.12),
+        at=(0.0, seat + (h - seat) * 0.385, -hd + 0.057), of=p.pad)
 
 
 @family(group="stool", nyu40=CHAIR, place=Place.FLOOR, called="stool", variants=20,

@@ -24,13 +24,18 @@ Extent = float | Pair
 """A size, or the two coordinates that a solid reaches from and to."""
 
 
-class Put(TypedDict, total=False):
-    """How a solid is added: the keywords of `Maker.add`."""
+class PutBox(TypedDict, total=False):
+    """How a box is added: keywords of `Maker.add`."""
 
     of: Material | None
     at: Triple | None
     turn: F64 | None
     name: str
+
+
+class Put(PutBox, total=False):
+    """How any other solid is added: the keywords of `Maker.add`."""
+
     mirrored: str
 
 
@@ -63,7 +68,7 @@ class Shapes:
         against: float | None = None,
         z: float = 0.0,
         mirrored: str = "",
-        **put: Unpack[Put],
+        **put: Unpack[PutBox],
     ) -> None:
         """A box w wide (x), h high (y) and d deep (z).
 
@@ -88,7 +93,7 @@ class Shapes:
         against: float | None = None,
         z: float = 0.0,
         mirrored: str = "",
-        **put: Unpack[Put],
+        **put: Unpack[PutBox],
     ) -> None:
         """A box as of `box`, its edges round with radius r in 2 n steps: cushions, upholstery."""
         for low, high in _corners((w, h, d), (left, on, against), (x, z), mirrored):
@@ -209,6 +214,11 @@ def row(low: float, high: float, n: int, gap: float = 0.0) -> Iterator[Pair]:
     step = (high - low) / n
     for k in range(n):
         yield low + k * step + gap / 2, low + (k + 1) * step - gap / 2
+
+
+def on_side(side: float, a: float, b: float) -> Pair:
+    """The extent between two distances from the middle, to the left (side -1) or right (side 1)."""
+    return min(side * a, side * b), max(side * a, side * b)
 
 
 def _corners(
