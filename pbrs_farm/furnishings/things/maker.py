@@ -45,7 +45,7 @@ from pbrs_farm.furnishings.things.assembly import (
     standing_piece,
     transformed,
 )
-from pbrs_farm.furnishings.things.materials import any_colour, metal, plain
+from pbrs_farm.furnishings.things.materials import WHITE, any_colour, glossy, metal, plain
 from pbrs_farm.furnishings.things.outlines import Triple
 from pbrs_farm.furnishings.things.shapes import Shapes
 from pbrs_farm.home.masses import mass_kg
@@ -154,6 +154,11 @@ class Maker(Shapes):
         """A colour that furniture is painted with: whites and greys more often than colours."""
         known = COLOURS[_PAINTS[int(self.rng.choice(5, p=_PAINT_SHARES))]]
         return known[int(self.rng.integers(len(known)))]
+
+    def finish(self, whites: int = 1) -> Material:
+        """A finish for furniture: timber, white lacquer or paint; whites: weight of white."""
+        paint = glossy("paint", self.paint(), 0.4)
+        return self.pick(self.timber, self.timber, self.dark_timber, *[WHITE] * whites, paint)
 
     def add(
         self,

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from itertools import product
+from typing import Annotated
 
 from numpy import cos, pi, sin
 
@@ -30,8 +32,12 @@ from pbrs_farm.furnishings.things.materials import (
     glossy,
 )
 from pbrs_farm.furnishings.things.outlines import bent, oval, polar, rect
+from pbrs_farm.furnishings.things.parameters import Choice, Front, Legs, Pull, Range
+from pbrs_farm.furnishings.things.shapes import Pair
 
 # fmt: off
+
+_SPLIT_M = 0.95  # wider shelves get an upright in the middle
 
 
 def case(
@@ -47,88 +53,151 @@ def case(
             m.box(w - 2 * t, (low + t, h - t), 0.006, against=-hd)
 
 
-@family(group="bookcase", nyu40=BOOKSHELF, place=Place.FLOOR, called="bookcase", variants=40,
-    size=lambda m: (m.pick(0.45, 0.6, 0.8, 0.8, 0.9, 1.0, 1.2), m.pick(0.26, 0.28, 0.3, 0.34),
-    m.pick(0.9, 1.1, 1.5, 1.8, 1.9, 2.0, 2.1)))
-def open_bookcase(m: Maker, size: Size) -> None:
-    """A bookcase.
+@dataclass(frozen=True, slots=True)
+class Bookcase:
+    """Parameters of a bookcase."""
 
-    Plain shelves, doors or drawers below, a crown and a plinth, a ladder, a staggered one, a frame of metal.
-    """
+    form: Annotated[str, Choice("plain", "fronts_below", "crown", "staggered", "metal_frame")]
+    body: Material
+    front: Material
+    front_kind: Front
+    pull: Pull
+    pull_material: Material
+    board_m: Annotated[float, Range(0.01, 0.06)]  # thickness
+    rows: Annotated[int, Range(2, 12)]  # shelves above each other
+    foot: Annotated[str, Choice("plinth", "legs", "none")]  # of a plain one
+    back: bool
+    legs: Legs
+    leg_material: Material
+    front_rows: Annotated[int, Range(1, 6)]  # rows that the fronts below cover
+    front_columns: tuple[Annotated[str, Choice("door", "drawer", "drawers")], ...]
+    bars: Material  # the frame of metal
+    planks: Material  # the boards in it
+    cross: bool  # at the back of the frame
+
+
+_BOOKCASE_FRONTS = {"door": ("door",), "drawer": ("drawer",), "drawers": ("drawer", "drawer")}
+
+
+def draw_bookcase(m: Maker, size: Size) -> Bookcase:
+    """Draw a bookcase's parameters."""
+    w, _d, h = size
+    body = m.finish(whites=2)
+    kind = m.pick("flat", "flat", "shaker", "raised", "grooved", "glazed")
+    front, pull = m.pick(body, body, WHITE), m.pick("knob", "bar", "disc", "edge", "ring")
+    form = ("plain", "fronts_below", "crown", "staggered", "metal_frame")[
+        m.weighted(0.3, 0.24, 0.14, 0.12, 0.2)]
+    t = m.pick(0.018, 0.022, 0.028)
+    rows = max(2, round((h - 0.06) / m.uniform(0.3, 0.38)))
+    p = Bookcase(form, body, front, kind, pull, m.metal, t, rows, "none", True, "square", body, 1,
+        ("door",), BLACK_STEEL, body, False)
+    match form:
+        case "plain" | "fronts_below":
+            p = replace(p, foot=m.pick("plinth", "plinth", "legs", "none"), back=m.chance(0.85))
+            if p.foot == "legs":
+                p = replace(p, legs=m.pick("tapered", "square", "round"),
+                    leg_material=m.pick(body, BLACK_STEEL))
+            if form == "fronts_below":
+                n = m.pick(1, 2) if rows > 3 else 1
+                columns = m.pick(("door", "door") if w > 0.5 else ("door",),
+                    ("drawers",) if n > 1 else ("drawer",))
+                p = replace(p, front_rows=n, front_columns=columns)
+        case "staggered":
+            p = replace(p, back=m.chance(0.5))
+        case "metal_frame":
+            p = replace(p, bars=m.pick(BLACK_STEEL, BLACK_STEEL, WHITE_STEEL, BRASS, m.metal),
+                planks=m.pick(body, body, m.timber), cross=m.chance(0.5))
+    return p
+
+
+@family(group="bookcase", nyu40=BOOKSHELF, place=Place.FLOOR, called="bookcase", variants=40,
+    draw=draw_bookcase, size=lambda m: (m.pick(0.45, 0.6, 0.8, 0.8, 0.9, 1.0, 1.2),
+    m.pick(0.26, 0.28, 0.3, 0.34), m.pick(0.9, 1.1, 1.5, 1.8, 1.9, 2.0, 2.1)))
+def open_bookcase(m: Maker, size: Size, p: Bookcase) -> None:
+    """A bookcase: plain, fronts below, a crown and a plinth, staggered, or a frame of metal."""
+    match p.form:
+        case "plain" | "fronts_below":
+            plain_bookcase(m, size, p)
+        case "crown":
+            crowned_bookcase(m, size, p)
+        case "staggered":
+            staggered_bookcase(m, size, p)
+        case "metal_frame":
+            metal_bookcase(m, size, p)
+
+
+def plain_bookcase(m: Maker, size: Size, p: Bookcase) -> None:
+    """Shelves in a case on a plinth, on legs or on the floor, with fronts below or without."""
+    w, d, h = size
+    t, n, hd = p.board_m, p.rows, d / 2
+    low = {"plinth": 0.06, "legs": 0.12, "none": 0.0}[p.foot]
+    f = d if p.form == "plain" else d - 0.05
+    with m.moved(at=(0.0, 0.0, (f - d) / 2)):
+        case(m, w, h, f, low, t, p.body, p.back)
+        with m.of(p.body):
+            for k in range(1, n):
+                y = low + (h - low - t) * k / n
+                m.box(w - 2 * t, t, (-f / 2 + 0.006, f / 2 - 0.004), on=y)
+            if w > _SPLIT_M:
+                m.box(0.02, (low + t, h - t), f - 0.012)
+            if p.foot == "plinth":
+                m.box(w - 0.01, low, (-f / 2, f / 2 - 0.03))
+        if p.foot == "legs":
+            four_legs(m, p.legs, w, f, low + 0.001, 0.045, 0.05, 0.0, p.leg_material)
+    if p.form == "fronts_below":
+        look = Look(p.front_kind, p.front, p.body, p.body, p.pull, p.pull_material)
+        high = low + (h - low - t) * min(p.front_rows, n) / n + t
+        columns = [_BOOKCASE_FRONTS[name] for name in p.front_columns]
+        fronts_of(m, look, (-w / 2, w / 2), (low, high), hd - 0.05, columns, False,
+            Inside(-hd + 0.006, has_boards=False))
+
+
+def crowned_bookcase(m: Maker, size: Size, p: Bookcase) -> None:
+    """A bookcase with a moulded top, a plinth and strips before its sides."""
+    w, d, h = size
+    hd, t, n = d / 2, p.board_m, p.rows
+    with m.moved(at=(0.0, 0.0, -0.015)), m.of(p.body):
+        case(m, w - 0.05, h - 0.02, d - 0.03, 0.07, t, p.body, True)
+        for k in range(1, n):
+            y = 0.07 + (h - 0.1) * k / n
+            m.box(w - 2 * t - 0.05, t, (-hd + 0.021, hd - 0.02), on=y)
+        if w > _SPLIT_M:
+            m.box(0.02, (0.07 + t, h - 0.02 - t), (-hd + 0.021, hd - 0.022))
+    with m.of(p.body):
+        m.box(w - 0.02, 0.08, (-hd, hd - 0.01), 0.004)
+        m.box(w - 0.024, 0.028, (-hd, hd - 0.012), 0.004, on=h - 0.05)
+        m.box(w, (h - 0.022, h), d, 0.005)
+        m.box(0.04, (0.08, h - 0.05), 0.013, 0.002, left=0.022 - w / 2, against=hd - 0.031,
+            mirrored="x")
+
+
+def staggered_bookcase(m: Maker, size: Size, p: Bookcase) -> None:
+    """Shelves with an upright in each row, to the left and to the right by turns."""
+    w, d, h = size
+    t, n, z = p.board_m, p.rows, (-d / 2 + 0.006, d / 2 - 0.003)
+    case(m, w, h, d, 0.0, t, p.body, p.back)
+    with m.of(p.body):
+        for k in range(1, n):
+            m.box(w - 2 * t, t, z, on=(h - t) * k / n)
+        for k in range(n):
+            y = (h - t) * k / n
+            m.box(t, (y + t, y + (h - t) / n), z, x=w * (0.18 if k % 2 == 0 else -0.18))
+
+
+def metal_bookcase(m: Maker, size: Size, p: Bookcase) -> None:
+    """Boards in a frame of metal, with a cross at the back or without."""
     w, d, h = size
     hw, hd = w / 2, d / 2
-    body = m.pick(m.timber, m.timber, m.dark_timber, WHITE, WHITE, glossy("paint", m.paint(), 0.4))
-    look = Look(m.pick("flat", "flat", "shaker", "raised", "grooved", "glazed"),
-        m.pick(body, body, WHITE), body, body, m.pick("knob", "bar", "disc", "edge", "ring"),
-        m.metal)
-    form = m.weighted(0.3, 0.24, 0.14, 0.12, 0.2)
-    t = m.pick(0.018, 0.022, 0.028)
-    n = max(2, round((h - 0.06) / m.uniform(0.3, 0.38)))
-    split = w > 0.95
-    match form:
-        case 0 | 1:  # plain, or fronts below
-            foot = m.pick("plinth", "plinth", "legs", "none")
-            low = 0.06 if foot == "plinth" else 0.12 if foot == "legs" else 0.0
-            f = d if form == 0 else d - 0.05
-            with m.moved(at=(0.0, 0.0, (f - d) / 2)):
-                case(m, w, h, f, low, t, body, m.chance(0.85))
-                with m.of(body):
-                    for k in range(1, n):
-                        m.box(w - 2 * t, t, (-f / 2 + 0.006, f / 2 - 0.004),
-                            on=low + (h - low - t) * k / n)
-                    if split:
-                        m.box(0.02, (low + t, h - t), f - 0.012)
-                    if foot == "plinth":
-                        m.box(w - 0.01, low, (-f / 2, f / 2 - 0.03))
-                if foot == "legs":
-                    four_legs(m, m.pick("tapered", "square", "round"), w, f, low + 0.001, 0.045,
-                        0.05, 0.0, m.pick(body, BLACK_STEEL))
-            # What is behind fronts below.
-            if form == 1:
-                rows = m.pick(1, 2) if n > 3 else 1
-                fronts_of(m, look, (-hw, hw), (low, low + (h - low - t) * rows / n + t), hd - 0.05,
-                    m.pick([("door",), ("door",)] if w > 0.5 else [("door",)],
-                    [("drawer", "drawer")] if rows > 1 else [("drawer",)]), False,
-                    Inside(-hd + 0.006, has_boards=False))
-        case 2:  # a crown and a plinth as of old
-            with m.moved(at=(0.0, 0.0, -0.015)):
-                case(m, w - 0.05, h - 0.02, d - 0.03, 0.07, t, body, True)
-                for k in range(1, n):
-                    m.box(w - 2 * t - 0.05, t, (-hd + 0.021, hd - 0.02),
-                        on=0.07 + (h - 0.1) * k / n, of=body)
-                if split:
-                    m.box(0.02, (0.07 + t, h - 0.02 - t), (-hd + 0.021, hd - 0.022), of=body)
-            with m.of(body):
-                m.box(w - 0.02, 0.08, (-hd, hd - 0.01), 0.004)
-                m.box(w - 0.024, 0.028, (-hd, hd - 0.012), 0.004, on=h - 0.05)
-                m.box(w, (h - 0.022, h), d, 0.005)
-                m.box(0.04, (0.08, h - 0.05), 0.013, 0.002, left=0.022 - w / 2, against=hd - 0.031,
-                    mirrored="x")
-        case 3:  # staggered boxes
-            case(m, w, h, d, 0.0, t, body, m.chance(0.5))
-            with m.of(body):
-                for k in range(1, n):
-                    y = (h - t) * k / n
-                    m.box(w - 2 * t, t, (-hd + 0.006, hd - 0.003), on=y)
-                for k in range(n):
-                    y, x = (h - t) * k / n, w * (0.18 if k % 2 == 0 else -0.18)
-                    m.box(t, (y + t, y + (h - t) / n), (-hd + 0.006, hd - 0.003), x=x)
-        case 4:  # boards in a frame of metal, some with crosses at the back
-            bar, plank = (m.pick(BLACK_STEEL, BLACK_STEEL, WHITE_STEEL, BRASS, m.metal),
-                m.pick(body, body, m.timber))
-            with m.of(bar):
-                for x, z in product((-hw, hw - 0.02), (-hd, hd - 0.02)):
-                    m.box(0.02, h, 0.02, 0.001, left=x, against=z)
-                m.box(0.014, 0.018, d - 0.04, 0.001, left=0.003 - w / 2, on=h - 0.02, mirrored="x")
-                if m.chance(0.5):
-                    for s in (-1.0, 1.0):
-                        m.square_tube((-s * (hw - 0.02), 0.1, -hd + 0.006 + s * 0.002),
-                            (s * (hw - 0.02), h - 0.1, -hd + 0.006 + s * 0.002), 0.012, 0.004)
-            for k in range(n + 1):
-                y = 0.08 + (h - 0.13) * k / n
-                m.box(w - 0.04, 0.024, d - 0.012, 0.002, on=y, of=plank)
-                m.box(0.014, 0.016, d - 0.04, 0.001, left=0.003 - w / 2, on=y + 0.004, mirrored="x",
-                    of=bar)
+    with m.of(p.bars):
+        m.box(0.02, h, 0.02, 0.001, left=-hw, against=-hd, mirrored="xz")
+        m.box(0.014, 0.018, d - 0.04, 0.001, left=0.003 - hw, on=h - 0.02, mirrored="x")
+        for s in (-1.0, 1.0) if p.cross else ():
+            x, z = s * (hw - 0.02), -hd + 0.006 + s * 0.002
+            m.square_tube((-x, 0.1, z), (x, h - 0.1, z), 0.012, 0.004)
+    for k in range(p.rows + 1):
+        y = 0.08 + (h - 0.13) * k / p.rows
+        m.box(w - 0.04, 0.024, d - 0.012, 0.002, on=y, of=p.planks)
+        m.box(0.014, 0.016, d - 0.04, 0.001, left=0.003 - hw, on=y + 0.004, mirrored="x", of=p.bars)
 
 
 @family(group="shelves", nyu40=SHELVES, place=Place.FLOOR, called="shelves", variants=32,
@@ -141,7 +210,7 @@ def open_shelves(m: Maker, size: Size) -> None:
     """
     w, d, h = size
     hw, hd = w / 2, d / 2
-    body = m.pick(m.timber, m.timber, m.dark_timber, WHITE, WHITE, glossy("paint", m.paint(), 0.4))
+    body = m.finish(whites=2)
     form, bar = m.weighted(0.35, 0.2, 0.25, 0.2), m.pick(BLACK_STEEL, WHITE_STEEL, m.metal, CHROME)
     match form:
         case 0:  # cubes behind a thick rim
@@ -197,84 +266,121 @@ def open_shelves(m: Maker, size: Size) -> None:
                             0.003, n=4)
 
 
-@family(group="wardrobe", nyu40=CABINET, place=Place.FLOOR, variants=36,
+@dataclass(frozen=True, slots=True)
+class Wardrobe:
+    """Parameters of a wardrobe."""
+
+    form: Annotated[str, Choice("hinged", "sliding", "one_mirror", "panels")]
+    parts: Annotated[int, Range(1, 6)]  # doors or leaves side by side
+    body: Material
+    front: Material
+    front_kind: Front
+    pull: Pull
+    pull_material: Material
+    foot_m: Annotated[float, Range(0.02, 0.2)]
+    crown: bool
+    plinth: bool
+    legs: Legs
+    column: Annotated[str, Choice("door", "door_drawer", "door_low_drawers")]  # of each hinged part
+    rail: Material  # of sliding leaves, with their grips
+    mirror: Annotated[int, Range(-1, 5)]  # number of the part with a mirror, -1 for none
+
+
+_WARDROBE_COLUMNS = {
+    "door": ("door",),
+    "door_drawer": ("door", "drawer"),
+    "door_low_drawers": ("door", "low", "low"),
+}
+
+
+def draw_wardrobe(m: Maker, size: Size) -> Wardrobe:
+    """Draw a wardrobe's parameters."""
+    w = size[0]
+    body = m.finish(whites=2)
+    front = m.pick(body, body, WHITE, m.timber)
+    kind = m.pick("flat", "flat", "shaker", "raised", "grooved", "shaker")
+    pull = m.pick("knob", "bar", "disc", "square", "bow", "none")
+    number = m.weighted(0.4, 0.3, 0.3) if w > 1.1 else m.weighted(0.65, 0.0, 0.35)
+    foot, crown, plinth = m.pick(0.05, 0.07, 0.1), m.chance(0.2), m.chance(0.7)
+    legs = "square" if plinth else m.pick("square", "bun", "tapered")
+    p = Wardrobe("panels", max(2, round(w / 0.48)), body, front, kind, pull, m.metal, foot, crown,
+        plinth, legs, "door", STEEL, -1)
+    if number == 0:
+        return replace(p, form="hinged",
+            column=m.pick("door", "door", "door_drawer", "door_low_drawers"))
+    if number == 1:
+        n = 2 if w < 1.6 else m.pick(2, 3)
+        mirror = (-1, 0, 1)[m.weighted(0.4, 0.35, 0.25)]
+        rail = m.pick(STEEL, BLACK_STEEL, WHITE_STEEL, body)
+        return replace(p, form="sliding", parts=n, mirror=mirror, rail=rail)
+    return replace(p, form="one_mirror", mirror=m.pick(0, 1)) if m.chance(0.6) else p
+
+
+@family(group="wardrobe", nyu40=CABINET, place=Place.FLOOR, variants=36, draw=draw_wardrobe,
     size=lambda m: (m.pick(0.8, 0.9, 1.0, 1.2, 1.5, 1.8), m.pick(0.5, 0.55, 0.58, 0.6),
     m.pick(1.85, 1.95, 2.0, 2.1, 2.2)))
-def wardrobe(m: Maker, size: Size) -> None:
-    """A wardrobe.
-
-    Doors on hinges, sliding ones, a mirror, drawers below, a crown, open at one side.
-    """
+def wardrobe(m: Maker, size: Size, p: Wardrobe) -> None:
+    """A wardrobe: doors on hinges, some with drawers, panels or a mirror, or sliding leaves."""
     w, d, h = size
-    hw, hd = w / 2, d / 2
-    body = m.pick(m.timber, m.timber, m.dark_timber, WHITE, WHITE, glossy("paint", m.paint(), 0.4))
-    front = m.pick(body, body, WHITE, m.timber)
-    look = Look(m.pick("flat", "flat", "shaker", "raised", "grooved", "shaker"), front, body, body,
-        m.pick("knob", "bar", "disc", "square", "bow", "none"), m.metal)
-    form = m.weighted(0.4, 0.3, 0.3) if w > 1.1 else m.weighted(0.65, 0.0, 0.35)
-    low, f = m.pick(0.05, 0.07, 0.1), hd - 0.05
-    crown = m.chance(0.2)
-    top = h - (0.04 if crown else 0.0)
-    hollow(m, (-hw, hw), (low, top), (-hd, f), 0.016, body)
-    inside = Inside(-hd + 0.008, rail=CHROME)
-    if m.chance(0.7):
-        m.box(w - 0.02, low, (-hd, f - 0.03), of=body)
+    hw, hd, low = w / 2, d / 2, p.foot_m
+    f, top = hd - 0.05, h - (0.04 if p.crown else 0.0)
+    x, y, inside = (-hw, hw), (low, top), Inside(-hd + 0.008, rail=CHROME)
+    hollow(m, x, y, (-hd, f), 0.016, p.body)
+    if p.plinth:
+        m.box(w - 0.02, low, (-hd, f - 0.03), of=p.body)
     else:
-        four_legs(
-            m, m.pick("square", "bun", "tapered"), w, d - 0.06, low + 0.001, 0.06, 0.07, 0.0, body
-        )
-    if crown:
-        m.box(w, 0.02, (-hd, f + 0.025), 0.005, on=top, of=body)
-        m.box(w, (top + 0.02, h), d, 0.008, of=body)
-    n = max(2, round(w / 0.48))
-    match form:
-        case 0:  # doors on hinges
-            fronts_of(m, look, (-hw, hw), (low, top), f, [m.pick(("door",), ("door",),
-                ("door", "drawer"), ("door", "low", "low"))] * n, False, inside)
-        case 1:  # sliding: two or three leaves on rails, one before the other, with grips let in
-            n, glassy = 2 if w < 1.6 else m.pick(2, 3), m.weighted(0.4, 0.35, 0.25)
-            rail = m.pick(STEEL, BLACK_STEEL, WHITE_STEEL, body)
-            for y in (low, top - 0.03):
-                m.box(w, 0.03, (f, hd), 0.002, on=y, of=rail)
-            for k in range(n):
-                a, b, z = (-hw + k * w / n - (0.02 if k else 0.0),
-                    -hw + (k + 1) * w / n + (0.02 if k < n - 1 else 0.0),
-                    f + 0.004 + 0.02 * (k % 2))
-                is_mirror = (glassy == 1 and k == 0) or (glassy == 2 and k == 1)
-                # A leaf slides before or behind its neighbour; the last goes back.
-                way = 1.0 if k < n - 1 else -1.0
-                with m.sliding("leaf", along=(way, 0.0, 0.0), upper_m=w / n - 0.02):
-                    m.box((a + 0.003, b - 0.003), (low + 0.031, top - 0.031), 0.018, 0.002,
-                        against=z, of=front)
-                    if is_mirror:
-                        m.box((a + 0.035, b - 0.035), (low + 0.06, top - 0.06), 0.0007,
-                            against=z + 0.0181, of=SILVERED)
-                    for x in (a + 0.003, b - 0.023):
-                        # The grips of a leaf behind another lie flat, so that it slides past.
-                        m.box(0.02, (low + 0.031, top - 0.031), (z + 0.0182,
-                            z + (0.024 if k % 2 else 0.0196)), 0.0006, left=x, of=rail)
-                space = (-hw + k * w / n + (0.008 if k else 0.016),
-                    -hw + (k + 1) * w / n - (0.008 if k < n - 1 else 0.016))
-                if k:
-                    m.box(
-                        0.016, (low + 0.016, top), (inside.back, f), left=space[0] - 0.016, of=body
-                    )
-                shelves(
-                    m, space, (low, top), (inside.back, f), body, CHROME if k % 2 == 0 else None
-                )
-        case 2:  # one part open or with a mirror on its door
-            at = m.pick(0, 1) if m.chance(0.6) else None
+        four_legs(m, p.legs, w, d - 0.06, low + 0.001, 0.06, 0.07, 0.0, p.body)
+    if p.crown:
+        m.box(w, 0.02, (-hd, f + 0.025), 0.005, on=top, of=p.body)
+        m.box(w, (top + 0.02, h), d, 0.008, of=p.body)
+    look = Look(p.front_kind, p.front, p.body, p.body, p.pull, p.pull_material)
+    if p.form == "hinged":
+        columns = [_WARDROBE_COLUMNS[p.column]] * p.parts
+        fronts_of(m, look, x, y, f, columns, False, inside)
+        return
+    if p.form == "sliding":
+        sliding_leaves(m, p, x, y, (f, hd), inside)
+        return
 
-            def add_panel(k: int) -> None:
-                a, b = -hw + k * w / n, -hw + (k + 1) * w / n
-                if at is None:
-                    m.box((a + 0.07, b - 0.07), 0.43, 0.0075, 0.006, on=low + 0.12,
-                        against=f + 0.0185, of=front)
-                elif k == at:
-                    m.box((a + 0.09, b - 0.09), (low + 0.3, top - 0.25), 0.0015, against=f + 0.0195,
-                        of=SILVERED)
+    def add_panel(k: int) -> None:
+        a, b = -hw + k * w / p.parts, -hw + (k + 1) * w / p.parts
+        if p.form == "panels":
+            m.box((a + 0.07, b - 0.07), 0.43, 0.0075, 0.006, on=low + 0.12, against=f + 0.0185,
+                of=p.front)
+        elif k == p.mirror:
+            m.box((a + 0.09, b - 0.09), (low + 0.3, top - 0.25), 0.0015, against=f + 0.0195,
+                of=SILVERED)
 
-            fronts_of(m, look, (-hw, hw), (low, top), f, [("door",)] * n, False, inside, add_panel)
+    fronts_of(m, look, x, y, f, [("door",)] * p.parts, False, inside, add_panel)
+
+
+def sliding_leaves(m: Maker, p: Wardrobe, x: Pair, y: Pair, z: Pair, inside: Inside) -> None:
+    """Leaves on rails, one before the other, with grips let in, and the shelves behind them."""
+    n, w, low, top = p.parts, x[1] - x[0], y[0], y[1]
+    for rail in (low, top - 0.03):
+        m.box(w, 0.03, z, 0.002, on=rail, of=p.rail)
+    for k in range(n):
+        a, b = x[0] + k * w / n - (0.02 if k else 0.0), x[0] + (k + 1) * w / n
+        b += 0.02 if k < n - 1 else 0.0
+        face = z[0] + 0.004 + 0.02 * (k % 2)
+        # A leaf slides before or behind its neighbour; the last goes back.
+        way = 1.0 if k < n - 1 else -1.0
+        with m.sliding("leaf", along=(way, 0.0, 0.0), upper_m=w / n - 0.02):
+            m.box((a + 0.003, b - 0.003), (low + 0.031, top - 0.031), 0.018, 0.002, against=face,
+                of=p.front)
+            if k == p.mirror:
+                m.box((a + 0.035, b - 0.035), (low + 0.06, top - 0.06), 0.0007,
+                    against=face + 0.0181, of=SILVERED)
+            # The grips of a leaf behind another are flat, so that it slides past.
+            grip = (face + 0.0182, face + (0.024 if k % 2 else 0.0196))
+            for left in (a + 0.003, b - 0.023):
+                m.box(0.02, (low + 0.031, top - 0.031), grip, 0.0006, left=left, of=p.rail)
+        space = (x[0] + k * w / n + (0.008 if k else 0.016),
+            x[0] + (k + 1) * w / n - (0.008 if k < n - 1 else 0.016))
+        if k:
+            m.box(0.016, (low + 0.016, top), (inside.back, z[0]), left=space[0] - 0.016, of=p.body)
+        clothes_rail = CHROME if k % 2 == 0 else None
+        shelves(m, space, (low, top), (inside.back, z[0]), p.body, clothes_rail)
 
 
 @family(group="dresser", nyu40=DRESSER, place=Place.FLOOR, called="chest_of_drawers", variants=36,
@@ -284,7 +390,7 @@ def drawer_chest(m: Maker, size: Size) -> None:
     """A chest of drawers: rows of one to three, doors beside them, legs, plinth or buns."""
     w, d, h = size
     hw = w / 2
-    body = m.pick(m.timber, m.timber, m.dark_timber, WHITE, WHITE, glossy("paint", m.paint(), 0.4))
+    body = m.finish(whites=2)
     look = Look(m.pick("flat", "flat", "raised", "shaker", "grooved"),
         m.pick(body, body, body, WHITE), body, body, m.pick("knob", "bar", "disc", "edge", "cup",
         "ring", "bow", "square"), m.metal)
@@ -325,7 +431,7 @@ def sideboard_cabinet(m: Maker, size: Size) -> None:
     """A cabinet: a sideboard, a highboard, a show case with glass, a narrow tall one."""
     w, d, h = size
     hw = w / 2
-    body = m.pick(m.timber, m.timber, m.dark_timber, WHITE, glossy("paint", m.paint(), 0.4))
+    body = m.finish()
     look = Look(m.pick("flat", "shaker", "raised", "grooved", "glazed", "glazed"),
         m.pick(body, body, WHITE), body, body, m.pick("knob", "bar", "disc", "edge", "ring",
         "square"), m.metal)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from itertools import product
+from typing import Annotated
 
 from numpy import pi
 
@@ -23,12 +25,14 @@ from pbrs_farm.furnishings.things.materials import (
     glossy,
 )
 from pbrs_farm.furnishings.things.outlines import bent, oval, polar, rect, rings
+from pbrs_farm.furnishings.things.parameters import Choice, Front, Legs, Pull, Range
+from pbrs_farm.furnishings.things.shapes import on_side
 
 # fmt: off
 
 
 def under_top(
-    m: Maker, kind: str, w: float, d: float, high: float, material: Material, leg_kind: str
+    m: Maker, kind: str, w: float, d: float, high: float, material: Material, leg_kind: str, column: bool = True
 ) -> None:
     """What carries a top w by d at `high`.
 
@@ -73,7 +77,7 @@ def under_top(
         case "foot":
             with m.of(material):
                 r = 0.34 * min(w, d)
-                if m.chance(0.5):
+                if column:
                     m.revolve([(0.0, 0.0), (r, 0.0), (r, 0.012), (r * 0.3, 0.04), (0.045, 0.09),
                         (0.04, high - 0.06), (r * 0.4, high - 0.005), (r * 0.4, high), (0.0, high)],
                         n=28)
@@ -109,28 +113,58 @@ def top_of(
                         -d / 2 + (k + 1) * d / 5 - 0.0005), 0.003)
 
 
-@family(group="dining_table", nyu40=TABLE, place=Place.FLOOR, variants=36,
+@dataclass(frozen=True, slots=True)
+class DiningTable:
+    """Parameters of a dining table."""
+
+    top: Annotated[str, Choice("rect", "round_rect", "round", "oval", "boards")]
+    under: Annotated[str, Choice("legs", "rails", "frames", "crossed", "trestles", "foot", "panels")]
+    legs: Legs
+    top_m: Annotated[float, Range(0.01, 0.1)]  # thickness
+    top_material: Material
+    frame: Material
+    column: bool  # a foot in one piece instead of four feet
+
+
+def draw_dining_table(m: Maker, size: Size) -> DiningTable:
+    """Draw a dining table's parameters."""
+    w, d, _h = size
+    if w == d:
+        top = m.pick("round", "round", "rect", "round_rect")
+    else:
+        top = m.pick("rect", "rect", "boards", "round_rect", "oval")
+    t = m.pick(0.02, 0.025, 0.03, 0.04)
+    if top in ("round", "oval"):
+        under = m.pick("foot", "legs", "legs")
+    elif w > 1.1:
+        under = m.pick("legs", "rails", "rails", "frames", "crossed", "trestles")
+    else:
+        under = m.pick("rails", "legs", "foot")
+    body = m.finish()
+    frame = body if under == "rails" else m.pick(body, body, BLACK_STEEL, m.metal, WHITE)
+    if under == "legs":
+        legs = m.pick("square", "tapered", "turned", "round", "hairpin")
+    else:
+        legs = m.pick("square", "square", "turned", "tapered")
+    if under == "foot":
+        material = m.pick(body, glossy("stone", (0.88, 0.87, 0.84), 0.25), body)
+    else:
+        material = m.pick(body, body, body, m.timber)
+    column = under != "foot" or m.chance(0.5)
+    return DiningTable(top, under, legs, t, material, frame, column)
+
+
+@family(group="dining_table", nyu40=TABLE, place=Place.FLOOR, variants=36, draw=draw_dining_table,
     size=lambda m: (*m.pick((0.7, 0.7), (0.8, 0.8), (1.0, 1.0), (1.1, 1.1), (1.2, 0.75), (1.2, 0.8),
     (1.4, 0.8), (1.4, 0.85), (1.6, 0.9), (1.8, 0.9), (2.0, 0.95), (2.2, 1.0)),
     m.uniform(0.73, 0.77)))
-def dining_table(m: Maker, size: Size) -> None:
+def dining_table(m: Maker, size: Size, p: DiningTable) -> None:
     """A table for two to eight: square, long, round or oval on legs, frames, trestles or one foot."""
     w, d, h = size
-    is_square = w == d
-    top = (m.pick("round", "round", "rect", "round_rect") if is_square else m.pick("rect", "rect",
-        "boards", "round_rect", "oval"))
-    t = m.pick(0.02, 0.025, 0.03, 0.04)
-    kind = (m.pick("foot", "legs", "legs") if top in ("round", "oval") else m.pick("legs", "rails",
-        "rails", "frames", "crossed", "trestles") if w > 1.1 else m.pick("rails", "legs", "foot"))
-    body = m.pick(m.timber, m.timber, m.dark_timber, WHITE, glossy("paint", m.paint(), 0.4))
-    frame = body if kind == "rails" else m.pick(body, body, BLACK_STEEL, m.metal, WHITE)
-    leg_kind = (m.pick("square", "tapered", "turned", "round",
-        "hairpin") if kind == "legs" else m.pick("square", "square", "turned", "tapered"))
-    inset = 0.72 if top in ("round", "oval") else 1.0
-    top_of(m, top, w, d, h - t, h, m.pick(body, body, body,
-        m.timber) if kind != "foot" else m.pick(body, glossy("stone", (0.88, 0.87, 0.84), 0.25),
-        body))
-    under_top(m, kind, w * inset, d * inset, h - t + 0.001, frame, leg_kind)
+    inset = 0.72 if p.top in ("round", "oval") else 1.0
+    low = h - p.top_m
+    top_of(m, p.top, w, d, low, h, p.top_material)
+    under_top(m, p.under, w * inset, d * inset, low + 0.001, p.frame, p.legs, p.column)
 
 
 @family(group="coffee_table", nyu40=TABLE, place=Place.FLOOR, variants=36,
@@ -144,7 +178,7 @@ def coffee_table(m: Maker, size: Size) -> None:
     w, d, h = size
     hw, hd = w / 2, d / 2
     form = m.weighted(0.4, 0.2, 0.14, 0.12, 0.14)
-    body = m.pick(m.timber, m.timber, m.dark_timber, WHITE, glossy("paint", m.paint(), 0.4))
+    body = m.finish()
     top = (m.pick("rect", "round_rect",
         "boards") if abs(w - d) > 0.05 and m.chance(0.7) else m.pick("oval", "oval", "round_rect"))
     t = m.pick(0.018, 0.025, 0.035)
@@ -204,55 +238,114 @@ def coffee_table(m: Maker, size: Size) -> None:
                 m.box(w - 0.12, 0.05, d - 0.12, of=RUBBER)
 
 
-@family(group="desk", nyu40=DESK, place=Place.FLOOR, variants=36,
+@dataclass(frozen=True, slots=True)
+class Desk:
+    """Parameters of a desk."""
+
+    form: Annotated[str, Choice("legs", "drawers_left", "drawers_right", "drawers_both", "flaps", "shelf")]
+    body: Material
+    front: Material
+    front_kind: Front
+    pull: Pull
+    pull_material: Material
+    top: Annotated[str, Choice("rect", "round_rect", "boards")]
+    top_m: Annotated[float, Range(0.01, 0.1)]  # thickness
+    top_material: Material
+    under: Annotated[str, Choice("legs", "rails", "frames", "trestles", "crossed")]  # of form legs
+    legs: tuple[Legs, ...]  # behind and in front, where drawers do not carry the top
+    leg_materials: tuple[Material, ...]
+    columns: tuple[Annotated[str, Choice("low_drawers", "drawers", "low_door", "door")], ...]
+    flaps: Annotated[int, Range(1, 4)]  # side by side below the whole top
+    back_panel: bool
+
+
+_DESK_COLUMNS = {
+    "low_drawers": ("low", "drawer", "drawer"),
+    "drawers": ("drawer", "drawer", "drawer"),
+    "low_door": ("low", "door"),
+    "door": ("door",),
+}
+
+
+def draw_desk(m: Maker, size: Size) -> Desk:
+    """Draw a desk's parameters."""
+    body = m.finish(whites=2)
+    kind, front = m.pick("flat", "flat", "raised", "shaker"), m.pick(body, body, WHITE)
+    pull = m.pick("knob", "bar", "edge", "disc", "square", "bow")
+    t, number = m.pick(0.02, 0.025, 0.03), m.weighted(0.25, 0.25, 0.15, 0.2, 0.15)
+    top, top_material = m.pick("rect", "rect", "round_rect", "boards"), m.pick(body, m.timber)
+    p = Desk("shelf", body, front, kind, pull, m.metal, top, t, top_material, "legs",
+        ("square", "square"), (body, body), ("drawers", "drawers"), 1, False)
+    match number:
+        case 0:
+            under = m.pick("legs", "rails", "frames", "trestles", "crossed")
+            material = m.pick(body, BLACK_STEEL, WHITE_STEEL, m.metal)
+            legs = m.pick("square", "tapered", "hairpin", "round")
+            return replace(p, form="legs", under=under, legs=(legs, legs),
+                leg_materials=(material, material))
+        case 1:
+            form = m.pick("drawers_left", "drawers_right")
+            column = m.pick(*_DESK_COLUMNS)
+            rows = [(m.pick("square", "square", "round"), m.pick(body, BLACK_STEEL)) for _ in "ab"]
+            kinds, materials = zip(*rows, strict=True)
+            return replace(p, form=form, columns=(column, column), legs=kinds,
+                leg_materials=materials, back_panel=m.chance(0.6))
+        case 2:
+            columns = (m.pick(*_DESK_COLUMNS), m.pick(*_DESK_COLUMNS))
+            return replace(p, form="drawers_both", columns=columns, back_panel=m.chance(0.6))
+        case 3:
+            n = m.pick(1, 2, 3)
+            legs = m.pick("tapered", "square", "turned", "round", "hairpin")
+            material = m.pick(body, body, BLACK_STEEL)
+            return replace(p, form="flaps", flaps=n, legs=(legs, legs),
+                leg_materials=(material, material))
+    return p
+
+
+@family(group="desk", nyu40=DESK, place=Place.FLOOR, variants=36, draw=draw_desk,
     size=lambda m: (m.pick(0.95, 1.1, 1.2, 1.3, 1.4, 1.6), m.pick(0.55, 0.6, 0.65, 0.7),
     m.uniform(0.73, 0.77)))
-def desk(m: Maker, size: Size) -> None:
-    """A desk.
-
-    On legs, with drawers at one side or both, a shelf over it, trestles, a frame, a secretaire's niches.
-    """
+def desk(m: Maker, size: Size, p: Desk) -> None:
+    """A desk on legs, with drawers at one side or both, with flaps below the top, or with a shelf."""
     w, d, h = size
-    hw, hd = w / 2, d / 2
-    body = m.pick(m.timber, m.timber, m.dark_timber, WHITE, WHITE, glossy("paint", m.paint(), 0.4))
-    look = Look(m.pick("flat", "flat", "raised", "shaker"), m.pick(body, body, WHITE), body, body,
-        m.pick("knob", "bar", "edge", "disc", "square", "bow"), m.metal)
-    t, form = m.pick(0.02, 0.025, 0.03), m.weighted(0.25, 0.25, 0.15, 0.2, 0.15)
-    top_of(
-        m, m.pick("rect", "rect", "round_rect", "boards"), w, d, h - t, h, m.pick(body, m.timber)
-    )
-    y = h - t + 0.001
-    match form:
-        case 0:  # on legs
-            under_top(m, m.pick("legs", "rails", "frames", "trestles", "crossed"), w, d, y,
-                m.pick(body, BLACK_STEEL, WHITE_STEEL, m.metal),
-                m.pick("square", "tapered", "hairpin", "round"))
-        case 1 | 2:  # drawers at one side
-            for s in (m.pick(-1.0, 1.0),) if form == 1 else (-1.0, 1.0):
-                a, b = (min(s * (hw - 0.01), s * (hw - 0.01 - (0.4 if form == 1 else 0.32))),
-                    max(s * (hw - 0.01), s * (hw - 0.01 - (0.4 if form == 1 else 0.32))))
-                hollow(m, (a, b), (0.05, y), (-hd + 0.02, hd - 0.05), 0.016, body)
-                m.box((a + 0.02, b - 0.02), 0.05, (-hd + 0.04, hd - 0.09), of=body)
-                fronts_of(m, look, (a, b), (0.06, h - t - 0.003), hd - 0.05,
-                    [m.pick(("low", "drawer", "drawer"), ("drawer", "drawer", "drawer"),
-                    ("low", "door"), ("door",))], False, Inside(-hd + 0.028))
-                if form == 1:
-                    for z in (-hd + 0.05, hd - 0.05):
-                        leg(m, m.pick("square", "square", "round"), (-s * (hw - 0.05), z),
-                            (-s * (hw - 0.05), z), y, 0.045, m.pick(body, BLACK_STEEL))
-            if m.chance(0.6):
-                m.box(w - 0.12, (h - t - 0.3, y), 0.015, against=-hd + 0.03, of=body)
-        case 3:  # a drawer or two under the whole top
-            hollow(
-                m, (-hw + 0.02, hw - 0.02), (h - t - 0.11, y), (-hd + 0.02, hd - 0.05), 0.012, body
-            )
-            fronts_of(m, look, (-hw + 0.02, hw - 0.02), (h - t - 0.11, h - t - 0.002), hd - 0.05,
-                [("flap",)] * m.pick(1, 2, 3), False, Inside(-hd + 0.028))
-            four_legs(m, m.pick("tapered", "square", "turned", "round", "hairpin"), w, d,
-                h - t - 0.108, 0.05, 0.06, 0.0, m.pick(body, body, BLACK_STEEL))
-        case 4:  # with a shelf below
-            under_top(m, "panels", w, d, y, body, "square")
-            m.box(w - 0.1, 0.015, d - 0.08, on=h - t - 0.14, of=body)
+    hw, hd, low = w / 2, d / 2, h - p.top_m
+    look = Look(p.front_kind, p.front, p.body, p.body, p.pull, p.pull_material)
+    top_of(m, p.top, w, d, low, h, p.top_material)
+    y = low + 0.001
+    match p.form:
+        case "legs":
+            under_top(m, p.under, w, d, y, p.leg_materials[0], p.legs[0])
+        case "drawers_left" | "drawers_right" | "drawers_both":
+            desk_drawers(m, size, p, look)
+            if p.back_panel:
+                m.box(w - 0.12, (low - 0.3, y), 0.015, against=-hd + 0.03, of=p.body)
+        case "flaps":
+            x = (-hw + 0.02, hw - 0.02)
+            hollow(m, x, (low - 0.11, y), (-hd + 0.02, hd - 0.05), 0.012, p.body)
+            fronts_of(m, look, x, (low - 0.11, low - 0.002), hd - 0.05, [("flap",)] * p.flaps, False,
+                Inside(-hd + 0.028))
+            four_legs(m, p.legs[0], w, d, low - 0.108, 0.05, 0.06, 0.0, p.leg_materials[0])
+        case "shelf":
+            under_top(m, "panels", w, d, y, p.body, "square")
+            m.box(w - 0.1, 0.015, d - 0.08, on=low - 0.14, of=p.body)
+
+
+def desk_drawers(m: Maker, size: Size, p: Desk, look: Look) -> None:
+    """A column of drawers at one side and two legs at the other, or a column at both sides."""
+    w, d, h = size
+    hw, hd, low = w / 2, d / 2, h - p.top_m
+    is_single = p.form != "drawers_both"
+    sides = (-1.0 if p.form == "drawers_left" else 1.0,) if is_single else (-1.0, 1.0)
+    for s, column in zip(sides, p.columns, strict=False):
+        a, b = x = on_side(s, hw - 0.01, hw - 0.01 - (0.4 if is_single else 0.32))
+        hollow(m, x, (0.05, low + 0.001), (-hd + 0.02, hd - 0.05), 0.016, p.body)
+        m.box((a + 0.02, b - 0.02), 0.05, (-hd + 0.04, hd - 0.09), of=p.body)
+        fronts_of(m, look, x, (0.06, low - 0.003), hd - 0.05, [_DESK_COLUMNS[column]], False,
+            Inside(-hd + 0.028))
+        if is_single:
+            foot = -s * (hw - 0.05)
+            for z, kind, of in zip((-hd + 0.05, hd - 0.05), p.legs, p.leg_materials, strict=True):
+                leg(m, kind, (foot, z), (foot, z), low + 0.001, 0.045, of)
 
 
 @family(group="nightstand", nyu40=NIGHT_STAND, place=Place.FLOOR, variants=40,
@@ -264,7 +357,7 @@ def nightstand(m: Maker, size: Size) -> None:
     """
     w, d, h = size
     hw, hd = w / 2, d / 2
-    body = m.pick(m.timber, m.timber, m.dark_timber, WHITE, glossy("paint", m.paint(), 0.4))
+    body = m.finish()
     look = Look(m.pick("flat", "flat", "shaker", "raised", "grooved"), m.pick(body, body, WHITE),
         body, body, m.pick("knob", "bar", "edge", "disc", "ring", "cup", "bow"), m.metal)
     form = m.weighted(0.42, 0.2, 0.12, 0.12, 0.14)
@@ -338,7 +431,7 @@ def tv_bench(m: Maker, size: Size) -> None:
     """
     w, d, h = size
     hw, hd = w / 2, d / 2
-    body = m.pick(m.timber, m.timber, m.dark_timber, WHITE, WHITE, glossy("paint", m.paint(), 0.4))
+    body = m.finish(whites=2)
     look = Look(m.pick("flat", "flat", "shaker", "grooved", "glazed"),
         m.pick(body, body, WHITE, m.timber), body, body, m.pick("knob", "bar", "edge", "disc",
         "none", "none", "square"), m.metal)
