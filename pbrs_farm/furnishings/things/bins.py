@@ -9,6 +9,7 @@ from numpy import pi
 
 from pbrs_farm.core.catalogue import Place
 from pbrs_farm.core.frames import rotation_y
+from pbrs_farm.core.house import Material
 from pbrs_farm.dress.style import mix
 from pbrs_farm.furnishings.things.boxes import rope_side
 from pbrs_farm.furnishings.things.maker import Maker, Size, family, thing
@@ -40,26 +41,10 @@ def bin_of(m: Maker, form: int, r: float, tall: float) -> None:
             m.vessel(
                 [(0, 0), (r * 0.85, 0), (r, tall)], 0.003, n=20 if form == 0 else 28, of=material
             )
-        case 2:  # of wire
-            with m.of(m.metal):
-                m.cylinder(r * 0.85, 0, 0.004, n=20)
-                for t in (0.3, 0.65, 1.0):
-                    m.hoop(oval(2 * r * (0.85 + 0.15 * t), 2 * r * (0.85 + 0.15 * t), n=22),
-                        t * tall, 0.003, n=5)
-                for k in range(22):
-                    m.tube([polar(0.84 * r, 0.002, 0.2856 * k), polar(r, tall, 0.2856 * k)], 0.0015,
-                        n=4)
-        case 3 | 4:  # with a pedal
-            h = tall * 1.2
-            m.revolve([(0, 0.012), (r * 0.98, 0.012), (r, 0.02), (r, h * 0.86), (0, h * 0.86)],
-                n=26, of=material)
-            m.cylinder(r * 1.02, 0, 0.0118, n=26, of=plain("bin foot", (0.08, 0.08, 0.08), 0.6))
-            m.revolve(scaled(r, h, [(0, 0.8602), (1.02, 0.8602), (1.02, 0.89), (0.8, 0.97),
-                (0, 1)]), n=26, of=material if form == 3 else plain("lid", (0.1, 0.1, 0.1), 0.5))
-            m.box(0.06, (0.004, 0.018), (r * 0.9, r + 0.05), 0.003,
-                of=plain("pedal", (0.1, 0.1, 0.1), 0.5))
-            m.box(0.08, (h * 0.82, h * 0.9), (-r - 0.015, -r * 0.9), 0.003,
-                of=plain("hinge", (0.1, 0.1, 0.1), 0.5))
+        case 2:
+            wire_bin(m, r, tall)
+        case 3 | 4:
+            pedal_bin(m, r, tall, form, material)
         case 5:  # a lid that swings
             m.loft(rings(rect, [(1.7 * r, 1.4 * r, 0.03, 0), (1.9 * r, 1.6 * r, 0.04, tall * 1.2)]),
                 of=material)
@@ -81,26 +66,16 @@ def bin_of(m: Maker, form: int, r: float, tall: float) -> None:
                 m.tube(bent([(x * r * 0.97, tall * 0.9, -0.04), (x * r, tall * 1.12, -0.03),
                     (x * r, tall * 1.12, 0.03), (x * r * 0.97, tall * 0.9, 0.04)], 0.02, n=3),
                     0.005, n=6, of=plain("strap", (0.35, 0.22, 0.13), 0.6))
-        case 9:  # two for sorting
-            for x in (-0.115, 0.115):
-                m.box(0.22, tall * 1.25, 0.28, 0.008, x=x, of=plain("bin",
-                    m.pick((0.3, 0.32, 0.33), (0.9, 0.9, 0.89)), 0.5))
-                m.box(0.224, (tall * 1.2502, tall * 1.32), 0.284, 0.006, x=x,
-                    of=plain("lid", m.pick((0.2, 0.4, 0.25), (0.2, 0.3, 0.5), (0.75, 0.6, 0.15),
-                    (0.25, 0.25, 0.26)), 0.5))
+        case 9:
+            sorting_bins(m, tall)
         case 10:  # a lid that opens by a touch, over a tall square body
             m.loft(rings(rect, [(1.8 * r, 1.5 * r, 0.02, 0), (1.8 * r, 1.5 * r, 0.02, tall * 1.3)],
                 n=3), of=material)
             m.loft(rings(rect, [(1.82 * r, 1.52 * r, 0.02, tall * 1.3 + 0.0002),
                 (1.82 * r, 1.52 * r, 0.02, tall * 1.36), (1.7 * r, 1.4 * r, 0.02, tall * 1.38)],
                 n=3), of=plain("lid", m.pick((0.1, 0.1, 0.1), (0.9, 0.9, 0.88)), 0.4))
-        case 11:  # half round, to stand at a wall
-            m.loft([(d_shape(1.9 * r, 1.4 * r, back=-0.7 * r), 0.0),
-                (d_shape(2 * r, 1.5 * r, back=-0.75 * r), tall * 1.2)], of=material)
-            m.loft([(d_shape(2.02 * r, 1.52 * r, back=-0.76 * r), tall * 1.2 + 0.0002),
-                (d_shape(2.02 * r, 1.52 * r, back=-0.76 * r), tall * 1.26),
-                (d_shape(1.7 * r, 1.2 * r, back=-0.6 * r), tall * 1.36)],
-                of=plain("lid", (0.12, 0.12, 0.12), 0.45))
+        case 11:
+            half_round_bin(m, r, tall, material)
         case 12:  # of slats round a bag
             m.cylinder(0.86 * r, 0.01, tall, n=20, of=plain("bag", (0.86, 0.84, 0.78), 0.95))
             with m.of(m.timber):
@@ -118,21 +93,72 @@ def bin_of(m: Maker, form: int, r: float, tall: float) -> None:
             m.revolve(scaled(r, tall * 1.25, [(0, 0), (0.6, 0), (0.95, 0.3), (1, 0.55),
                 (0.85, 0.85), (0.6, 1), (0.56, 0.99), (0.8, 0.84), (0.94, 0.55), (0.9, 0.3),
                 (0.55, 0.03), (0, 0.03)]), n=30, of=material)
-        case 15:  # a bag in a frame on crossed legs
-            with m.of(m.pick(m.timber, m.metal)):
-                for z, s in product((-0.5, 0.5), (-1.0, 1.0)):
-                    m.tube([(-s * 0.85 * r, 0.008, z * r), (s * 0.85 * r, tall * 1.3, z * r)],
-                        0.008, n=7)
-                for x in (-0.85, 0.85):
-                    m.rod(x * r, tall * 1.3, (-0.6 * r, 0.6 * r), 0.009, n=7)
-            m.loft(rings(rect, [(1.0 * r, 0.8 * r, 0.03, 0.18 * tall),
-                (1.62 * r, 0.92 * r, 0.04, tall * 1.28)], n=3), of=plain("bag", m.any_colour(),
-                0.95))
+        case 15:
+            bag_bin(m, r, tall)
         case 16:  # a drum of folded sheet: facets
             n = m.pick(6, 8, 12)
             m.loft(rings(oval, [(1.6 * r, 1.6 * r, 0), (2 * r, 2 * r, tall),
                 (2 * r - 0.008, 2 * r - 0.008, tall), (1.6 * r - 0.008, 1.6 * r - 0.008, 0.006)],
                 n=n), sharp=20.0, of=material)
+
+
+def wire_bin(m: Maker, r: float, tall: float) -> None:
+    """A bin of wire."""
+    with m.of(m.metal):
+        m.cylinder(r * 0.85, 0, 0.004, n=20)
+        for t in (0.3, 0.65, 1.0):
+            m.hoop(oval(2 * r * (0.85 + 0.15 * t), 2 * r * (0.85 + 0.15 * t), n=22),
+                t * tall, 0.003, n=5)
+        for k in range(22):
+            m.tube([polar(0.84 * r, 0.002, 0.2856 * k), polar(r, tall, 0.2856 * k)], 0.0015,
+                n=4)
+
+
+def pedal_bin(m: Maker, r: float, tall: float, form: int, material: Material) -> None:
+    """A bin with a pedal; form 3 has a lid like its body."""
+    h = tall * 1.2
+    m.revolve([(0, 0.012), (r * 0.98, 0.012), (r, 0.02), (r, h * 0.86), (0, h * 0.86)],
+        n=26, of=material)
+    m.cylinder(r * 1.02, 0, 0.0118, n=26, of=plain("bin foot", (0.08, 0.08, 0.08), 0.6))
+    m.revolve(scaled(r, h, [(0, 0.8602), (1.02, 0.8602), (1.02, 0.89), (0.8, 0.97),
+        (0, 1)]), n=26, of=material if form == 3 else plain("lid", (0.1, 0.1, 0.1), 0.5))
+    m.box(0.06, (0.004, 0.018), (r * 0.9, r + 0.05), 0.003,
+        of=plain("pedal", (0.1, 0.1, 0.1), 0.5))
+    m.box(0.08, (h * 0.82, h * 0.9), (-r - 0.015, -r * 0.9), 0.003,
+        of=plain("hinge", (0.1, 0.1, 0.1), 0.5))
+
+
+def sorting_bins(m: Maker, tall: float) -> None:
+    """Two bins for sorted waste."""
+    for x in (-0.115, 0.115):
+        m.box(0.22, tall * 1.25, 0.28, 0.008, x=x, of=plain("bin",
+            m.pick((0.3, 0.32, 0.33), (0.9, 0.9, 0.89)), 0.5))
+        m.box(0.224, (tall * 1.2502, tall * 1.32), 0.284, 0.006, x=x,
+            of=plain("lid", m.pick((0.2, 0.4, 0.25), (0.2, 0.3, 0.5), (0.75, 0.6, 0.15),
+            (0.25, 0.25, 0.26)), 0.5))
+
+
+def half_round_bin(m: Maker, r: float, tall: float, material: Material) -> None:
+    """A half round bin for a place at the wall."""
+    m.loft([(d_shape(1.9 * r, 1.4 * r, back=-0.7 * r), 0.0),
+        (d_shape(2 * r, 1.5 * r, back=-0.75 * r), tall * 1.2)], of=material)
+    m.loft([(d_shape(2.02 * r, 1.52 * r, back=-0.76 * r), tall * 1.2 + 0.0002),
+        (d_shape(2.02 * r, 1.52 * r, back=-0.76 * r), tall * 1.26),
+        (d_shape(1.7 * r, 1.2 * r, back=-0.6 * r), tall * 1.36)],
+        of=plain("lid", (0.12, 0.12, 0.12), 0.45))
+
+
+def bag_bin(m: Maker, r: float, tall: float) -> None:
+    """A bag in a frame on crossed legs."""
+    with m.of(m.pick(m.timber, m.metal)):
+        for z, s in product((-0.5, 0.5), (-1.0, 1.0)):
+            m.tube([(-s * 0.85 * r, 0.008, z * r), (s * 0.85 * r, tall * 1.3, z * r)],
+                0.008, n=7)
+        for x in (-0.85, 0.85):
+            m.rod(x * r, tall * 1.3, (-0.6 * r, 0.6 * r), 0.009, n=7)
+    m.loft(rings(rect, [(1.0 * r, 0.8 * r, 0.03, 0.18 * tall),
+        (1.62 * r, 0.92 * r, 0.04, tall * 1.28)], n=3), of=plain("bag", m.any_colour(),
+        0.95))
 
 
 def _drawn_size(m: Maker) -> Size:

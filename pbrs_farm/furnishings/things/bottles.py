@@ -9,7 +9,7 @@ import numpy as np
 
 from pbrs_farm.core.frames import LYING_ALONG_Z, rotation_x, rotation_y, rotation_z
 from pbrs_farm.core.house import Material
-from pbrs_farm.dress.style import shade
+from pbrs_farm.dress.style import Rgb, shade
 from pbrs_farm.furnishings.things.bodies import sphere, stretched
 from pbrs_farm.furnishings.things.maker import Maker, thing
 from pbrs_farm.furnishings.things.materials import glass, plain
@@ -255,21 +255,8 @@ def jar(m: Maker) -> None:
             if form == 1:
                 m.box(0.044, (tall * 0.35, tall * 0.6), 0.0048, against=r - 0.004,
                     of=plain("label", (0.92, 0.91, 0.87), 0.8))
-        case 2 | 3:  # glass with what is in it, and a cork
-            m.revolve(scaled(r, tall, [(0, 0), (1, 0), (1, 0.8), (0.8, 0.88), (0.8, 0.92),
-                (0, 0.92)]), n=18, of=glass())
-            full = tall * m.uniform(0.4, 0.7)
-            m.revolve([(0, 0.003), (r - 0.004, 0.003), (r - 0.004, full), (0, full + 0.1 * r)],
-                of=plain("grain", grain, 0.9))
-            if form == 2:
-                m.frustum((r * 0.78, tall * 0.9202), (r * 0.82, tall),
-                    of=plain("cork", (0.72, 0.57, 0.4), 0.9))
-            else:
-                m.revolve(scaled(r, tall, [(0, 0.9202), (0.9, 0.9202), (0.85, 0.97), (0, 0.98)]),
-                    of=glass())
-                m.tube(bent([(r * 0.85, tall * 0.86, 0), (r * 1.1, tall * 0.93, 0),
-                    (r * 0.85, tall * 0.985, 0)], 0.01, n=2), 0.0015, n=5, of=m.metal)
-                m.hoop(oval(1.7 * r, 1.7 * r, n=18), tall * 0.87, 0.002, n=5, of=m.metal)
+        case 2 | 3:
+            stoppered_jar(m, r, tall, form, grain)
         case 4:  # tin
             paint_of = plain("tin", m.any_colour(), 0.3)
             m.cylinder(r, 0, tall * 0.85, n=22, of=paint_of)
@@ -282,26 +269,10 @@ def jar(m: Maker) -> None:
                 tall * 0.85)], n=2), of=side)
             m.loft(rings(rect, [(1.8 * r, 1.8 * r, 0.008, tall * 0.8502),
                 (1.8 * r, 1.8 * r, 0.008, tall)], n=2), of=lid)
-        case 6:  # a set in a row
-            for k, s in enumerate((1.0, 0.86, 0.72)):
-                with m.moved(at=(k * 2.05 * r, 0, 0)):
-                    m.revolve([(0, 0), (r * 0.95 * s, 0), (r * s, 0.006),
-                        (r * s, (tall - 0.02) * s), (0, (tall - 0.02) * s)], of=side)
-                    m.revolve([(0, (tall - 0.02) * s + 0.0002), (r * s, (tall - 0.02) * s + 0.0002),
-                        (r * s, tall * s - 0.004), (0.008, tall * s - 0.002),
-                        (0.01, tall * s + 0.008), (0, tall * s + 0.009)], of=lid)
-        case 7:  # spices in a little rack
-            board_of = plain("rack wood", m.wood, 0.5)
-            with m.of(board_of):
-                m.box(0.26, 0.008, 0.06)
-                m.box(0.008, (0.008, 0.09), 0.06, left=-0.13, mirrored="x")
-                m.box(0.244, (0.035, 0.05), (0.024, 0.03))
-            for k in range(5):
-                with m.moved(at=(-0.1 + 0.05 * k, 0.0082, 0)):
-                    m.cylinder(0.021, 0, 0.06, n=12, of=plain("spice",
-                        m.pick((0.5, 0.15, 0.05), (0.3, 0.35, 0.12), (0.75, 0.55, 0.12),
-                        (0.15, 0.1, 0.07)), 0.3))
-                    m.cylinder(0.021, 0.0602, 0.076, n=12, of=lid)
+        case 6:
+            jar_set(m, r, tall, side, lid)
+        case 7:
+            spice_rack(m, lid)
         case 8:  # a pot of honey or jam with a cloth
             m.revolve([(0, 0), (0.034, 0), (0.037, 0.008), (0.037, 0.07), (0.03, 0.08), (0, 0.08)],
                 n=18, of=plain("jam", m.pick((0.4, 0.03, 0.06), (0.75, 0.42, 0.06),
@@ -339,3 +310,47 @@ def jar(m: Maker) -> None:
                 (0.107, 0.046), (0.09, 0.034), (0, 0.034)], n=26, at=(0, 0.049, 0), of=m.metal)
             m.frustum((0.035, 0), (0.033, 0.004), n=20, turn=LYING_ALONG_Z, at=(0, 0.025, 0.0695),
                 of=plain("dial", (0.93, 0.92, 0.88), 0.4))
+
+
+def stoppered_jar(m: Maker, r: float, tall: float, form: int, grain: Rgb) -> None:
+    """A filled jar of glass with a cork, or with a glass stopper on a wire."""
+    m.revolve(scaled(r, tall, [(0, 0), (1, 0), (1, 0.8), (0.8, 0.88), (0.8, 0.92),
+        (0, 0.92)]), n=18, of=glass())
+    full = tall * m.uniform(0.4, 0.7)
+    m.revolve([(0, 0.003), (r - 0.004, 0.003), (r - 0.004, full), (0, full + 0.1 * r)],
+        of=plain("grain", grain, 0.9))
+    if form == 2:
+        m.frustum((r * 0.78, tall * 0.9202), (r * 0.82, tall),
+            of=plain("cork", (0.72, 0.57, 0.4), 0.9))
+    else:
+        m.revolve(scaled(r, tall, [(0, 0.9202), (0.9, 0.9202), (0.85, 0.97), (0, 0.98)]),
+            of=glass())
+        m.tube(bent([(r * 0.85, tall * 0.86, 0), (r * 1.1, tall * 0.93, 0),
+            (r * 0.85, tall * 0.985, 0)], 0.01, n=2), 0.0015, n=5, of=m.metal)
+        m.hoop(oval(1.7 * r, 1.7 * r, n=18), tall * 0.87, 0.002, n=5, of=m.metal)
+
+
+def jar_set(m: Maker, r: float, tall: float, side: Material, lid: Material) -> None:
+    """Three jars in a row, each smaller than the one before."""
+    for k, s in enumerate((1.0, 0.86, 0.72)):
+        with m.moved(at=(k * 2.05 * r, 0, 0)):
+            m.revolve([(0, 0), (r * 0.95 * s, 0), (r * s, 0.006),
+                (r * s, (tall - 0.02) * s), (0, (tall - 0.02) * s)], of=side)
+            m.revolve([(0, (tall - 0.02) * s + 0.0002), (r * s, (tall - 0.02) * s + 0.0002),
+                (r * s, tall * s - 0.004), (0.008, tall * s - 0.002),
+                (0.01, tall * s + 0.008), (0, tall * s + 0.009)], of=lid)
+
+
+def spice_rack(m: Maker, lid: Material) -> None:
+    """Five spices in a little rack."""
+    board_of = plain("rack wood", m.wood, 0.5)
+    with m.of(board_of):
+        m.box(0.26, 0.008, 0.06)
+        m.box(0.008, (0.008, 0.09), 0.06, left=-0.13, mirrored="x")
+        m.box(0.244, (0.035, 0.05), (0.024, 0.03))
+    for k in range(5):
+        with m.moved(at=(-0.1 + 0.05 * k, 0.0082, 0)):
+            m.cylinder(0.021, 0, 0.06, n=12, of=plain("spice",
+                m.pick((0.5, 0.15, 0.05), (0.3, 0.35, 0.12), (0.75, 0.55, 0.12),
+                (0.15, 0.1, 0.07)), 0.3))
+            m.cylinder(0.021, 0.0602, 0.076, n=12, of=lid)

@@ -10,10 +10,11 @@ from numpy import cos, pi, sin
 from pbrs_farm.core.classes import BOX
 from pbrs_farm.core.frames import LYING_ALONG_Z, rotation_x, rotation_y
 from pbrs_farm.core.house import Material
-from pbrs_farm.dress.style import mix, shade
+from pbrs_farm.dress.style import Rgb, mix, shade
 from pbrs_farm.furnishings.things.maker import Maker, thing
 from pbrs_farm.furnishings.things.materials import plain
 from pbrs_farm.furnishings.things.outlines import bent, oval, polar, rect, ring_path, rings, scaled
+from pbrs_farm.furnishings.things.shapes import row
 
 # fmt: off
 
@@ -45,18 +46,8 @@ def storage_box(m: Maker) -> None:
             m.tube(bent([(-0.05, h * 0.6, hd), (-0.045, h * 0.52, hd + 0.025),
                 (0.045, h * 0.52, hd + 0.025), (0.05, h * 0.6, hd)], 0.02, n=3), 0.006, n=6,
                 of=plain("strap", (0.35, 0.22, 0.13), 0.7))
-        case 3:  # a crate of slats
-            with m.of(grain):
-                m.box(w, 0.01, d)
-                for k in range(3):
-                    y = 0.012 + k * (h - 0.01) / 3
-                    m.box(
-                        w, (y, y + h / 3 - 0.0153333333), 0.01, 0.001, against=-d / 2, mirrored="z"
-                    )
-                    m.box(0.01, (y, y + h / 3 - 0.0153333333), d - 0.0204, 0.001, left=-w / 2,
-                        mirrored="x")
-                for x, z in product((-hw + 0.0102, hw - 0.0302), (-hd + 0.0102, hd - 0.0302)):
-                    m.box(0.02, (0.01, h), 0.02, left=x, against=z)
+        case 3:
+            slatted_crate(m, w, h, d, grain)
         case 4:  # round, as for hats
             r = 0.42 * d + 0.03
             m.cylinder(r, 0, h * 0.8, n=28, of=card)
@@ -84,15 +75,8 @@ def storage_box(m: Maker) -> None:
             side, lid = plain("box", m.any_colour(), 0.7), plain("lid", m.any_colour(), 0.7)
             with m.moved(at=(0, h * 0.8 + 0.0003, 0), turn=rotation_y(m.uniform(-0.1, 0.1))):
                 lidded_box(m, w * 0.8, h * 0.6, d * 0.8, side, lid)
-        case 9:  # clear plastic with a lid that is not
-            m.loft(rings(rect, [(w * 0.92, d * 0.92, 0.02, 0), (w, d, 0.025, h * 0.85)]),
-                of=plain("frosted plastic", (0.82, 0.84, 0.85), 0.3))
-            m.loft(rings(rect, [(w + 0.012, d + 0.012, 0.03, h * 0.85 + 0.0002),
-                (w + 0.012, d + 0.012, 0.03, h * 0.85 + 0.02), (w - 0.02, d - 0.02, 0.02,
-                h * 0.85 + 0.028)]), of=plain("plastic lid", colour, 0.4))
-            for x in (-1.0, 1.0):
-                m.box(0.012, (h * 0.7, h * 0.85 + 0.018), 0.06, 0.002, x=x * (hw + 0.004),
-                    of=plain("plastic lid", colour, 0.4))
+        case 9:
+            plastic_box(m, w, h, d, hw, colour)
         case 10:  # a letter box: drawers
             m.box(0.9 * w, h, d, 0.002, of=card)
             for k in range(2):
@@ -100,6 +84,29 @@ def storage_box(m: Maker) -> None:
                     against=hd - 0.001, of=plain("drawer", shade(colour, 0.92), 0.7))
                 m.revolve([(0, 0), (0.004, 0), (0.008, 0.006), (0, 0.012)], n=10,
                     turn=LYING_ALONG_Z, at=(0, (k + 0.5) * 0.5 * h, hd + 0.0055), of=m.metal)
+
+
+def slatted_crate(m: Maker, w: float, h: float, d: float, grain: Material) -> None:
+    """A crate of slats."""
+    with m.of(grain):
+        m.box(w, 0.01, d)
+        for low, high in row(0.012, h + 0.002, 3):
+            slat = (low, high - 0.012)
+            m.box(w, slat, 0.01, 0.001, against=-d / 2, mirrored="z")
+            m.box(0.01, slat, d - 0.0204, 0.001, left=-w / 2, mirrored="x")
+        m.box(0.02, (0.01, h), 0.02, left=0.0102 - w / 2, against=0.0102 - d / 2, mirrored="xz")
+
+
+def plastic_box(m: Maker, w: float, h: float, d: float, hw: float, colour: Rgb) -> None:
+    """A box of clear plastic with an opaque lid."""
+    m.loft(rings(rect, [(w * 0.92, d * 0.92, 0.02, 0), (w, d, 0.025, h * 0.85)]),
+        of=plain("frosted plastic", (0.82, 0.84, 0.85), 0.3))
+    m.loft(rings(rect, [(w + 0.012, d + 0.012, 0.03, h * 0.85 + 0.0002),
+        (w + 0.012, d + 0.012, 0.03, h * 0.85 + 0.02), (w - 0.02, d - 0.02, 0.02,
+        h * 0.85 + 0.028)]), of=plain("plastic lid", colour, 0.4))
+    for x in (-1.0, 1.0):
+        m.box(0.012, (h * 0.7, h * 0.85 + 0.018), 0.06, 0.002, x=x * (hw + 0.004),
+            of=plain("plastic lid", colour, 0.4))
 
 
 def lidded_box(m: Maker, w: float, h: float, d: float, side: Material, lid: Material) -> None:

@@ -29,16 +29,8 @@ def clock(m: Maker) -> None:
             with m.moved(at=(0, 0.062, 0)):
                 clock_face(m, 0.055, material)
             m.box(0.07, 0.012, 0.04, of=material)
-        case 2:  # two bells
-            with m.moved(at=(0, 0.07, 0)):
-                clock_face(m, 0.055, material)
-            with m.of(material):
-                for x in (-1.0, 1.0):
-                    m.revolve([(0, 0), (0.022, 0), (0.019, 0.012), (0, 0.02)], n=14,
-                        turn=rotation_z(-x * 0.6), at=(x * 0.033, 0.126, 0))
-                    m.tube([(x * 0.025, 0.03, 0), (x * 0.04, 0.0, 0)], 0.004, n=6)
-                m.tube(bent([(-0.03, 0.125, 0), (-0.02, 0.165, 0), (0.02, 0.165, 0),
-                    (0.03, 0.125, 0)], 0.02, n=3), 0.003, n=6)
+        case 2:
+            bell_clock(m, material)
         case 3:  # a wedge
             m.loft([(rect(0.16, 0.08, 0.004, n=2), 0), (rect(0.16, 0.03, 0.004, z=-0.022, n=2),
                 0.075)], sharp=25.0, of=grain)
@@ -50,15 +42,8 @@ def clock(m: Maker) -> None:
                 (0.12, 0.06, 0.004, 0.18), (0.04, 0.05, 0.004, 0.2)], n=2), sharp=25.0, of=grain)
             with m.moved(at=(0, 0.1, 0.022)):
                 clock_face(m, 0.05, m.metal)
-        case 5:  # under a glass dome
-            m.frustum((0.07, 0), (0.068, 0.015), n=24, of=grain)
-            m.revolve([(0, 0.0152), (0.06, 0.0152), (0.06, 0.16), (0.04, 0.2), (0, 0.215)], n=22,
-                of=glass())
-            with m.moved(at=(0, 0.12, 0)):
-                clock_face(m, 0.04, m.metal)
-            for x in (-0.03, 0.03):
-                m.rod(x, (0.014, 0.12), 0, 0.004, of=m.metal)
-            m.cylinder(0.022, 0.03, 0.045, n=14, of=m.metal)
+        case 5:
+            domed_clock(m, grain)
         case 6:  # a cube
             m.box(0.07, 0.07, 0.07, 0.003, of=grain)
             m.box(0.05, (0.02, 0.05), (0.035, 0.0355), of=plain("display", (0.1, 0.12, 0.1), 0.1))
@@ -74,39 +59,74 @@ def clock(m: Maker) -> None:
             with m.moved(at=(0, 0.058, 0.03)):
                 clock_face(m, 0.042, material)
             m.frustum((0.03, 0), (0.022, 0.012), of=grain)
-        case 9:  # a carriage clock with a grip
-            with m.of(m.metal):
-                m.box(0.09, 0.015, 0.08, 0.003)
-                m.box(0.09, (0.115, 0.13), 0.08, 0.003)
-                for x, z in product((-0.039, 0.039), (-0.034, 0.034)):
-                    m.rod(x, (0.012, 0.118), z, 0.005)
-                m.tube(bent([(-0.03, 0.128, 0), (-0.03, 0.165, 0), (0.03, 0.165, 0),
-                    (0.03, 0.128, 0)], 0.015, n=3), 0.004, n=6)
-            m.box(0.068, (0.015, 0.115), (-0.03, 0.026), 0.002,
-                of=plain("case", (0.9, 0.88, 0.82), 0.4))
-            with m.moved(at=(0, 0.068, 0.0075)):
-                clock_face(m, 0.03, m.metal)
+        case 9:
+            carriage_clock(m)
         case 10:  # an arch of wood
             m.rod(0, 0.08, (-0.03, 0.03), 0.075, n=24, of=grain)
             m.box(0.15, 0.08, 0.06, 0.002, of=grain)
             with m.moved(at=(0, 0.085, 0.0125)):
                 clock_face(m, 0.05, material)
-        case 11:  # a radio with its display
-            m.box(0.24, (0.004, 0.11), 0.1, 0.01, of=m.pick(grain, material))
-            m.box((-0.11, 0.02), (0.02, 0.1), (0.049, 0.053), 0.002,
-                of=plain("grille", (0.2, 0.2, 0.21), 0.9))
-            m.box((0.035, 0.11), (0.06, 0.1), (0.05, 0.0506), of=plain("display",
-                (0.05, 0.06, 0.05), 0.1))
-            m.revolve([(0, 0), (0.016, 0), (0.014, 0.012), (0, 0.013)], turn=LYING_ALONG_Z,
-                at=(0.072, 0.035, 0.0495), of=m.metal)
-            for x, z in product((-0.1, 0.1), (-0.035, 0.035)):
-                m.rod(x, (0, 0.006), z, 0.008, of=plain("foot", (0.1, 0.1, 0.1), 0.8))
+        case 11:
+            clock_radio(m, material, grain)
         case 12:  # a slice of stone or glass
             m.box(0.16, 0.11, 0.024, 0.003, of=m.pick(glass((0.85, 0.93, 0.92), 0.35),
                 plain("slate", (0.2, 0.21, 0.22), 0.7)))
             with m.moved(at=(0, 0.06, -0.0055)):
                 clock_face(m, 0.04, m.metal)
             m.box(0.12, 0.01, 0.08, 0.002, of=m.metal)
+
+
+def bell_clock(m: Maker, material: Material) -> None:
+    """A clock with two bells on it."""
+    with m.moved(at=(0, 0.07, 0)):
+        clock_face(m, 0.055, material)
+    with m.of(material):
+        for x in (-1.0, 1.0):
+            m.revolve([(0, 0), (0.022, 0), (0.019, 0.012), (0, 0.02)], n=14,
+                turn=rotation_z(-x * 0.6), at=(x * 0.033, 0.126, 0))
+            m.tube([(x * 0.025, 0.03, 0), (x * 0.04, 0.0, 0)], 0.004, n=6)
+        m.tube(bent([(-0.03, 0.125, 0), (-0.02, 0.165, 0), (0.02, 0.165, 0),
+            (0.03, 0.125, 0)], 0.02, n=3), 0.003, n=6)
+
+
+def domed_clock(m: Maker, grain: Material) -> None:
+    """A clock under a glass dome."""
+    m.frustum((0.07, 0), (0.068, 0.015), n=24, of=grain)
+    m.revolve([(0, 0.0152), (0.06, 0.0152), (0.06, 0.16), (0.04, 0.2), (0, 0.215)], n=22,
+        of=glass())
+    with m.moved(at=(0, 0.12, 0)):
+        clock_face(m, 0.04, m.metal)
+    for x in (-0.03, 0.03):
+        m.rod(x, (0.014, 0.12), 0, 0.004, of=m.metal)
+    m.cylinder(0.022, 0.03, 0.045, n=14, of=m.metal)
+
+
+def carriage_clock(m: Maker) -> None:
+    """A carriage clock with a grip."""
+    with m.of(m.metal):
+        m.box(0.09, 0.015, 0.08, 0.003)
+        m.box(0.09, (0.115, 0.13), 0.08, 0.003)
+        for x, z in product((-0.039, 0.039), (-0.034, 0.034)):
+            m.rod(x, (0.012, 0.118), z, 0.005)
+        m.tube(bent([(-0.03, 0.128, 0), (-0.03, 0.165, 0), (0.03, 0.165, 0),
+            (0.03, 0.128, 0)], 0.015, n=3), 0.004, n=6)
+    m.box(0.068, (0.015, 0.115), (-0.03, 0.026), 0.002,
+        of=plain("case", (0.9, 0.88, 0.82), 0.4))
+    with m.moved(at=(0, 0.068, 0.0075)):
+        clock_face(m, 0.03, m.metal)
+
+
+def clock_radio(m: Maker, material: Material, grain: Material) -> None:
+    """A radio with a clock in its display."""
+    m.box(0.24, (0.004, 0.11), 0.1, 0.01, of=m.pick(grain, material))
+    m.box((-0.11, 0.02), (0.02, 0.1), (0.049, 0.053), 0.002,
+        of=plain("grille", (0.2, 0.2, 0.21), 0.9))
+    m.box((0.035, 0.11), (0.06, 0.1), (0.05, 0.0506), of=plain("display",
+        (0.05, 0.06, 0.05), 0.1))
+    m.revolve([(0, 0), (0.016, 0), (0.014, 0.012), (0, 0.013)], turn=LYING_ALONG_Z,
+        at=(0.072, 0.035, 0.0495), of=m.metal)
+    for x, z in product((-0.1, 0.1), (-0.035, 0.035)):
+        m.rod(x, (0, 0.006), z, 0.008, of=plain("foot", (0.1, 0.1, 0.1), 0.8))
 
 
 def clock_face(m: Maker, r: float, material: Material) -> None:

@@ -5,11 +5,11 @@ Fronts end 30 mm before the depth that a unit is said to have: room for what ope
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from itertools import product
 from math import radians
-from typing import Final
+from typing import Annotated, Final
 
 import numpy as np
 
@@ -50,6 +50,7 @@ from pbrs_farm.furnishings.things.materials import (
     plain,
 )
 from pbrs_farm.furnishings.things.outlines import bent, d_shape, oval, rect, rings
+from pbrs_farm.furnishings.things.parameters import Choice, Front, Pull
 from pbrs_farm.furnishings.things.shapes import Pair
 
 # fmt: off
@@ -110,29 +111,65 @@ def unit_body(m: Maker, size: Size, top_h: float, k: KitchenSet) -> None:
     m.box(w, k.plinth_h, (-d / 2 + 0.02, f - 0.05), of=k.plinth)
 
 
-def unit(m: Maker, size: Size, k: KitchenSet, columns: Sequence[Sequence[str]]) -> None:
+_FRONTS: Final[Mapping[str, list[tuple[str, ...]]]] = {
+    "door": [("door",)],
+    "low_door": [("low", "door")],
+    "three_drawers": [("drawer", "drawer", "drawer")],
+    "low_two_drawers": [("low", "drawer", "drawer")],
+    "two_doors": [("door",), ("door",)],
+    "two_drawers": [("drawer", "drawer")],
+    "four_drawers": [("low", "low", "drawer", "drawer")],
+}
+
+
+@dataclass(frozen=True, slots=True)
+class KitchenUnit:
+    """Parameters of a base unit; all but the first are those of its kitchen."""
+
+    fronts: Annotated[str, Choice(*_FRONTS)]
+    front: Material
+    front_kind: Front
+    body: Material
+    pull: Pull
+    pull_material: Material
+    worktop: Material
+    plinth: Material
+
+
+def draw_unit(m: Maker, k: KitchenSet, *fronts: str) -> KitchenUnit:
+    """Draw a unit's fronts."""
+    look = k.look
+    return KitchenUnit(m.pick(*fronts), look.front, look.kind, look.body, look.pull,
+        look.pull_material, k.worktop, k.plinth)
+
+
+def unit(m: Maker, size: Size, k: KitchenSet, p: KitchenUnit) -> None:
     """A unit with its worktop and columns of fronts."""
-    unit_body(m, size, k.top_h, k)
+    look = Look(p.front_kind, p.front, p.body, p.worktop, p.pull, p.pull_material)
+    unit_body(m, size, k.top_h, replace(k, look=look, plinth=p.plinth))
     w, d, h = size
-    m.box(w, (h - k.top_t, h), (-d / 2, d / 2 - 0.012), of=k.worktop)
-    fronts_of(m, k.look, (-w / 2, w / 2), (k.plinth_h, h - k.top_t - 0.003), d / 2 - 0.049, columns,
-        False, Inside(-d / 2 + _BACK_M))
+    m.box(w, (h - k.top_t, h), (-d / 2, d / 2 - 0.012), of=p.worktop)
+    y = (k.plinth_h, h - k.top_t - 0.003)
+    fronts_of(m, look, (-w / 2, w / 2), y, d / 2 - 0.049, _FRONTS[p.fronts], False,
+        Inside(-d / 2 + _BACK_M))
 
 
 @family(group="base_cabinet", nyu40=COUNTER, place=Place.KITCHEN, called="kitchen_cabinet",
-    variants=32, of_set=kitchen_set, size=lambda m, k: (0.6, 0.6, k.top_h))
-def base_cabinet(m: Maker, size: Size, k: KitchenSet) -> None:
+    variants=32, of_set=kitchen_set, size=lambda m, k: (0.6, 0.6, k.top_h),
+    draw=lambda m, _size, k: draw_unit(m, k, "door", "low_door", "three_drawers", "low_two_drawers",
+    "two_doors"))
+def base_cabinet(m: Maker, size: Size, k: KitchenSet, p: KitchenUnit) -> None:
     """A kitchen's unit with a worktop: doors, drawers, or both."""
-    unit(m, size, k, m.pick([("door",)], [("low", "door")], [("drawer", "drawer", "drawer")],
-        [("low", "drawer", "drawer")], [("door",), ("door",)]))
+    unit(m, size, k, p)
 
 
 @family(group="base_cabinet", nyu40=COUNTER, place=Place.KITCHEN, called="kitchen_cabinet",
-    variants=32, of_set=kitchen_set, size=lambda m, k: (0.6, 0.6, k.top_h))
-def drawer_cabinet(m: Maker, size: Size, k: KitchenSet) -> None:
-    """The same with drawers alone, as a second unit of the kitchen."""
-    unit(m, size, k, m.pick([("low", "drawer", "drawer")], [("drawer", "drawer")],
-        [("low", "low", "drawer", "drawer")], [("low", "door")]))
+    variants=32, of_set=kitchen_set, size=lambda m, k: (0.6, 0.6, k.top_h),
+    draw=lambda m, _size, k: draw_unit(m, k, "low_two_drawers", "two_drawers", "four_drawers",
+    "low_door"))
+def drawer_cabinet(m: Maker, size: Size, k: KitchenSet, p: KitchenUnit) -> None:
+    """A second unit of the kitchen, mostly of drawers."""
+    unit(m, size, k, p)
 
 
 @family(group="blind_cabinet", nyu40=COUNTER, place=Place.KITCHEN, called="kitchen_blind_cabinet",

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+from typing import Annotated
+
 from numpy import cos, pi, sin
 
 from pbrs_farm.core.catalogue import Place
@@ -31,6 +34,7 @@ from pbrs_farm.furnishings.things.outlines import (
     rings,
     scaled,
 )
+from pbrs_farm.furnishings.things.parameters import Choice, Range
 
 # fmt: off
 
@@ -48,46 +52,71 @@ def shade_spokes(m: Maker, r: float, k1: float, tall: float, h: float, material:
             2.1 * k)], 0.003, n=5, of=material)
 
 
-@family(group="floor_lamp", nyu40=LAMP, place=Place.FLOOR, called="floor_lamp", variants=36,
-    size=lambda m: (*m.pick((0.36, 0.36), (0.4, 0.4), (0.46, 0.46)), m.uniform(1.4, 1.72)))
-def standing_lamp(m: Maker, size: Size) -> None:
-    """A lamp that stands on the floor.
+@dataclass(frozen=True, slots=True)
+class FloorLamp:
+    """Parameters of a lamp on the floor."""
 
-    A shade on a pole, on three legs, an arc, a reading arm, a column, a ball.
-    """
-    w, d, h = size
-    r = w / 2
+    form: Annotated[str, Choice("pole", "tripod", "column", "ball")]
+    body: Material
+    shade: Material
+    shade_m: Annotated[float, Range(0.1, 0.6)]  # height of the shade
+    taper: Annotated[float, Range(0.2, 1.2)]  # upper radius of the shade per lower radius
+    column_m: Annotated[float, Range(0.05, 0.18)]  # radius of a column that shines
+    corner_m: Annotated[float, Range(0.005, 0.3)]  # radius of the corners of its base
+
+
+def shade_fabric(m: Maker) -> Material:
+    """Draw the cloth of a shade."""
+    colours = (0.9, 0.87, 0.8), (0.9, 0.88, 0.85), m.textile(), m.style.accent
+    return plain("shade fabric", m.pick(*colours), 0.9)
+
+
+def draw_floor_lamp(m: Maker, size: Size) -> FloorLamp:
+    """Draw a floor lamp's parameters."""
     material = m.pick(m.metal, BLACK_STEEL, BRASS, m.timber, WHITE_STEEL, m.dark_timber)
-    fabric = plain("shade fabric", m.pick((0.9, 0.87, 0.8), (0.9, 0.88, 0.85), m.textile(),
-        m.style.accent), 0.9)
-    form = m.pick(0, 0, 0, 1, 1, 1, 4, 5)
-    tall, k1 = m.uniform(0.2, 0.32), m.uniform(0.6, 1.0)
-    match form:
-        case 0:  # a shade on a pole
-            m.revolve([(0.0, 0.0), (r * 0.72, 0.0), (r * 0.72, 0.014), (0.02, 0.03), (0.011, 0.05),
-                (0.011, h - 0.5 * tall - 0.05), (0.0, h - 0.5 * tall - 0.05)], n=28, of=material)
-            lamp_shade(m, r, r * k1, h - tall, h, fabric)
-            shade_spokes(m, r, k1, tall, h, material)
-        case 1:  # on three legs
-            for k in range(3):
-                m.tube([polar(0.96 * r, 0.006, 2.0944 * k), polar(0.02, h - tall - 0.06,
-                    2.0944 * k)], 0.012, end=0.016, of=material)
-            m.revolve([(0.0, h - tall - 0.1), (0.035, h - tall - 0.1), (0.035, h - tall - 0.05),
-                (0.01, h - tall - 0.03), (0.01, h - 0.5 * tall - 0.04),
-                (0.0, h - 0.5 * tall - 0.04)], of=material)
-            lamp_shade(m, r, r * k1, h - tall, h, fabric)
-            shade_spokes(m, r, k1, tall, h, material)
-        case 4:  # a column that shines
-            q = m.pick(0.11, 0.13, 0.15)
-            m.board(w, d, 0.0, 0.03, m.pick(0.02, 0.12, r), 0.004, of=material)
-            m.rod(0.0, (0.031, h - 0.02), 0.0, q, n=24, of=OPAL)
-            for y in (0.03, 0.36 * h, 0.68 * h, h - 0.022):
-                m.revolve([(q - 0.002, y), (q + 0.012, y), (q + 0.012, y + 0.022),
-                    (q - 0.002, y + 0.022), (q - 0.002, y)], n=24, of=material)
-        case 5:  # a ball, or three, on a pole
-            m.revolve([(0.0, 0.0), (r, 0.0), (r, 0.012), (0.014, 0.024), (0.01, h - 0.24),
-                (0.0, h - 0.24)], n=28, of=material)
-            m.sphere((0.0, h - 0.13, 0.0), 0.13, n=20, of=OPAL)
+    fabric = shade_fabric(m)
+    form = m.pick("pole", "pole", "pole", "tripod", "tripod", "tripod", "column", "ball")
+    p = FloorLamp(form, material, fabric, m.uniform(0.2, 0.32), m.uniform(0.6, 1.0), 0.13, 0.12)
+    if form == "column":
+        p = replace(p, column_m=m.pick(0.11, 0.13, 0.15), corner_m=m.pick(0.02, 0.12, size[0] / 2))
+    return p
+
+
+@family(group="floor_lamp", nyu40=LAMP, place=Place.FLOOR, called="floor_lamp", variants=36,
+    draw=draw_floor_lamp,
+    size=lambda m: (*m.pick((0.36, 0.36), (0.4, 0.4), (0.46, 0.46)), m.uniform(1.4, 1.72)))
+def standing_lamp(m: Maker, size: Size, p: FloorLamp) -> None:
+    """A lamp on the floor: a shade on a pole or a tripod, a column, or a ball."""
+    w, d, h = size
+    r, tall = w / 2, p.shade_m
+    with m.of(p.body):
+        match p.form:
+            case "pole":
+                top = h - 0.5 * tall - 0.05
+                m.revolve([(0.0, 0.0), (r * 0.72, 0.0), (r * 0.72, 0.014), (0.02, 0.03),
+                    (0.011, 0.05), (0.011, top), (0.0, top)], n=28)
+            case "tripod":
+                top, neck = h - 0.5 * tall - 0.04, h - tall
+                for k in range(3):
+                    a = 2.0944 * k
+                    m.tube([polar(0.96 * r, 0.006, a), polar(0.02, neck - 0.06, a)], 0.012,
+                        end=0.016)
+                m.revolve([(0.0, neck - 0.1), (0.035, neck - 0.1), (0.035, neck - 0.05),
+                    (0.01, neck - 0.03), (0.01, top), (0.0, top)])
+            case "column":
+                q = p.column_m
+                m.board(w, d, 0.0, 0.03, p.corner_m, 0.004)
+                m.rod(0.0, (0.031, h - 0.02), 0.0, q, n=24, of=OPAL)
+                for y in (0.03, 0.36 * h, 0.68 * h, h - 0.022):
+                    m.revolve([(q - 0.002, y), (q + 0.012, y), (q + 0.012, y + 0.022),
+                        (q - 0.002, y + 0.022), (q - 0.002, y)], n=24)
+            case "ball":
+                m.revolve([(0.0, 0.0), (r, 0.0), (r, 0.012), (0.014, 0.024), (0.01, h - 0.24),
+                    (0.0, h - 0.24)], n=28)
+                m.sphere((0.0, h - 0.13, 0.0), 0.13, n=20, of=OPAL)
+    if p.form in ("pole", "tripod"):
+        lamp_shade(m, r, r * p.taper, h - tall, h, p.shade)
+        shade_spokes(m, r, p.taper, tall, h, p.body)
 
 
 @family(group="floor_lamp", nyu40=LAMP, place=Place.FLOOR, called="reading_lamp", variants=16,
@@ -122,74 +151,95 @@ def arc_lamp(m: Maker, size: Size) -> None:
             m.sphere((r - 0.085, h - 0.235, 0.0), 0.025, n=10, of=OPAL)
 
 
-@family(group="table_lamp", nyu40=LAMP, place=Place.SURFACE, called="table_lamp", variants=36,
-    size=lambda m: (*m.pick((0.2, 0.2), (0.24, 0.24), (0.28, 0.28), (0.32, 0.32)),
-    m.uniform(0.32, 0.52)))
-def shade_lamp(m: Maker, size: Size) -> None:
-    """A lamp on a table.
+_FEET = ("turned", "ball", "rod", "block", "balls", "tripod", "fluted", "baluster")
 
-    A foot of clay, glass, wood or metal and a shade; a ball, a mushroom, an arm.
-    """
+
+@dataclass(frozen=True, slots=True)
+class TableLamp:
+    """Parameters of a lamp on a table."""
+
+    form: Annotated[str, Choice("shade", "ball", "mushroom")]
+    foot: Annotated[str, Choice(*_FEET)]  # below a shade
+    body: Material
+    shade: Material
+    shade_m: Annotated[float, Range(0.08, 0.4)]  # height of the shade
+    taper: Annotated[float, Range(0.2, 1.2)]  # upper radius of the shade per lower radius
+    foot_m: Annotated[float, Range(0.02, 0.2)]  # radius of the foot
+
+
+def draw_table_lamp(m: Maker, size: Size) -> TableLamp:
+    """Draw a table lamp's parameters."""
     w, _d, h = size
-    r = w / 2
     material = m.pick(m.china(), m.china(), m.metal, BRASS, BLACK_STEEL, m.timber,
         glass((0.8, 0.9, 0.88), 0.25), plain("clay", m.any_colour(), 0.7))
-    fabric = plain("shade fabric", m.pick((0.9, 0.87, 0.8), (0.9, 0.88, 0.85), m.textile(),
-        m.style.accent), 0.9)
-    form = m.weighted(0.64, 0.18, 0.18)
-    tall, k1 = h * m.uniform(0.38, 0.5), m.uniform(0.55, 1.0)
-    match form:
-        case 0:  # a foot and a shade
-            foot, f = m.integers(0, 8), h - tall
-            q = r * m.uniform(0.45, 0.62)
-            with m.of(material):
-                match foot:
-                    case 0:  # turned of clay
-                        m.revolve(scaled(q, f, [(0, 0), (0.8, 0), (1, 0.2), (0.9, 0.5),
-                            (0.35, 0.85), (0.2, 1), (0, 1)]), n=24)
-                    case 1:  # a ball
-                        m.sphere((0.0, q, 0.0), q, n=18)
-                    case 2:  # a rod on a plate
-                        m.revolve([(0.0, 0.0), (q, 0.0), (q, 0.015), (0.012, 0.03), (0.01, f),
-                            (0.0, f)], n=24)
-                    case 3:  # a square block
-                        m.loft(rings(rect, [(q * 1.5, q * 1.5, 0.006, 0.0),
-                            (q * 1.5, q * 1.5, 0.006, 0.75 * f), (q * 0.5, q * 0.5, 0.006,
-                            0.85 * f)], n=2))
-                    case 4:  # three balls
-                        for k in range(3):
-                            m.sphere(
-                                (0.0, q * (0.75 + 1.15 * k * 0.8), 0.0), q * (0.75 - 0.12 * k), n=14
-                            )
-                    case 5:  # three legs
-                        for k in range(3):
-                            m.tube([polar(q, 0.004, 2.0944 * k), polar(0.01, f, 2.0944 * k)], 0.008,
-                                n=7)
-                    case 6:  # fluted
-                        m.loft(rings(fluted, [(1.6 * q, 12, 0.08, 0.0), (2 * q, 12, 0.08, 0.4 * f),
-                            (1.1 * q, 12, 0.08, 0.85 * f), (0.6 * q, 12, 0.08, 0.9 * f)]),
-                            sharp=70.0)
-                    case 7:  # turned of wood
-                        m.revolve([(0.0, 0.0), (q, 0.0), (q, 0.02), (q * 0.4, 0.06),
-                            (q * 0.55, 0.3 * f), (q * 0.3, 0.5 * f), (q * 0.5, 0.7 * f),
-                            (q * 0.2, 0.9 * f), (q * 0.2, f), (0.0, f)], n=20)
-            m.rod(0.0, (0.3 * f, h - 0.5 * tall), 0.0, 0.007, of=m.metal)
-            lamp_shade(m, r, r * k1, h - tall, h, fabric)
+    fabric = shade_fabric(m)
+    form = ("shade", "ball", "mushroom")[m.weighted(0.64, 0.18, 0.18)]
+    tall, taper = h * m.uniform(0.38, 0.5), m.uniform(0.55, 1.0)
+    p = TableLamp(form, "turned", material, fabric, tall, taper, 0.26 * w)
+    if form == "shade":
+        p = replace(p, foot=m.pick(*_FEET), foot_m=w / 2 * m.uniform(0.45, 0.62))
+    return p
+
+
+@family(group="table_lamp", nyu40=LAMP, place=Place.SURFACE, called="table_lamp", variants=36,
+    draw=draw_table_lamp,
+    size=lambda m: (*m.pick((0.2, 0.2), (0.24, 0.24), (0.28, 0.28), (0.32, 0.32)),
+    m.uniform(0.32, 0.52)))
+def shade_lamp(m: Maker, size: Size, p: TableLamp) -> None:
+    """A lamp on a table: a shade on a foot of clay, glass, wood or metal, a ball, or a mushroom."""
+    w, _d, h = size
+    r, tall = w / 2, p.shade_m
+    match p.form:
+        case "shade":
+            middle = h - 0.5 * tall
+            with m.of(p.body):
+                lamp_foot(m, p.foot, p.foot_m, h - tall)
+            m.rod(0.0, (0.3 * (h - tall), middle), 0.0, 0.007, of=m.metal)
+            lamp_shade(m, r, r * p.taper, h - tall, h, p.shade)
             for k in range(3):
-                m.tube([(0.0, h - 0.5 * tall - 0.02, 0.0), polar((r + k1 * r) / 2.1, h - 0.5 * tall,
-                    2.1 * k)], 0.002, n=5, of=m.metal)
-        case 1:  # a ball on a foot
+                rim = polar((r + p.taper * r) / 2.1, middle, 2.1 * k)
+                m.tube([(0.0, middle - 0.02, 0.0), rim], 0.002, n=5, of=m.metal)
+        case "ball":
             q = min(r, 0.3 * h)
             m.revolve([(0.0, 0.0), (r, 0.0), (r, 0.012), (r * 0.3, 0.025), (r * 0.25, h - 1.9 * q),
-                (0.0, h - 1.9 * q)], n=24, of=material)
+                (0.0, h - 1.9 * q)], n=24, of=p.body)
             m.sphere((0.0, h - q, 0.0), q, n=20, of=OPAL)
-        case 2:  # a mushroom: a dome over a foot
-            m.revolve([(0.0, 0.0), (r * 0.6, 0.0), (r * 0.55, 0.02), (r * 0.25, 0.1 * h),
-                (r * 0.2, 0.6 * h), (r * 0.3, 0.66 * h), (0.0, 0.66 * h)], n=22, of=material)
-            m.revolve([(r * 0.93, 0.62 * h), (r, 0.63 * h), (r * 0.9, 0.8 * h), (r * 0.6, 0.94 * h),
-                (0.0, h), (0.0, h - 0.004), (r * 0.57, 0.93 * h), (r * 0.87, 0.79 * h),
-                (r * 0.93, 0.62 * h)], n=28, of=material)
+        case "mushroom":
+            with m.of(p.body):
+                m.revolve([(0.0, 0.0), (r * 0.6, 0.0), (r * 0.55, 0.02), (r * 0.25, 0.1 * h),
+                    (r * 0.2, 0.6 * h), (r * 0.3, 0.66 * h), (0.0, 0.66 * h)], n=22)
+                m.revolve([(r * 0.93, 0.62 * h), (r, 0.63 * h), (r * 0.9, 0.8 * h),
+                    (r * 0.6, 0.94 * h), (0.0, h), (0.0, h - 0.004), (r * 0.57, 0.93 * h),
+                    (r * 0.87, 0.79 * h), (r * 0.93, 0.62 * h)], n=28)
             m.sphere((0.0, 0.72 * h, 0.0), 0.035, n=12, of=OPAL)
+
+
+def lamp_foot(m: Maker, kind: str, q: float, f: float) -> None:
+    """The foot of a table lamp, of radius q and height f."""
+    match kind:
+        case "turned":
+            m.revolve(scaled(q, f, [(0, 0), (0.8, 0), (1, 0.2), (0.9, 0.5), (0.35, 0.85), (0.2, 1),
+                (0, 1)]), n=24)
+        case "ball":
+            m.sphere((0.0, q, 0.0), q, n=18)
+        case "rod":
+            m.revolve([(0.0, 0.0), (q, 0.0), (q, 0.015), (0.012, 0.03), (0.01, f), (0.0, f)], n=24)
+        case "block":
+            m.loft(rings(rect, [(q * 1.5, q * 1.5, 0.006, 0.0), (q * 1.5, q * 1.5, 0.006, 0.75 * f),
+                (q * 0.5, q * 0.5, 0.006, 0.85 * f)], n=2))
+        case "balls":
+            for k in range(3):
+                m.sphere((0.0, q * (0.75 + 1.15 * k * 0.8), 0.0), q * (0.75 - 0.12 * k), n=14)
+        case "tripod":
+            for k in range(3):
+                m.tube([polar(q, 0.004, 2.0944 * k), polar(0.01, f, 2.0944 * k)], 0.008, n=7)
+        case "fluted":
+            m.loft(rings(fluted, [(1.6 * q, 12, 0.08, 0.0), (2 * q, 12, 0.08, 0.4 * f),
+                (1.1 * q, 12, 0.08, 0.85 * f), (0.6 * q, 12, 0.08, 0.9 * f)]), sharp=70.0)
+        case "baluster":
+            m.revolve([(0.0, 0.0), (q, 0.0), (q, 0.02), (q * 0.4, 0.06), (q * 0.55, 0.3 * f),
+                (q * 0.3, 0.5 * f), (q * 0.5, 0.7 * f), (q * 0.2, 0.9 * f), (q * 0.2, f),
+                (0.0, f)], n=20)
 
 
 @family(group="table_lamp", nyu40=LAMP, place=Place.SURFACE, called="desk_lamp", variants=16,
@@ -233,138 +283,167 @@ def arm_lamp(m: Maker, size: Size) -> None:
     size=lambda m: (*m.pick((0.3, 0.3), (0.38, 0.38), (0.46, 0.46), (0.56, 0.56)),
     m.pick(0.1, 0.13, 0.15, 0.5, 0.6, 0.7)))
 def hanging_lamp(m: Maker, size: Size) -> None:
-    """A lamp under the ceiling.
-
-    Domes, balls, drums, cones, a ring, a cluster, arms, rattan, flat plates.
-    """
-    w, d, h = size
-    r = w / 2
+    """A lamp under the ceiling: flat, or hung from a canopy if it is over 0.2 m high."""
     material = m.pick(
         m.metal, BLACK_STEEL, BRASS, WHITE_STEEL, glossy("enamel", m.style.accent, 0.3), m.timber
     )
-    fabric = plain("shade fabric", m.pick((0.9, 0.87, 0.8), (0.9, 0.88, 0.85), m.textile(),
-        m.style.accent), 0.9)
-    # Flat ones: a dish, a drum, a square, spots on a bar, a ring of metal round a plate.
-    if h < 0.2:
-        form = m.weighted(0.3, 0.25, 0.15, 0.15, 0.15)
-        match form:
-            case 0:  # a bowl at the ceiling
-                m.cylinder(r, h - 0.025, h, n=32, of=material)
-                m.revolve([(0.0, 0.0), (r * 0.5, 0.1 * h), (r * 0.85, 0.4 * h),
-                    (r * 0.95, h - 0.026), (0.0, h - 0.026)], n=32, of=OPAL)
-            case 1:  # a drum of cloth
-                m.revolve([(r - 0.004, 0.0), (r, 0.0), (r, h), (0.0, h), (0.0, h - 0.004),
-                    (r - 0.004, h - 0.004), (r - 0.004, 0.0)], n=32, of=fabric)
-                m.cylinder(r - 0.005, 0.015, 0.02, n=32, of=OPAL)
-            case 2:  # a square plate
-                m.board(w, d, h - 0.03, h, 0.01, 0.002, of=material)
-                m.board(w - 0.04, d - 0.04, 0.0, h - 0.031, 0.02, 0.006, of=OPAL)
-            case 3:  # a bar with three spots
-                m.box(2 * r, (h - 0.03, h), 0.06, 0.002, of=material)
-                for x in (-0.7, 0.0, 0.7):
-                    with m.moved(at=(x * r, 0.0, 0.0), turn=rotation_x(x * 0.5)):
-                        m.revolve([(0.0, h - 0.03), (0.012, h - 0.03), (0.03, h - 0.045),
-                            (0.032, 0.012), (0.0, 0.012)], of=material)
-                        m.cylinder(0.026, 0.002, 0.0115, of=OPAL)
-                m.cylinder(d / 2, h - 0.02, h - 0.001, n=24, of=material)
-            case 4:  # a drum of glass in a rim
-                m.cylinder(0.06, h - 0.02, h, n=20, of=material)
-                m.cylinder(r * 0.9, 0.02, h - 0.021, n=32, of=OPAL)
-                m.revolve([(r * 0.9, 0.0), (r, 0.0), (r, h - 0.01), (r * 0.9, h - 0.01),
-                    (r * 0.9, 0.0)], n=32, of=material)
-    # Hanging ones, from a canopy by a cord.
-    if h > 0.2:
-        form = m.integers(0, 10)
-        m.frustum((0.045, h - 0.03), (0.05, h), n=22, of=material)
-        low = 0.36 * h
-        if form not in (5, 6, 8):
-            m.rod(0.0, (low, h - 0.025), 0.0, 0.0035, n=6, of=RUBBER)
-        match form:
-            case 0:  # a cone of metal
-                m.revolve([(r, 0.0), (r * 0.55, 0.2 * h), (0.03, low), (0.0, low),
-                    (0.0, low - 0.004), (0.027, low - 0.004), (r * 0.55 - 0.004, 0.2 * h - 0.002),
-                    (r - 0.003, 0.0), (r, 0.0)], n=32, of=material)
-                m.sphere((0.0, 0.14 * h, 0.0), 0.036, n=14, of=OPAL)
-            case 1:  # a drum of cloth
-                m.revolve([(r, 0.0), (r * 0.98, low), (r * 0.98 - 0.003, low), (r - 0.003, 0.0),
-                    (r, 0.0)], n=32, of=fabric)
-                m.sphere((0.0, 0.18 * h, 0.0), 0.045, n=14, of=OPAL)
-                for k in range(3):
-                    m.tube([(0.0, low - 0.004, 0.0), polar(r * 0.975, low - 0.004, 2.1 * k)],
-                        0.0025, n=5, of=material)
-            case 2:  # a dome
-                m.revolve([(r, 0.0), (r * 0.95, 0.12 * h), (r * 0.7, 0.26 * h), (0.03, low),
-                    (0.0, low), (0.0, low - 0.004), (0.028, low - 0.005),
-                    (r * 0.7 - 0.003, 0.26 * h - 0.004), (r * 0.95 - 0.004, 0.12 * h),
-                    (r - 0.004, 0.0), (r, 0.0)], n=36, of=material)
-                m.sphere((0.0, 0.16 * h, 0.0), 0.045, n=14, of=OPAL)
-            case 3:  # a ball of opal, pressed
-                m.add(stretched(sphere((0, 0, 0), 1.0, n=22), (r, 0.5 * low, r)),
-                    at=(0.0, 0.5 * low, 0.0), of=OPAL)
-                m.frustum((0.04, low - 0.006), (0.03, low + 0.02), of=material)
-            case 4:  # a basket of hoops round a bulb
-                for k in range(7):
-                    m.hoop(oval(w * sin(0.35 + 2.4 * k / 6) - 0.014,
-                        d * sin(0.35 + 2.4 * k / 6) - 0.014, n=24), 0.007 + (low - 0.014) * k / 6,
-                        0.006, n=5, of=m.pick(WICKER, WICKER, material))
-                for k in range(10):
-                    m.tube(bent([polar(0.04, low - 0.004, 0.628 * k),
-                        polar(r - 0.01, 0.5 * low, 0.628 * k), polar(0.3 * r, 0.006, 0.628 * k)],
-                        0.3, n=5), 0.003, n=4, of=WICKER)
-                m.sphere((0.0, 0.55 * low, 0.0), 0.045, n=14, of=OPAL)
-            case 5:  # a ring on three wires
-                m.hoop(oval(w - 0.03, d - 0.03, n=40), 0.015, 0.015, n=8, of=material)
-                m.hoop(oval(w - 0.07, d - 0.07, n=40), 0.012, 0.0115, of=OPAL)
-                for k in range(3):
-                    m.tube([polar(r - 0.015, 0.02, 2.0944 * k), polar(0.02, h - 0.025, 2.0944 * k)],
-                        0.0015, n=5, of=material)
-            case 6:  # a cluster of small balls at several heights
-                n = m.integers(4, 7)  # three would fill five sixths of the width alone
-                for k in range(n):
-                    a, y = 2 * pi * k / n, 0.0 if k == 0 else h * m.uniform(0.0, 0.35)
-                    x, z, q = (r - 0.06) * cos(a), (d / 2 - 0.06) * sin(a), 0.06
-                    m.tube([(x, y + 2 * q - 0.004, z), (x, h - 0.1, z), polar(0.02, h - 0.026, a)],
-                        0.003, n=5, of=RUBBER)
-                    m.sphere((x, y + q, z), q, n=14, of=OPAL)
-                    m.frustum(
-                        (0.018, 0.0), (0.014, 0.03), n=12, at=(x, y + 2 * q - 0.008, z), of=material
-                    )
-            case 7:  # arms that bend up, a bulb on each
-                n = m.integers(3, 7)
-                m.sphere((0.0, 0.4 * low, 0.0), 0.03, n=12, of=material)
-                m.rod(0.0, (0.4 * low, low + 0.02), 0.0, 0.008, of=material)
-                for k in range(n):
-                    a = 2 * pi * k / n
-                    m.tube(bent([(0.0, 0.4 * low, 0.0), polar(0.5 * r, 0.02, a),
-                        polar(r - 0.03, 0.1 * low, a), polar(r - 0.03, 0.45 * low, a)], 0.08, n=4),
-                        0.006, n=7, of=material)
-                    m.frustum((0.022, 0.45 * low), (0.026, 0.5 * low), n=12,
-                        at=polar(r - 0.03, 0.0, a), of=material)
-                    m.revolve([(0.0, 0.505 * low), (0.014, 0.505 * low), (0.02, 0.65 * low),
-                        (0.0, 0.85 * low)], n=12, at=polar(r - 0.03, 0.0, a), of=OPAL)
-                m.revolve([(0.0, 0.0), (0.012, 0.006), (0.0, 0.3 * low)], n=10, of=material)
-            case 8:  # a bar with three shades
-                m.box(2 * r, (low - 0.02, low), 0.024, 0.002, of=material)
-                for x in (-0.5, 0.5):
-                    m.tube(
-                        [(x * r, low - 0.002, 0.0), (0.0, h - 0.026, 0.0)], 0.002, n=5, of=material
-                    )
-                for x in (-0.72, 0.0, 0.72):
-                    with m.moved(at=(x * r, 0.0, 0.0)):
-                        m.rod(0.0, (0.5 * low, low - 0.018), 0.0, 0.003, n=5, of=RUBBER)
-                        m.revolve([(0.075, 0.0), (0.06, 0.3 * low), (0.015, 0.55 * low),
-                            (0.0, 0.55 * low), (0.0, 0.53 * low), (0.013, 0.53 * low),
-                            (0.057, 0.3 * low), (0.072, 0.0), (0.075, 0.0)], n=20, of=material)
-                        m.sphere((0.0, 0.2 * low, 0.0), 0.03, n=10, of=OPAL)
-                m.cylinder(d / 2, h - 0.012, h - 0.001, n=24, of=material)
-            case 9:  # leaves of a flower: three plates over each other
-                for k in range(3):
-                    q, y = r * (1.0 - 0.24 * k), 0.1 * low + 0.3 * low * k
-                    m.revolve([(q, y), (q * 0.6, y + 0.22 * low), (0.02, y + 0.3 * low),
-                        (0.02, y + 0.29 * low), (q * 0.6 - 0.002, y + 0.21 * low),
-                        (q - 0.003, y - 0.002), (q, y)], n=30, of=material)
-                m.sphere((0.0, 0.22 * low, 0.0), 0.04, n=12, of=OPAL)
-                m.revolve([(0.0, 0.0), (0.05, 0.005), (0.05, 0.03), (0.0, 0.03)], n=18, of=material)
+    fabric = shade_fabric(m)
+    if size[2] < 0.2:
+        flat_lamp(m, size, material, fabric)
+    else:
+        hung_lamp(m, size, material, fabric)
+
+
+def flat_lamp(m: Maker, size: Size, material: Material, fabric: Material) -> None:
+    """A lamp close to the ceiling: a bowl, a drum, a plate, spots on a bar, or glass in a rim."""
+    w, d, h = size
+    r = w / 2
+    form = m.weighted(0.3, 0.25, 0.15, 0.15, 0.15)
+    match form:
+        case 0:  # a bowl at the ceiling
+            m.cylinder(r, h - 0.025, h, n=32, of=material)
+            m.revolve([(0.0, 0.0), (r * 0.5, 0.1 * h), (r * 0.85, 0.4 * h),
+                (r * 0.95, h - 0.026), (0.0, h - 0.026)], n=32, of=OPAL)
+        case 1:  # a drum of cloth
+            m.revolve([(r - 0.004, 0.0), (r, 0.0), (r, h), (0.0, h), (0.0, h - 0.004),
+                (r - 0.004, h - 0.004), (r - 0.004, 0.0)], n=32, of=fabric)
+            m.cylinder(r - 0.005, 0.015, 0.02, n=32, of=OPAL)
+        case 2:  # a square plate
+            m.board(w, d, h - 0.03, h, 0.01, 0.002, of=material)
+            m.board(w - 0.04, d - 0.04, 0.0, h - 0.031, 0.02, 0.006, of=OPAL)
+        case 3:  # a bar with three spots
+            m.box(2 * r, (h - 0.03, h), 0.06, 0.002, of=material)
+            for x in (-0.7, 0.0, 0.7):
+                with m.moved(at=(x * r, 0.0, 0.0), turn=rotation_x(x * 0.5)):
+                    m.revolve([(0.0, h - 0.03), (0.012, h - 0.03), (0.03, h - 0.045),
+                        (0.032, 0.012), (0.0, 0.012)], of=material)
+                    m.cylinder(0.026, 0.002, 0.0115, of=OPAL)
+            m.cylinder(d / 2, h - 0.02, h - 0.001, n=24, of=material)
+        case 4:  # a drum of glass in a rim
+            m.cylinder(0.06, h - 0.02, h, n=20, of=material)
+            m.cylinder(r * 0.9, 0.02, h - 0.021, n=32, of=OPAL)
+            m.revolve([(r * 0.9, 0.0), (r, 0.0), (r, h - 0.01), (r * 0.9, h - 0.01),
+                (r * 0.9, 0.0)], n=32, of=material)
+
+
+def hung_lamp(m: Maker, size: Size, material: Material, fabric: Material) -> None:
+    """A lamp that hangs from a canopy.
+
+    Cones, drums, domes, balls, baskets, rings, clusters, arms, bars and leaves.
+    """
+    w, d, h = size
+    r = w / 2
+    form = m.integers(0, 10)
+    m.frustum((0.045, h - 0.03), (0.05, h), n=22, of=material)
+    low = 0.36 * h
+    if form not in (5, 6, 8):
+        m.rod(0.0, (low, h - 0.025), 0.0, 0.0035, n=6, of=RUBBER)
+    match form:
+        case 0:  # a cone of metal
+            m.revolve([(r, 0.0), (r * 0.55, 0.2 * h), (0.03, low), (0.0, low),
+                (0.0, low - 0.004), (0.027, low - 0.004), (r * 0.55 - 0.004, 0.2 * h - 0.002),
+                (r - 0.003, 0.0), (r, 0.0)], n=32, of=material)
+            m.sphere((0.0, 0.14 * h, 0.0), 0.036, n=14, of=OPAL)
+        case 1:  # a drum of cloth
+            m.revolve([(r, 0.0), (r * 0.98, low), (r * 0.98 - 0.003, low), (r - 0.003, 0.0),
+                (r, 0.0)], n=32, of=fabric)
+            m.sphere((0.0, 0.18 * h, 0.0), 0.045, n=14, of=OPAL)
+            for k in range(3):
+                m.tube([(0.0, low - 0.004, 0.0), polar(r * 0.975, low - 0.004, 2.1 * k)],
+                    0.0025, n=5, of=material)
+        case 2:  # a dome
+            m.revolve([(r, 0.0), (r * 0.95, 0.12 * h), (r * 0.7, 0.26 * h), (0.03, low),
+                (0.0, low), (0.0, low - 0.004), (0.028, low - 0.005),
+                (r * 0.7 - 0.003, 0.26 * h - 0.004), (r * 0.95 - 0.004, 0.12 * h),
+                (r - 0.004, 0.0), (r, 0.0)], n=36, of=material)
+            m.sphere((0.0, 0.16 * h, 0.0), 0.045, n=14, of=OPAL)
+        case 3:  # a ball of opal, pressed
+            m.add(stretched(sphere((0, 0, 0), 1.0, n=22), (r, 0.5 * low, r)),
+                at=(0.0, 0.5 * low, 0.0), of=OPAL)
+            m.frustum((0.04, low - 0.006), (0.03, low + 0.02), of=material)
+        case 4:
+            basket_lamp(m, w, d, r, low, material)
+        case 5:  # a ring on three wires
+            m.hoop(oval(w - 0.03, d - 0.03, n=40), 0.015, 0.015, n=8, of=material)
+            m.hoop(oval(w - 0.07, d - 0.07, n=40), 0.012, 0.0115, of=OPAL)
+            for k in range(3):
+                m.tube([polar(r - 0.015, 0.02, 2.0944 * k), polar(0.02, h - 0.025, 2.0944 * k)],
+                    0.0015, n=5, of=material)
+        case 6:
+            ball_cluster(m, h, d, r, material)
+        case 7:
+            arm_chandelier(m, r, low, material)
+        case 8:
+            bar_lamp(m, h, d, r, low, material)
+        case 9:  # leaves of a flower: three plates over each other
+            for k in range(3):
+                q, y = r * (1.0 - 0.24 * k), 0.1 * low + 0.3 * low * k
+                m.revolve([(q, y), (q * 0.6, y + 0.22 * low), (0.02, y + 0.3 * low),
+                    (0.02, y + 0.29 * low), (q * 0.6 - 0.002, y + 0.21 * low),
+                    (q - 0.003, y - 0.002), (q, y)], n=30, of=material)
+            m.sphere((0.0, 0.22 * low, 0.0), 0.04, n=12, of=OPAL)
+            m.revolve([(0.0, 0.0), (0.05, 0.005), (0.05, 0.03), (0.0, 0.03)], n=18, of=material)
+
+
+def basket_lamp(m: Maker, w: float, d: float, r: float, low: float, material: Material) -> None:
+    """A basket of hoops round a bulb."""
+    for k in range(7):
+        m.hoop(oval(w * sin(0.35 + 2.4 * k / 6) - 0.014,
+            d * sin(0.35 + 2.4 * k / 6) - 0.014, n=24), 0.007 + (low - 0.014) * k / 6,
+            0.006, n=5, of=m.pick(WICKER, WICKER, material))
+    for k in range(10):
+        m.tube(bent([polar(0.04, low - 0.004, 0.628 * k),
+            polar(r - 0.01, 0.5 * low, 0.628 * k), polar(0.3 * r, 0.006, 0.628 * k)],
+            0.3, n=5), 0.003, n=4, of=WICKER)
+    m.sphere((0.0, 0.55 * low, 0.0), 0.045, n=14, of=OPAL)
+
+
+def ball_cluster(m: Maker, h: float, d: float, r: float, material: Material) -> None:
+    """A cluster of small balls at different heights."""
+    n = m.integers(4, 7)  # three would fill five sixths of the width alone
+    for k in range(n):
+        a, y = 2 * pi * k / n, 0.0 if k == 0 else h * m.uniform(0.0, 0.35)
+        x, z, q = (r - 0.06) * cos(a), (d / 2 - 0.06) * sin(a), 0.06
+        m.tube([(x, y + 2 * q - 0.004, z), (x, h - 0.1, z), polar(0.02, h - 0.026, a)],
+            0.003, n=5, of=RUBBER)
+        m.sphere((x, y + q, z), q, n=14, of=OPAL)
+        m.frustum(
+            (0.018, 0.0), (0.014, 0.03), n=12, at=(x, y + 2 * q - 0.008, z), of=material
+        )
+
+
+def arm_chandelier(m: Maker, r: float, low: float, material: Material) -> None:
+    """Arms that bend upwards, a bulb on each."""
+    n = m.integers(3, 7)
+    m.sphere((0.0, 0.4 * low, 0.0), 0.03, n=12, of=material)
+    m.rod(0.0, (0.4 * low, low + 0.02), 0.0, 0.008, of=material)
+    for k in range(n):
+        a = 2 * pi * k / n
+        m.tube(bent([(0.0, 0.4 * low, 0.0), polar(0.5 * r, 0.02, a),
+            polar(r - 0.03, 0.1 * low, a), polar(r - 0.03, 0.45 * low, a)], 0.08, n=4),
+            0.006, n=7, of=material)
+        m.frustum((0.022, 0.45 * low), (0.026, 0.5 * low), n=12,
+            at=polar(r - 0.03, 0.0, a), of=material)
+        m.revolve([(0.0, 0.505 * low), (0.014, 0.505 * low), (0.02, 0.65 * low),
+            (0.0, 0.85 * low)], n=12, at=polar(r - 0.03, 0.0, a), of=OPAL)
+    m.revolve([(0.0, 0.0), (0.012, 0.006), (0.0, 0.3 * low)], n=10, of=material)
+
+
+def bar_lamp(m: Maker, h: float, d: float, r: float, low: float, material: Material) -> None:
+    """A bar with three shades."""
+    m.box(2 * r, (low - 0.02, low), 0.024, 0.002, of=material)
+    for x in (-0.5, 0.5):
+        m.tube(
+            [(x * r, low - 0.002, 0.0), (0.0, h - 0.026, 0.0)], 0.002, n=5, of=material
+        )
+    for x in (-0.72, 0.0, 0.72):
+        with m.moved(at=(x * r, 0.0, 0.0)):
+            m.rod(0.0, (0.5 * low, low - 0.018), 0.0, 0.003, n=5, of=RUBBER)
+            m.revolve([(0.075, 0.0), (0.06, 0.3 * low), (0.015, 0.55 * low),
+                (0.0, 0.55 * low), (0.0, 0.53 * low), (0.013, 0.53 * low),
+                (0.057, 0.3 * low), (0.072, 0.0), (0.075, 0.0)], n=20, of=material)
+            m.sphere((0.0, 0.2 * low, 0.0), 0.03, n=10, of=OPAL)
+    m.cylinder(d / 2, h - 0.012, h - 0.001, n=24, of=material)
 
 
 @family(group="wall_lamp", nyu40=LAMP, place=Place.WALL, called="wall_lamp", variants=24,

@@ -7,6 +7,7 @@ from itertools import product
 from numpy import pi
 
 from pbrs_farm.core.frames import LYING_ALONG_Z, rotation_y, rotation_z
+from pbrs_farm.core.house import Material
 from pbrs_farm.furnishings.things.bodies import sphere, stretched
 from pbrs_farm.furnishings.things.maker import Maker, thing
 from pbrs_farm.furnishings.things.materials import plain
@@ -27,158 +28,223 @@ def toy(m: Maker) -> None:
     grain = plain("toy wood", m.wood, 0.6)
     match form:
         case 0:
-            m.name, fur = ("bear", plain("fur", m.pick((0.5, 0.33, 0.2), (0.75, 0.62, 0.45),
-                (0.4, 0.4, 0.42), (0.9, 0.87, 0.8)), 0.98))
-            with m.of(fur):
-                m.add(stretched(sphere((0, 0, 0), 1.0, n=14), (0.075 * s, 0.085 * s, 0.065 * s)),
-                    at=(0, 0.085 * s, 0))
-                m.sphere((0, 0.2 * s, 0.01), 0.062 * s, n=14)
-                for x in (-1.0, 1.0):
-                    m.sphere((x * 0.05 * s, 0.25 * s, 0), 0.022 * s, n=10)
-                    m.add(stretched(sphere((0, 0, 0), 1.0, n=10), (0.03 * s, 0.03 * s, 0.06 * s)),
-                        turn=rotation_y(x * 0.4), at=(x * 0.055 * s, 0.031 * s, 0.07 * s))
-                    m.add(stretched(sphere((0, 0, 0), 1.0, n=10), (0.024 * s, 0.055 * s,
-                        0.026 * s)), turn=rotation_z(x * 0.7), at=(x * 0.088 * s, 0.12 * s,
-                        0.02 * s))
-            m.add(stretched(sphere((0, 0, 0), 1.0, n=10), (0.028 * s, 0.022 * s, 0.022 * s)),
-                at=(0, 0.188 * s, 0.062 * s), of=plain("snout", (0.85, 0.75, 0.6), 0.98))
-            for x, y, r in ((-0.022, 0.218, 0.007), (0.022, 0.218, 0.007), (0.0, 0.196, 0.009)):
-                m.sphere((x * s, y * s, (0.068 if r < 0.008 else 0.083) * s), r * s, n=8,
-                    of=plain("button", (0.05, 0.04, 0.04), 0.3))
+            bear(m, s)
         case 1:
-            m.name = "toy_blocks"
-            for k in range(m.integers(4, 9)):
-                m.box(0.04, 0.04, 0.04, 0.003, turn=rotation_y(m.uniform(-0.6, 0.6)),
-                    at=(0.05 * (k % 3), 0.0404 * (k // 3), m.uniform(-0.004, 0.004)),
-                    of=m.pick(own, other, third, grain))
+            toy_blocks(m, own, other, third, grain)
         case 2:
-            m.name = "toy_train"
-            for k in range(m.integers(2, 4)):
-                with m.moved(at=(0, 0, -0.115 * k)):
-                    m.box(0.06, (0.016, 0.034), 0.096, 0.004, of=m.pick(own, grain))
-                    for x, z in product((-0.031, 0.031), (-0.03, 0.03)):
-                        m.rod((x - 0.005, x + 0.005), 0.016, z, 0.016, n=12, of=third)
-                    if k == 0:
-                        m.rod(0, 0.055, (-0.02, 0.045), 0.022, n=14, of=other)
-                        m.box(0.056, (0.0345, 0.095), 0.032, 0.004, against=-0.047, of=own)
-                        m.frustum((0.009, 0.07), (0.012, 0.1), n=10, at=(0, 0, 0.028), of=third)
-                    else:
-                        m.box(0.054, (0.0345, 0.07), 0.084, 0.004, of=m.pick(other, third, own))
+            toy_train(m, own, other, third, grain)
         case 3:
-            m.name = "toy_car"
-            m.box(0.08 * s, (0.018, 0.05 * s), 0.18 * s, 0.01, of=own)
-            m.loft([(rect(0.074 * s, 0.1 * s, 0.01, z=-0.01), 0.0502 * s),
-                (rect(0.06 * s, 0.07 * s, 0.01, z=-0.012), 0.082 * s)], of=m.pick(own, other))
-            for x, z in product((-0.04, 0.04), (-0.055, 0.055)):
-                m.rod(((x - 0.008) * s, (x + 0.008) * s), 0.02, z * s, 0.02, n=14,
-                    of=plain("tyre", (0.06, 0.06, 0.06), 0.8))
-            for x in (-0.025, 0.025):
-                m.sphere((x * s, 0.036 * s, 0.089 * s), 0.008, n=8,
-                    of=plain("lamp", (0.95, 0.9, 0.7), 0.2))
+            toy_car(m, s, own, other)
         case 4:
-            m.name = "stacking_rings"
-            m.revolve([(0, 0), (0.06, 0), (0.058, 0.012), (0.012, 0.014), (0.01, 0.15 * s),
-                (0, 0.16 * s)], n=18, of=grain)
-            for k in range(5):
-                m.hoop(oval(0.085 - 0.011 * k, 0.085 - 0.011 * k, n=18), 0.03 + 0.0255 * s * k,
-                    0.0125 * s, n=7, of=m.pick(own, other, third))
+            stacking_rings(m, s, own, other, third, grain)
         case 5:
-            m.name = "robot"
-            with m.of(own):
-                m.box(0.08, (0.07, 0.15), 0.05, 0.004)
-                m.box(0.03, 0.07, 0.055, 0.004, left=-0.037, z=0.0025, mirrored="x")
-                m.box(0.02, (0.08, 0.145), 0.024, 0.003, left=-0.062, mirrored="x")
-            m.box(0.06, (0.156, 0.205), 0.05, 0.004, of=other)
-            for x in (-0.013, 0.013):
-                m.cylinder(
-                    0.008, 0, 0.004, n=10, turn=LYING_ALONG_Z, at=(x, 0.185, 0.025), of=third
-                )
-            m.rod(0, (0.2, 0.235), 0, 0.003, n=6, of=third)
-            m.sphere((0, 0.237, 0), 0.007, n=8, of=third)
-            m.box(0.024, (0.14, 0.157), 0.024, 0.002, of=third)
-            m.box(0.05, (0.095, 0.13), (0.0245, 0.028), 0.001, of=other)
+            robot(m, own, other, third)
         case 6:
-            m.name = "plane"
-            m.tube([(0, 0.04, -0.1), (0, 0.045, 0.09)], 0.012, n=12, end=0.024, of=own)
-            m.box(0.26, (0.042, 0.05), (0.0, 0.055), 0.003, of=other)
-            m.box(0.1, (0.042, 0.048), 0.03, 0.002, against=-0.1, of=other)
-            m.box(0.006, (0.045, 0.09), 0.035, 0.001, against=-0.105, of=third)
-            m.revolve([(0, 0), (0.01, 0), (0, 0.018)], n=10, turn=LYING_ALONG_Z,
-                at=(0, 0.045, 0.089), of=third)
-            m.box(0.12, (0.041, 0.049), (0.095, 0.099), 0.001, turn=rotation_z(0.3),
-                at=(0.013, 0, 0), of=grain)
-            for x in (-0.035, 0.035):
-                m.rod((x - 0.006, x + 0.006), 0.014, 0.04, 0.014, n=10, of=third)
-            for x in (-0.035, 0.035):
-                m.tube([(x, 0.014, 0.04), (x * 0.5, 0.045, 0.035)], 0.003, n=5, of=grain)
+            plane(m, own, other, third, grain)
         case 7:
-            m.name = "rocket"
-            m.revolve([(0, 0.02), (0.03, 0.02), (0.04, 0.08), (0.038, 0.15), (0.02, 0.2),
-                (0, 0.225)], n=18, of=own)
-            m.revolve([(0.037, 0.148), (0.0385, 0.148), (0.021, 0.2), (0, 0.228), (0, 0.224),
-                (0.018, 0.199), (0.037, 0.148)], n=18, of=other)
-            for k in range(3):
-                m.loft([([(0.02, -0.003), (0.02, 0.003), (0.07, 0.003), (0.07, -0.003)], 0.0),
-                    ([(0.02, -0.003), (0.02, 0.003), (0.045, 0.003), (0.045, -0.003)], 0.08)],
-                    sharp=10.0, turn=rotation_y(2.0944 * k), of=third)
-            m.cylinder(0.013, 0, 0.004, n=12, turn=LYING_ALONG_Z, at=(0, 0.12, 0.0375),
-                of=plain("window", (0.6, 0.8, 0.9), 0.2))
+            rocket(m, own, other, third)
         case 8:
-            m.name = "doll_house"
-            w, h, d = m.uniform(0.22, 0.3), m.uniform(0.2, 0.28), 0.14
-            with m.of(m.pick(grain, plain("toy white", (0.92, 0.91, 0.88), 0.5))):
-                m.box(w, h, 0.006, against=-d / 2)
-                m.box(0.008, h, (-d / 2 + 0.006, d / 2), left=-w / 2, mirrored="x")
-                for y in (0.0, h / 2):
-                    m.box(w - 0.016, 0.008, (-d / 2 + 0.006, d / 2), on=y)
-                m.box(0.008, (0.008, h / 2), (-d / 2 + 0.006, d / 2))
-            m.loft(rings(rect, [(w + 0.03, d + 0.02, 0.001, h + 0.0002),
-                (0.01, d + 0.02, 0.001, h + 0.1)], n=1), sharp=20.0, of=own)
+            doll_house(m, own, grain)
         case 9:
-            m.name = "drum"
-            r, h = m.uniform(0.07, 0.11), m.uniform(0.09, 0.14)
-            m.cylinder(r, 0, h, n=26, of=own)
-            for y in (0.01, h - 0.006):
-                m.hoop(oval(2 * r, 2 * r, n=24), y, 0.007, of=other)
-            for k in range(2):
-                m.tube([(-0.1, h + 0.009, -0.02 + 0.04 * k), (0.11, h + 0.012, 0.02 - 0.01 * k)],
-                    0.004, n=6, of=grain)
+            drum(m, own, other, grain)
         case 10:
-            m.name = "pull_animal"
-            with m.of(grain):
-                m.box(0.06, (0.02, 0.032), 0.16, 0.003)
-                for x, z in product((-0.036, 0.036), (-0.055, 0.055)):
-                    m.rod((x - 0.006, x + 0.006), 0.02, z, 0.02, n=14)
-            with m.of(own):
-                m.rounded(0.044, (0.05, 0.1), (-0.06, 0.05), 0.02)
-                for z in (-0.045, 0.035):
-                    m.box(0.04, (0.0322, 0.07), 0.024, 0.003, z=z)
-                m.rounded(0.04, (0.085, 0.13), (0.035, 0.09), 0.018)
-            for x in (-1.0, 1.0):
-                m.add(stretched(sphere((0, 0, 0), 1.0, n=8), (0.005, 0.022, 0.013)),
-                    at=(x * 0.022, 0.115, 0.05), of=other)
-            m.tube(bent([(0, 0.026, 0.08), (0.01, 0.012, 0.13), (0.05, 0.006, 0.16),
-                (0.02, 0.006, 0.21)], 0.04, n=4), 0.003, n=5, of=third)
+            pull_animal(m, own, other, third, grain)
         case 11:
-            m.name = "puzzle_box"
-            m.box(0.3, 0.05, 0.22, 0.001, of=own)
-            m.box(0.28, (0.05, 0.0506), 0.2, of=other)
-            m.box(0.18, (0.0507, 0.0511), 0.06, of=third)
-            if m.chance(0.5):
-                m.box(0.26, (0.0513, 0.09), 0.19, 0.001, of=third)
+            puzzle_box(m, own, other, third)
         case 12:
-            m.name = "dinosaur"
-            with m.of(own):
-                m.rounded(0.06, (0.04, 0.1), 0.1, 0.028)
-                m.tube(bent([(0, 0.075, 0.04), (0, 0.1, 0.09), (0, 0.19, 0.1), (0, 0.2, 0.14)],
-                    0.04, n=4), 0.022, end=0.014)
-                m.tube(bent([(0, 0.075, -0.04), (0, 0.05, -0.1), (0, 0.02, -0.17)], 0.05, n=4),
-                    0.024, end=0.004)
-                for x, z in product((-0.02, 0.02), (-0.033, 0.033)):
-                    m.tube([(x * 1.2, 0, z), (x, 0.06, z)], 0.011, end=0.014)
-                for k in range(5):
-                    m.revolve([(0, 0), (0.01, 0), (0, 0.024)], n=6,
-                        at=(0, 0.096 - 0.002 * (k - 2) * (k - 2), -0.04 + 0.02 * k), of=other)
+            dinosaur(m, own, other)
+
+
+def bear(m: Maker, s: float) -> None:
+    """A bear."""
+    m.name, fur = ("bear", plain("fur", m.pick((0.5, 0.33, 0.2), (0.75, 0.62, 0.45),
+        (0.4, 0.4, 0.42), (0.9, 0.87, 0.8)), 0.98))
+    with m.of(fur):
+        m.add(stretched(sphere((0, 0, 0), 1.0, n=14), (0.075 * s, 0.085 * s, 0.065 * s)),
+            at=(0, 0.085 * s, 0))
+        m.sphere((0, 0.2 * s, 0.01), 0.062 * s, n=14)
+        for x in (-1.0, 1.0):
+            m.sphere((x * 0.05 * s, 0.25 * s, 0), 0.022 * s, n=10)
+            m.add(stretched(sphere((0, 0, 0), 1.0, n=10), (0.03 * s, 0.03 * s, 0.06 * s)),
+                turn=rotation_y(x * 0.4), at=(x * 0.055 * s, 0.031 * s, 0.07 * s))
+            m.add(stretched(sphere((0, 0, 0), 1.0, n=10), (0.024 * s, 0.055 * s,
+                0.026 * s)), turn=rotation_z(x * 0.7), at=(x * 0.088 * s, 0.12 * s,
+                0.02 * s))
+    m.add(stretched(sphere((0, 0, 0), 1.0, n=10), (0.028 * s, 0.022 * s, 0.022 * s)),
+        at=(0, 0.188 * s, 0.062 * s), of=plain("snout", (0.85, 0.75, 0.6), 0.98))
+    for x, y, r in ((-0.022, 0.218, 0.007), (0.022, 0.218, 0.007), (0.0, 0.196, 0.009)):
+        m.sphere((x * s, y * s, (0.068 if r < 0.008 else 0.083) * s), r * s, n=8,
+            of=plain("button", (0.05, 0.04, 0.04), 0.3))
+
+
+def toy_blocks(m: Maker, own: Material, other: Material, third: Material, grain: Material) -> None:
+    """Toy blocks."""
+    m.name = "toy_blocks"
+    for k in range(m.integers(4, 9)):
+        m.box(0.04, 0.04, 0.04, 0.003, turn=rotation_y(m.uniform(-0.6, 0.6)),
+            at=(0.05 * (k % 3), 0.0404 * (k // 3), m.uniform(-0.004, 0.004)),
+            of=m.pick(own, other, third, grain))
+
+
+def toy_train(m: Maker, own: Material, other: Material, third: Material, grain: Material) -> None:
+    """A toy train."""
+    m.name = "toy_train"
+    for k in range(m.integers(2, 4)):
+        with m.moved(at=(0, 0, -0.115 * k)):
+            m.box(0.06, (0.016, 0.034), 0.096, 0.004, of=m.pick(own, grain))
+            for x, z in product((-0.031, 0.031), (-0.03, 0.03)):
+                m.rod((x - 0.005, x + 0.005), 0.016, z, 0.016, n=12, of=third)
+            if k == 0:
+                m.rod(0, 0.055, (-0.02, 0.045), 0.022, n=14, of=other)
+                m.box(0.056, (0.0345, 0.095), 0.032, 0.004, against=-0.047, of=own)
+                m.frustum((0.009, 0.07), (0.012, 0.1), n=10, at=(0, 0, 0.028), of=third)
+            else:
+                m.box(0.054, (0.0345, 0.07), 0.084, 0.004, of=m.pick(other, third, own))
+
+
+def toy_car(m: Maker, s: float, own: Material, other: Material) -> None:
+    """A toy car."""
+    m.name = "toy_car"
+    m.box(0.08 * s, (0.018, 0.05 * s), 0.18 * s, 0.01, of=own)
+    m.loft([(rect(0.074 * s, 0.1 * s, 0.01, z=-0.01), 0.0502 * s),
+        (rect(0.06 * s, 0.07 * s, 0.01, z=-0.012), 0.082 * s)], of=m.pick(own, other))
+    for x, z in product((-0.04, 0.04), (-0.055, 0.055)):
+        m.rod(((x - 0.008) * s, (x + 0.008) * s), 0.02, z * s, 0.02, n=14,
+            of=plain("tyre", (0.06, 0.06, 0.06), 0.8))
+    for x in (-0.025, 0.025):
+        m.sphere((x * s, 0.036 * s, 0.089 * s), 0.008, n=8,
+            of=plain("lamp", (0.95, 0.9, 0.7), 0.2))
+
+
+def stacking_rings(m: Maker, s: float, own: Material, other: Material, third: Material, grain: Material) -> None:
+    """Stacking rings."""
+    m.name = "stacking_rings"
+    m.revolve([(0, 0), (0.06, 0), (0.058, 0.012), (0.012, 0.014), (0.01, 0.15 * s),
+        (0, 0.16 * s)], n=18, of=grain)
+    for k in range(5):
+        m.hoop(oval(0.085 - 0.011 * k, 0.085 - 0.011 * k, n=18), 0.03 + 0.0255 * s * k,
+            0.0125 * s, n=7, of=m.pick(own, other, third))
+
+
+def robot(m: Maker, own: Material, other: Material, third: Material) -> None:
+    """A robot."""
+    m.name = "robot"
+    with m.of(own):
+        m.box(0.08, (0.07, 0.15), 0.05, 0.004)
+        m.box(0.03, 0.07, 0.055, 0.004, left=-0.037, z=0.0025, mirrored="x")
+        m.box(0.02, (0.08, 0.145), 0.024, 0.003, left=-0.062, mirrored="x")
+    m.box(0.06, (0.156, 0.205), 0.05, 0.004, of=other)
+    for x in (-0.013, 0.013):
+        m.cylinder(
+            0.008, 0, 0.004, n=10, turn=LYING_ALONG_Z, at=(x, 0.185, 0.025), of=third
+        )
+    m.rod(0, (0.2, 0.235), 0, 0.003, n=6, of=third)
+    m.sphere((0, 0.237, 0), 0.007, n=8, of=third)
+    m.box(0.024, (0.14, 0.157), 0.024, 0.002, of=third)
+    m.box(0.05, (0.095, 0.13), (0.0245, 0.028), 0.001, of=other)
+
+
+def plane(m: Maker, own: Material, other: Material, third: Material, grain: Material) -> None:
+    """A plane."""
+    m.name = "plane"
+    m.tube([(0, 0.04, -0.1), (0, 0.045, 0.09)], 0.012, n=12, end=0.024, of=own)
+    m.box(0.26, (0.042, 0.05), (0.0, 0.055), 0.003, of=other)
+    m.box(0.1, (0.042, 0.048), 0.03, 0.002, against=-0.1, of=other)
+    m.box(0.006, (0.045, 0.09), 0.035, 0.001, against=-0.105, of=third)
+    m.revolve([(0, 0), (0.01, 0), (0, 0.018)], n=10, turn=LYING_ALONG_Z,
+        at=(0, 0.045, 0.089), of=third)
+    m.box(0.12, (0.041, 0.049), (0.095, 0.099), 0.001, turn=rotation_z(0.3),
+        at=(0.013, 0, 0), of=grain)
+    for x in (-0.035, 0.035):
+        m.rod((x - 0.006, x + 0.006), 0.014, 0.04, 0.014, n=10, of=third)
+    for x in (-0.035, 0.035):
+        m.tube([(x, 0.014, 0.04), (x * 0.5, 0.045, 0.035)], 0.003, n=5, of=grain)
+
+
+def rocket(m: Maker, own: Material, other: Material, third: Material) -> None:
+    """A rocket."""
+    m.name = "rocket"
+    m.revolve([(0, 0.02), (0.03, 0.02), (0.04, 0.08), (0.038, 0.15), (0.02, 0.2),
+        (0, 0.225)], n=18, of=own)
+    m.revolve([(0.037, 0.148), (0.0385, 0.148), (0.021, 0.2), (0, 0.228), (0, 0.224),
+        (0.018, 0.199), (0.037, 0.148)], n=18, of=other)
+    for k in range(3):
+        m.loft([([(0.02, -0.003), (0.02, 0.003), (0.07, 0.003), (0.07, -0.003)], 0.0),
+            ([(0.02, -0.003), (0.02, 0.003), (0.045, 0.003), (0.045, -0.003)], 0.08)],
+            sharp=10.0, turn=rotation_y(2.0944 * k), of=third)
+    m.cylinder(0.013, 0, 0.004, n=12, turn=LYING_ALONG_Z, at=(0, 0.12, 0.0375),
+        of=plain("window", (0.6, 0.8, 0.9), 0.2))
+
+
+def doll_house(m: Maker, own: Material, grain: Material) -> None:
+    """A doll house."""
+    m.name = "doll_house"
+    w, h, d = m.uniform(0.22, 0.3), m.uniform(0.2, 0.28), 0.14
+    with m.of(m.pick(grain, plain("toy white", (0.92, 0.91, 0.88), 0.5))):
+        m.box(w, h, 0.006, against=-d / 2)
+        m.box(0.008, h, (-d / 2 + 0.006, d / 2), left=-w / 2, mirrored="x")
+        for y in (0.0, h / 2):
+            m.box(w - 0.016, 0.008, (-d / 2 + 0.006, d / 2), on=y)
+        m.box(0.008, (0.008, h / 2), (-d / 2 + 0.006, d / 2))
+    m.loft(rings(rect, [(w + 0.03, d + 0.02, 0.001, h + 0.0002),
+        (0.01, d + 0.02, 0.001, h + 0.1)], n=1), sharp=20.0, of=own)
+
+
+def drum(m: Maker, own: Material, other: Material, grain: Material) -> None:
+    """A drum."""
+    m.name = "drum"
+    r, h = m.uniform(0.07, 0.11), m.uniform(0.09, 0.14)
+    m.cylinder(r, 0, h, n=26, of=own)
+    for y in (0.01, h - 0.006):
+        m.hoop(oval(2 * r, 2 * r, n=24), y, 0.007, of=other)
+    for k in range(2):
+        m.tube([(-0.1, h + 0.009, -0.02 + 0.04 * k), (0.11, h + 0.012, 0.02 - 0.01 * k)],
+            0.004, n=6, of=grain)
+
+
+def pull_animal(m: Maker, own: Material, other: Material, third: Material, grain: Material) -> None:
+    """A pull animal."""
+    m.name = "pull_animal"
+    with m.of(grain):
+        m.box(0.06, (0.02, 0.032), 0.16, 0.003)
+        for x, z in product((-0.036, 0.036), (-0.055, 0.055)):
+            m.rod((x - 0.006, x + 0.006), 0.02, z, 0.02, n=14)
+    with m.of(own):
+        m.rounded(0.044, (0.05, 0.1), (-0.06, 0.05), 0.02)
+        for z in (-0.045, 0.035):
+            m.box(0.04, (0.0322, 0.07), 0.024, 0.003, z=z)
+        m.rounded(0.04, (0.085, 0.13), (0.035, 0.09), 0.018)
+    for x in (-1.0, 1.0):
+        m.add(stretched(sphere((0, 0, 0), 1.0, n=8), (0.005, 0.022, 0.013)),
+            at=(x * 0.022, 0.115, 0.05), of=other)
+    m.tube(bent([(0, 0.026, 0.08), (0.01, 0.012, 0.13), (0.05, 0.006, 0.16),
+        (0.02, 0.006, 0.21)], 0.04, n=4), 0.003, n=5, of=third)
+
+
+def puzzle_box(m: Maker, own: Material, other: Material, third: Material) -> None:
+    """A puzzle box."""
+    m.name = "puzzle_box"
+    m.box(0.3, 0.05, 0.22, 0.001, of=own)
+    m.box(0.28, (0.05, 0.0506), 0.2, of=other)
+    m.box(0.18, (0.0507, 0.0511), 0.06, of=third)
+    if m.chance(0.5):
+        m.box(0.26, (0.0513, 0.09), 0.19, 0.001, of=third)
+
+
+def dinosaur(m: Maker, own: Material, other: Material) -> None:
+    """A dinosaur."""
+    m.name = "dinosaur"
+    with m.of(own):
+        m.rounded(0.06, (0.04, 0.1), 0.1, 0.028)
+        m.tube(bent([(0, 0.075, 0.04), (0, 0.1, 0.09), (0, 0.19, 0.1), (0, 0.2, 0.14)],
+            0.04, n=4), 0.022, end=0.014)
+        m.tube(bent([(0, 0.075, -0.04), (0, 0.05, -0.1), (0, 0.02, -0.17)], 0.05, n=4),
+            0.024, end=0.004)
+        for x, z in product((-0.02, 0.02), (-0.033, 0.033)):
+            m.tube([(x * 1.2, 0, z), (x, 0.06, z)], 0.011, end=0.014)
+        for k in range(5):
+            m.revolve([(0, 0), (0.01, 0), (0, 0.024)], n=6,
+                at=(0, 0.096 - 0.002 * (k - 2) * (k - 2), -0.04 + 0.02 * k), of=other)
 
 
 @thing(group="ball")

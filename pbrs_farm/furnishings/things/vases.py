@@ -101,18 +101,22 @@ def vase(m: Maker) -> None:
                 m.vessel([(0, 0), (r * 0.8, 0), (r * 0.95, 0.012), (r * 0.95, 0.3 * tall),
                     (r * 0.9, 0.32 * tall), (r * 0.95, 0.34 * tall), (r * 0.95, 0.6 * tall),
                     (r * 0.5, 0.75 * tall), (r * 0.5, 0.8 * tall)], 0.004, n=18)
-    # Dry twigs: a few bars that lean out of it.
     if form in (1, 3, 8, 15) and m.chance(0.5):
-        dry = plain(
-            "dry twig", m.pick((0.62, 0.5, 0.34), (0.75, 0.68, 0.52), (0.4, 0.28, 0.2)), 0.9
-        )
-        for k in range(m.integers(3, 7)):
-            a, lean, top = (2.4 * k + m.uniform(0, 0.5), m.uniform(0.03, 0.09),
-                tall * m.uniform(1.4, 2.0))
-            m.tube([(0.0, 0.02, 0.0), polar(0.003, 0.7 * tall, a), polar(lean, top, a)], 0.0022,
-                n=5, of=dry)
-            if m.chance(0.6):
-                m.sphere(polar(lean, top, a), 0.011, n=6, of=dry)
+        dry_twigs(m, tall)
+
+
+def dry_twigs(m: Maker, tall: float) -> None:
+    """Dry twigs that lean out of a vase."""
+    dry = plain(
+        "dry twig", m.pick((0.62, 0.5, 0.34), (0.75, 0.68, 0.52), (0.4, 0.28, 0.2)), 0.9
+    )
+    for k in range(m.integers(3, 7)):
+        a, lean, top = (2.4 * k + m.uniform(0, 0.5), m.uniform(0.03, 0.09),
+            tall * m.uniform(1.4, 2.0))
+        m.tube([(0.0, 0.02, 0.0), polar(0.003, 0.7 * tall, a), polar(lean, top, a)], 0.0022,
+            n=5, of=dry)
+        if m.chance(0.6):
+            m.sphere(polar(lean, top, a), 0.011, n=6, of=dry)
 
 
 def smoothed_vessel(r: float, waist: float, mouth: float, belly: float, tall: float) -> Surface:
