@@ -11,8 +11,10 @@ from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import Surface
 from pbrs_farm.dress.style import style_for
 from pbrs_farm.furnishings.things.bodies import slab
-from pbrs_farm.furnishings.things.maker import Maker, Triple, thing
+from pbrs_farm.furnishings.things.maker import Maker, thing
 from pbrs_farm.furnishings.things.materials import BRASS, STEEL, WHITE
+from pbrs_farm.furnishings.things.outlines import Triple
+from pbrs_farm.furnishings.things.shapes import on_side, row
 
 _STYLE = style_for(np.random.default_rng(1))
 
@@ -82,3 +84,46 @@ def test_a_share_of_chances_holds_and_a_choice_named_twice_is_twice_as_likely() 
     assert sum(m.chance(0.3) for _ in range(n)) / n == pytest.approx(0.3, abs=margin)
     picked = [m.pick("wood", "wood", "metal") for _ in range(n)]
     assert picked.count("wood") / n == pytest.approx(2 / 3, abs=margin)
+
+
+def _bounds_of(m: Maker) -> list[list[float]]:
+    return [
+        [round(float(v), 4) for v in (*s.positions.min(0), *s.positions.max(0))]
+        for s, _ in m.finished("file", "name")
+    ]
+
+
+def test_a_box_is_given_by_sizes_starts_middles_or_ends() -> None:
+    m = _maker()
+    with m.of(STEEL):
+        m.box(0.4, 0.2, 0.6)
+        m.box(0.1, 0.2, 0.3, 0.01, left=-0.5, on=1.0, against=-0.3)
+        m.box((0.1, 0.3), (0.5, 0.6), 0.2, z=0.4)
+    assert _bounds_of(m) == [
+        [-0.2, 0.0, -0.3, 0.2, 0.2, 0.3],
+        [-0.5, 1.0, -0.3, -0.4, 1.2, 0.0],
+        [0.1, 0.5, 0.3, 0.3, 0.6, 0.5],
+    ]
+
+
+def test_a_mirrored_solid_is_repeated_on_the_other_side() -> None:
+    m = _maker()
+    with m.of(STEEL):
+        m.box(0.1, 1.0, 0.1, left=-0.5, against=-0.4, mirrored="xz")
+        m.cylinder(0.1, 0.0, 0.2, n=4, at=(-0.5, 0.0, 0.2), mirrored="x")
+    lows = [(row[0], row[2]) for row in _bounds_of(m)]
+    assert lows == [(-0.5, -0.4), (-0.5, 0.3), (0.4, -0.4), (0.4, 0.3), (-0.6, 0.1), (0.4, 0.1)]
+
+
+def test_a_rod_runs_along_the_axis_of_its_pair() -> None:
+    m = _maker()
+    m.rod((-0.5, 0.5), 0.2, 0.1, 0.05, of=STEEL)
+    ((x0, y0, _z0, x1, y1, _z1),) = _bounds_of(m)
+    assert (x0, x1) == (-0.5, 0.5)
+    assert (y0 + y1) / 2 == pytest.approx(0.2, abs=1e-6)
+
+
+def test_a_row_divides_a_length_into_equal_parts_with_gaps() -> None:
+    parts = [pytest.approx(part) for part in row(-0.3, 0.3, 3, gap=0.02)]
+    assert parts == [(-0.29, -0.11), (-0.09, 0.09), (0.11, 0.29)]
+    assert on_side(-1.0, 0.2, 0.5) == (-0.5, -0.2)
