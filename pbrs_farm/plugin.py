@@ -88,6 +88,9 @@ if TYPE_CHECKING:
     from pbrs_farm.read.common.format import Format as Format
     from pbrs_farm.read.common.format import GivenFile as GivenFile
     from pbrs_farm.read.common.notes import Notes as Notes
+    from pbrs_farm.sample.camera_source import CameraRequest as CameraRequest
+    from pbrs_farm.sample.camera_source import CameraSource as CameraSource
+    from pbrs_farm.sample.camera_source import Sampling as Sampling
     from pbrs_farm.scene.home import Home as Home
     from pbrs_farm.transport.develop.mode_pictures import LinearAovs as LinearAovs
     from pbrs_farm.transport.develop.mode_pictures import develop as develop
@@ -127,6 +130,7 @@ _MODULES: Final = {
     "raycast.caster": ("Caster",),
     "read.common.format": ("Format", "GivenFile"),
     "read.common.notes": ("Notes",),
+    "sample.camera_source": ("CameraRequest", "CameraSource", "Sampling"),
     "scene.home": ("Home",),
     "transport.develop.mode_pictures": ("LinearAovs", "develop"),
     "truth.optional_layers": ("LabelInputs",),

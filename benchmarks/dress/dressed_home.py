@@ -96,7 +96,7 @@ def _seen(house: House) -> dict[str, Any]:
     from pbrs_farm.core.classes import NYU13_FROM_NYU40, NYU13_NAMES
     from pbrs_farm.raycast.caster import Caster
     from pbrs_farm.run.steps import camera_seed
-    from pbrs_farm.sample import sample_cameras
+    from pbrs_farm.sample.house_sampler import sample_cameras
 
     recipe = recipe_from_name("fast")
     caster = Caster.of_house(house)

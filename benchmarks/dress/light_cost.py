@@ -23,7 +23,7 @@ from pbrs_farm.store import MemoryStore
 def cost(name: str, seed: int) -> dict[str, float]:
     """CPU seconds bare and dressed, of the dressed home's best view."""
     from pbrs_farm.raycast.caster import Caster
-    from pbrs_farm.sample import sample_cameras
+    from pbrs_farm.sample.house_sampler import sample_cameras
 
     recipe = recipe_from_name("fast")
     bare, _ = repaired_house(resolve(name), recipe)

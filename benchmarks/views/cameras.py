@@ -30,9 +30,9 @@ from pbrs_farm.prepare.read_source import read_house
 from pbrs_farm.prepare.source import resolve
 from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.repair import repair
-from pbrs_farm.sample import sample_cameras
 from pbrs_farm.sample.camera_report import Verdict
 from pbrs_farm.sample.eye_probes import count_items
+from pbrs_farm.sample.house_sampler import sample_cameras
 from pbrs_farm.sample.view_score import object_columns, paper_score
 
 HOME = "2BedroomApartmentWithBowWindow"

@@ -17,7 +17,7 @@ from pbrs_farm.core.house import House
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.geometry.plan_surfaces import room_shape
 from pbrs_farm.raycast.caster import Caster
-from pbrs_farm.sample import sample_cameras
+from pbrs_farm.sample.house_sampler import sample_cameras
 from pbrs_farm.sample.photo_choice import NYUV2_SHARES
 from pbrs_farm.sample.photo_score import item_roles, photo_shares
 from pbrs_farm.sample.view_overlap import DEPTH_SIZE, overlap

@@ -197,11 +197,9 @@ def recipe_of(args: argparse.Namespace | RecipeOptions) -> Recipe:
     if args.strict:
         overrides["read.strict"] = "true"
     if getattr(args, "camera_file", None):
-        # A recipe's fields are JSON: quote the path.
-        overrides |= {"cameras.source": "file", "cameras.file": json.dumps(str(more.camera_file))}
+        overrides["cameras.source"] = f"file,file={more.camera_file}"
     if getattr(args, "trajectory", None):
-        text = json.dumps(str(more.trajectory))
-        overrides |= {"cameras.source": "trajectory", "cameras.file": text}
+        overrides["cameras.source"] = f"trajectory,file={more.trajectory}"
     if getattr(args, "rig", None):
         from pbrs_farm.formats.rig_toml import rig_from_toml
 

@@ -82,13 +82,14 @@ def _option_choices(parser: argparse.ArgumentParser) -> Iterator[tuple[str, list
     """Each option that takes one of some words, with those words."""
     from pbrs_farm.core.layers import OPTIONAL
     from pbrs_farm.core.lighting import ALL_MODES
-    from pbrs_farm.core.recipe import RECIPE_NAMES
+    from pbrs_farm.core.recipe import CAMERA_SOURCES, RECIPE_NAMES
 
     # Options that take lists declare no choices of their own.
     known = {
         "--recipe": list(RECIPE_NAMES),
         "--modes": [mode.value for mode in ALL_MODES],
         "--layers": list(OPTIONAL),
+        "--cameras": list(CAMERA_SOURCES.names()),
     }
     for name, action in parser._option_string_actions.items():
         if action.choices and name.startswith("--"):

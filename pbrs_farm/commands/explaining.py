@@ -29,9 +29,8 @@ if TYPE_CHECKING:
     from pbrs_farm.core.house import House
     from pbrs_farm.core.recipe import Recipe
     from pbrs_farm.progress import ShareTeller
-    from pbrs_farm.sample import CameraReport
-    from pbrs_farm.sample.camera_report import SectorReport
-    from pbrs_farm.sample.house_sampler import Sampling
+    from pbrs_farm.sample.camera_report import CameraReport, SectorReport
+    from pbrs_farm.sample.camera_source import Sampling
 
 
 # Parts of the time that `dress` takes, roughly; its pictures take the rest.

@@ -169,10 +169,10 @@ def _described(args: argparse.Namespace, homes: list[str], sources: Sequence[Sou
         from pbrs_farm.run.plan import check_layers
 
         check_layers(want, recipe)
-    if recipe.cameras.source in ("file", "trajectory"):
-        from pbrs_farm.run.chosen_cameras import check_camera_file
+    if recipe.cameras.file:
+        from pbrs_farm.run.chosen_cameras import file_content
 
-        check_camera_file(recipe.cameras)
+        file_content(recipe.cameras)
     return Run(
         homes=homes,
         models=getattr(args, "models", "") if homes else "",

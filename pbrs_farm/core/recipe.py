@@ -21,6 +21,7 @@ from pbrs_farm.core.errors import BadRecipe
 from pbrs_farm.core.optics_fields import BlurFields, LensFields, SensorFields
 from pbrs_farm.core.picture_cameras import DRAWN, PictureCamera, picture_camera
 from pbrs_farm.core.recipe_fields import (
+    CAMERA_SOURCES,
     CameraFields,
     DressFields,
     EmissionFields,
@@ -41,6 +42,7 @@ from pbrs_farm.core.rig_fields import RigFields, stereo_rig
 from pbrs_farm.core.shown_text import hint_of_choice, near_names, question
 
 __all__ = [
+    "CAMERA_SOURCES",
     "RECIPE_NAMES",
     "BlurFields",
     "CameraFields",

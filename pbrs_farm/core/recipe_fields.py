@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Final, Literal, Self
+from collections.abc import Mapping
+from typing import Annotated, Any, Final, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from pbrs_farm.core.camera import DEFAULT_SIZE
 from pbrs_farm.core.checked_calls import MAX_EDGE_PX, MAX_VIEW_PIXELS
+from pbrs_farm.core.entries import EntryTable
 from pbrs_farm.core.lighting import BULB_RADIUS_M
-from pbrs_farm.core.plugins import checked_names, plugins
+from pbrs_farm.core.plugins import checked_names
 from pbrs_farm.core.shown_text import hint_of_choice
 
 MAX_SAMPLES: Final = 2**20
 """Of samples, mutations and chains: far above what anyone waits for, far below what never ends."""
 
 CAMERA_PRESETS: Final = ("paper", "released", "photo")
+CAMERA_SOURCES: Final = EntryTable(
+    "pbrs_farm.sample.sources", "SOURCE", "cameras", ("CameraSource",)
+)
+"""Of viewpoints; sample/camera_source.py has the type of an entry."""
 
 Share = Annotated[float, Field(ge=0, le=1)]
 
@@ -160,8 +166,7 @@ class CameraFields(FieldGroup):
 
     preset: str = Field(
         "paper",
-        description="whose rules and score: paper, released; photo: as people photograph rooms; or a"
-        " plugin's",
+        description="whose rules and score: paper, released; photo: as people photograph rooms",
     )
     n_sectors: int = Field(6, ge=1, le=360, description="sectors of a room, of equal angles")
     cell_m: float = Field(0.25, ge=0.05, le=100, description="edge of the viewpoint grid")
@@ -218,8 +223,10 @@ class CameraFields(FieldGroup):
     coarse_width_px: int = Field(160, gt=0, le=4096)
     coarse_height_px: int = Field(120, gt=0, le=4096)
     per_sector: int = Field(1, ge=1, le=1000)
-    source: Literal["sampled", "stored", "file", "walk", "trajectory", "given"] = Field(
-        "sampled", description="given: from Python, by pbrs_farm.render"
+    source: str = Field(
+        "sampled",
+        max_length=4096,
+        description="where viewpoints come from, with the options of a plugin's source: NAME,key=value",
     )
     file: str = Field("", description="camera or trajectory file of the user's, for those sources")
     exact: bool = Field(False, description="score every candidate at full size")
@@ -232,13 +239,40 @@ class CameraFields(FieldGroup):
         0.0, ge=0, le=10, description="baseline: a view more to the right of each; 0 = none"
     )
 
+    @property
+    def source_name(self) -> str:
+        """The name of the source, without its options."""
+        return self.source.partition(",")[0]
+
     @field_validator("preset")
     @classmethod
     def _preset_is_known(cls, value: str) -> str:
-        known = (*CAMERA_PRESETS, *plugins("cameras"))
-        if value not in known:
-            raise ValueError(f"no preset {value!r}, {hint_of_choice(value, known)}")
+        if value in CAMERA_SOURCES.names():
+            raise ValueError(f"{value!r} is a source: --cameras {value}")
+        if value not in CAMERA_PRESETS:
+            raise ValueError(f"no preset {value!r}, {hint_of_choice(value, CAMERA_PRESETS)}")
         return value
+
+    @field_validator("source")
+    @classmethod
+    def _source_is_known(cls, value: str) -> str:
+        name, _, options = value.partition(",")
+        names = CAMERA_SOURCES.names()
+        if name not in names:
+            raise ValueError(f"no source {name!r}, {hint_of_choice(name, names)}")
+        if options:
+            CAMERA_SOURCES.entry(name).options_of(value)
+        return value
+
+    @model_validator(mode="before")
+    @classmethod
+    def _file_of_source(cls, data: Any) -> Any:
+        """Split `NAME,file=PATH`, as command lines write it, into the fields source and file."""
+        if isinstance(data, Mapping) and isinstance(word := data.get("source"), str):
+            source, is_split, path = word.partition(",file=")
+            if is_split:
+                return {**data, "source": source, "file": path}
+        return data
 
 
 class ImageFields(FieldGroup):

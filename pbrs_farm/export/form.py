@@ -6,20 +6,17 @@ tables of docs/formats/export.md.
 
 from __future__ import annotations
 
-import pkgutil
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Final, TypeAlias
 
-from pbrs_farm.core.errors import BadInput, MachineFailed
+from pbrs_farm.core.entries import EntryTable
+from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.options import flag, options_of, record_of
-from pbrs_farm.core.plugins import plugins
 from pbrs_farm.core.record import Record
 from pbrs_farm.core.shown_text import did_you_mean
-from pbrs_farm.export import forms
 
 if TYPE_CHECKING:
     from pbrs_farm.export.chosen_view import Choice, ChosenView
@@ -28,7 +25,7 @@ if TYPE_CHECKING:
 LEFT_OUT: Final = "left_out.txt"
 REMARKS: Final = "remarks.txt"
 """A file of an export whose lines are shown to its user."""
-_GROUP: Final = "exports"  # of plugins
+FORMS: Final = EntryTable("pbrs_farm.export.forms", "FORM", "exports", ("ViewForm", "HomeForm"))
 
 WriteViews: TypeAlias = "Callable[[list[ChosenView], Path, Choice], None]"
 WriteHome: TypeAlias = "Callable[[ExportedHome, Path], None]"
@@ -115,8 +112,7 @@ def form_names() -> tuple[str, ...]:
     >>> {"coco", "yolo-seg", "gltf"} <= set(form_names())
     True
     """
-    own = sorted(module.name.replace("_", "-") for module in pkgutil.iter_modules(forms.__path__))
-    return (*own, *(name for name in plugins(_GROUP) if name not in own))
+    return FORMS.names()
 
 
 def form_of(name: str) -> Form:
@@ -130,14 +126,8 @@ def form_of(name: str) -> Form:
     names = form_names()
     if name not in names:
         raise BadInput("--to", name, "no such form", hint=f"of {', '.join(names)}")
-    if name in {module.name.replace("_", "-") for module in pkgutil.iter_modules(forms.__path__)}:
-        form: Form = import_module(f"{forms.__name__}.{name.replace('-', '_')}").FORM
-        return form
-    plugin = plugins(_GROUP)[name]
-    loaded = plugin.load()
-    if not isinstance(loaded, ViewForm | HomeForm) or loaded.name != name:
-        raise MachineFailed(f"plugin {plugin.mark} is no ViewForm or HomeForm called {name}")
-    return loaded
+    form: Form = FORMS.entry(name)
+    return form
 
 
 def view_forms() -> Iterator[ViewForm]:
@@ -187,7 +177,7 @@ def no_such_option(form: Form, name: str) -> BadInput:
 def forms_table(of: str) -> str:
     """The package's forms of "views", or of "homes", as a Markdown table."""
     rows = ["| form | what is written |", "|---|---|"]
-    own = (form_of(name) for name in form_names() if name not in plugins(_GROUP))
+    own = map(form_of, FORMS.own_names())
     rows += [f"| `{form.name}` | {form.help} |" for form in own if form.of == of]
     return "\n".join(rows)
 
@@ -195,9 +185,9 @@ def forms_table(of: str) -> str:
 def conventions_table() -> str:
     """The conventions of the package's forms of views, as a Markdown table."""
     rows = ["| form | centre of the first pixel | K | axes | depth |", "|---|---|---|---|---|"]
-    for name in form_names():
+    for name in FORMS.own_names():
         convention = getattr(form_of(name), "convention", None)
-        if convention is not None and name not in plugins(_GROUP):
+        if convention is not None:
             rows.append(f"| `{name}` | {convention.row} |")
     return "\n".join(rows)
 

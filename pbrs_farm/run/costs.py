@@ -15,6 +15,7 @@ from typing import Final
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.core.record import Record, read_csv
 from pbrs_farm.run.request import Wanted
+from pbrs_farm.sample.camera_source import source_of
 
 VIEWS_PER_HOUSE: Final = 17.1
 """Where a run asks for all: 779,342 views of 45,622 houses, the paper's own count."""
@@ -69,8 +70,9 @@ def megapixels(recipe: Recipe) -> float:
 
 def views_per_house(recipe: Recipe, want: Wanted) -> float:
     """How many views a home has: as many as are asked for, a walk its frames, else as the paper's had."""
-    if recipe.cameras.source == "walk":
-        n = recipe.cameras.walk_frames
+    count = source_of(recipe.cameras).n_views
+    if count is not None:
+        n = count(recipe.cameras)
         return min(want.n_views, n) if want.n_views else n
     return min(want.n_views, VIEWS_PER_HOUSE) if want.n_views else VIEWS_PER_HOUSE
 

@@ -19,6 +19,7 @@ from pbrs_farm.core.lighting import ALL_MODES, Mode
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.prepare import passes
 from pbrs_farm.run.request import Wanted, wanted_of
+from pbrs_farm.sample.camera_source import source_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +78,7 @@ def check_layers(want: Wanted, recipe: Recipe) -> None:
     """Raise BadInput for what views under a recipe cannot have, before anything is rendered."""
     from pbrs_farm.truth.optional_layers import check_lens
 
-    if want.tracks and recipe.cameras.source not in ("walk", "trajectory", "given"):
+    if want.tracks and source_of(recipe.cameras).is_sequence is False:
         text = f"follows points through a film, and cameras are {recipe.cameras.source}"
         raise BadInput("--tracks", "", text, hint="--cameras walk")
 
@@ -152,7 +153,7 @@ def leaves_out_dark_rooms(recipe: Recipe, want: Wanted, house_id: str) -> bool:
 
     Where light is wanted and the recipe chooses the cameras: a user's own are made whatever they see.
     """
-    is_chosen = recipe.cameras.source == "sampled" and recipe.selection.min_room_lx > 0
+    is_chosen = source_of(recipe.cameras).is_ranked and recipe.selection.min_room_lx > 0
     return is_chosen and "illuminance" in house_steps(want, house_id)
 
 
@@ -189,7 +190,7 @@ def chosen_views(rows: Iterable[tuple[str, str, float]], n_views: int, recipe: R
     eyes = [camera.name for camera in rig.cameras[1:]] if rig is not None else []
     others = {keys.rig_view_id(row[0], eye) for row in all_rows for eye in eyes}
     firsts = [row for row in all_rows if row[0] not in others]
-    if recipe.cameras.source in ("walk", "trajectory"):
+    if source_of(recipe.cameras).is_sequence:
         chosen = [view for view, _room, _score in firsts[: n_views or None]]
     else:
         chosen = spread(firsts, n_views)

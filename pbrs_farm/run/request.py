@@ -17,7 +17,7 @@ from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.layers import LAYER, LIGHT_LAYERS, OPTIONAL
 from pbrs_farm.core.lighting import ALL_MODES, Mode
 from pbrs_farm.core.options import option, options_of
-from pbrs_farm.core.recipe import RECIPE_NAMES
+from pbrs_farm.core.recipe import CAMERA_SOURCES, RECIPE_NAMES
 from pbrs_farm.core.record import Record
 from pbrs_farm.core.shown_text import hint_of_choice
 
@@ -90,9 +90,9 @@ class LightOptions(Record):
 class CameraOptions(Record):
     """Where viewpoints come from."""
 
-    cameras: Literal["sampled", "stored", "walk"] | None = option(
-        None, "where viewpoints come from; walk: frames along a path through the home (docs/motion.md)",
-        group="viewpoints", sets="cameras.source",
+    cameras: str | None = option(
+        None, f"where viewpoints come from: {', '.join(CAMERA_SOURCES.names())} (docs/cameras.md)",
+        group="viewpoints", metavar="SOURCE", sets="cameras.source",
     )  # fmt: skip
     trajectory: Path | None = option(
         None, "your own walk, as TUM rows t x y z qx qy qz qw (docs/motion.md)",

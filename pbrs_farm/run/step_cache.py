@@ -19,7 +19,7 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.layers import LAYER, LAYERS, layers_in_digest
 from pbrs_farm.core.plugins import marks_in_digest, plugins
-from pbrs_farm.core.recipe import CameraFields, Recipe
+from pbrs_farm.core.recipe import CAMERA_SOURCES, CameraFields, Recipe
 from pbrs_farm.formats.marker import Marker, StoredFile, read_marker
 from pbrs_farm.prepare import passes
 from pbrs_farm.prepare.source import SourceRef
@@ -32,6 +32,7 @@ from pbrs_farm.regular_files import (
 )
 from pbrs_farm.run import plan
 from pbrs_farm.run.house_cache import HouseCache
+from pbrs_farm.sample.camera_source import source_of
 from pbrs_farm.store.object_store import Store, put_done
 from pbrs_farm.transport.scene_tables.material_rows import max_albedo
 
@@ -188,11 +189,10 @@ def _extra(name: str, work: Work) -> object:
 
 
 def _extra_of_cameras(fields: CameraFields) -> str | None:
-    if fields.preset in plugins("cameras"):
-        return marks_in_digest("cameras", [fields.preset])[0]
-    if fields.source in ("file", "trajectory"):
-        return keys.sha256(camera_file_text(fields).encode())
-    return None
+    marks = CAMERA_SOURCES.marks([fields.source_name])
+    if source_of(fields).is_file:
+        marks.append(keys.sha256(camera_file_text(fields).encode()))
+    return " ".join(marks) or None
 
 
 def _extra_of_develop(work: Work) -> object:

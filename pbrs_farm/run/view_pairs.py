@@ -39,7 +39,7 @@ def pairs(bare: House, dressed: House, recipe: Recipe, n_views: int) -> Iterator
     Both houses are repaired. n_views: at most.
     """
     from pbrs_farm.raycast.caster import Caster
-    from pbrs_farm.sample import sample_cameras
+    from pbrs_farm.sample.house_sampler import sample_cameras
 
     caster = Caster.of_house(dressed)
     views = sample_cameras(

@@ -21,8 +21,8 @@ from pbrs_farm.core.mesh import triangle_corners, unit_normals
 from pbrs_farm.core.shown_text import shown
 from pbrs_farm.geometry.plan_surfaces import room_shape
 from pbrs_farm.sample.camera_report import RoomReport, Verdict
+from pbrs_farm.sample.camera_source import Sampling
 from pbrs_farm.sample.drawing import Drawing, Mark
-from pbrs_farm.sample.house_sampler import Sampling
 from pbrs_farm.sample.room_sampler import RoomTrace
 
 # Colour the dots by verdict.

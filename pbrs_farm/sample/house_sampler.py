@@ -6,7 +6,7 @@ The pictures the rule needs come from a counter, an argument: pixels of each ite
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.camera import RigPlace, View
@@ -15,39 +15,12 @@ from pbrs_farm.core.house import House, geometry_from_house
 from pbrs_farm.core.recipe import CameraFields, RigFields
 from pbrs_farm.core.rig_fields import RigCamera
 from pbrs_farm.sample.camera_report import CameraReport, RoomReport, total_rejected
+from pbrs_farm.sample.camera_source import Sampling
 from pbrs_farm.sample.eye_probes import ItemCounter
 from pbrs_farm.sample.photo_choice import RoomCandidates
 from pbrs_farm.sample.photo_sampler import PhotoSampler, room_report
 from pbrs_farm.sample.room_sampler import RoomSampler, RoomTrace
-from pbrs_farm.sample.stored_cameras import stored_views
 from pbrs_farm.sample.view_overlap import DepthOf
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Sampling:
-    """The outcome of sampling a house: its views, the report for cameras.json, every candidate by room.
-
-    The traces are for the camera map alone and are not stored.
-    """
-
-    views: tuple[View, ...]
-    report: CameraReport
-    traces: tuple[RoomTrace, ...]
-
-
-def cameras(
-    house: House,
-    fields: CameraFields,
-    seed: int,
-    counter: ItemCounter,
-    depth_of: DepthOf | None = None,
-) -> tuple[tuple[View, ...], CameraReport]:
-    """The views of a house and why every other candidate was rejected; see sample_cameras.
-
-    For callers that draw no map; `sample_cameras` also gives the traces of all candidates.
-    """
-    sampling = sample_cameras(house, fields, seed, counter, depth_of)
-    return sampling.views, sampling.report
 
 
 def sample_cameras(
@@ -63,10 +36,8 @@ def sample_cameras(
     pictures of cameras, which the preset photo asks for (ValueError without). The same house,
     fields and seed give the same views, whatever the counter's speed and the rooms' order.
     Views have the scoring size (640x480) and are in order of rooms and sectors; with the preset
-    released in order of falling score, as published. fields.source "stored": see stored_views.
+    released in order of falling score, as published.
     """
-    if fields.source == "stored":
-        return _sample_stored_views(house, fields, counter)
     geometry = geometry_from_house(house)
     if fields.preset == "photo":
         if depth_of is None:
@@ -122,16 +93,8 @@ def _photographed(sampler: PhotoSampler) -> Sampling:
     )
 
 
-def _sample_stored_views(house: House, fields: CameraFields, counter: ItemCounter) -> Sampling:
-    views, notes = stored_views(house, fields, counter)
-    return Sampling(views, _camera_report(fields, list(views), (), notes), ())
-
-
 def _camera_report(
-    fields: CameraFields,
-    views: list[View],
-    rooms: tuple[RoomReport, ...],
-    notes: tuple[str, ...] = (),
+    fields: CameraFields, views: list[View], rooms: tuple[RoomReport, ...]
 ) -> CameraReport:
     return CameraReport(
         preset=fields.preset,
@@ -140,7 +103,6 @@ def _camera_report(
         n_candidates=sum(s.n_candidates for room in rooms for s in room.sectors),
         refused=total_rejected(rooms),
         rooms=rooms,
-        notes=notes,
     )
 
 

@@ -676,8 +676,8 @@ class Home:
     ) -> Viewpoints:
         """Viewpoints by the rules of a preset, best first in each room.
 
-        preset: photo, paper, released, or a plugin's; None = the recipe's. n: so many, spread over
-        rooms; None = all. fields: of the recipe's group `cameras`, such as hfov_rad=1.2.
+        preset: photo, paper or released; None = the recipe's. n: so many, spread over rooms; None =
+        all. fields: of the recipe's group `cameras`, such as hfov_rad=1.2 or source="walk".
 
             >>> len(home.cameras("photo", n=2))
             2

@@ -19,7 +19,7 @@ from pbrs_farm.prepare.finished_house import repaired_house
 from pbrs_farm.prepare.source import resolve
 from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.run.steps import camera_seed
-from pbrs_farm.sample import sample_cameras
+from pbrs_farm.sample.house_sampler import sample_cameras
 from pbrs_farm.store import MemoryStore
 from tests.board.roots import write_root
 from tests.board.served import served

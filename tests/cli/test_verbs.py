@@ -22,7 +22,7 @@ from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.formats.house_bundle import house_from_bundle
 from pbrs_farm.read.builtin.builtin_home import builtin_home
 from pbrs_farm.sample.camera_report import CameraReport
-from pbrs_farm.sample.house_sampler import Sampling
+from pbrs_farm.sample.camera_source import Sampling
 from pbrs_farm.store.folder import FolderStore
 from tests.example_homes import example_homes
 from tests.selection.histogram_sets import record

@@ -9,10 +9,9 @@ import pytest
 from pbrs_farm.core.camera import PAPER_HFOV_RAD
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.read.builtin.builtin_home import builtin_home
-from pbrs_farm.sample import sample_cameras
 from pbrs_farm.sample.camera_file import cameras_from_file_text
 from pbrs_farm.sample.room_camera_file import cameras_from_text, with_names
-from pbrs_farm.sample.stored_cameras import views_from_cameras
+from pbrs_farm.sample.stored_cameras import stored_views, views_from_cameras
 from tests.sample.sampled_rooms import QUICK, counter_of
 
 LINE = "1.5 1.55 2  0.6929 -0.19612 0.6929  0.1386 0.98058 0.1386  0.5534 0.433896  540"
@@ -102,14 +101,14 @@ def test_a_users_file_that_gives_no_pose_is_rejected(text: str) -> None:
 
 def test_stored_cameras_become_views_of_the_rooms_they_stand_in() -> None:
     house = builtin_home()
-    fields = QUICK.model_copy(update={"source": "stored"})
-    sampling = sample_cameras(house, fields, 0, counter_of(house))
-    assert [v.room_id for v in sampling.views] == ["0_0", "0_1"]
-    for view, stored in zip(sampling.views, house.cameras, strict=True):
+    views, notes = stored_views(house, QUICK, counter_of(house))
+    assert not notes
+    assert [v.room_id for v in views] == ["0_0", "0_1"]
+    for view, stored in zip(views, house.cameras, strict=True):
         assert view.origin == "stored"
         np.testing.assert_allclose(view.camera.eye, stored.eye)
         assert view.score == sum(view.objects.values()) > 0
-    assert len({v.id for v in sampling.views}) == 2
+    assert len({v.id for v in views}) == 2
 
 
 def test_the_room_of_a_published_camera_is_the_one_its_name_says() -> None:

@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from pbrs_farm.sample import sample_cameras
 from pbrs_farm.sample.camera_map import COLOURS, camera_map, camera_map_rgb, camera_map_svg
 from pbrs_farm.sample.camera_report import Verdict
+from pbrs_farm.sample.house_sampler import sample_cameras
 from tests.sample.sampled_rooms import QUICK, counter_of, furnished, room_house, shell
 
 SVG = "{http://www.w3.org/2000/svg}"

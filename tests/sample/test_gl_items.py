@@ -8,7 +8,7 @@ from pbrs_farm.core.house import geometry_from_house
 from pbrs_farm.core.recipe import CameraFields
 from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.read.builtin.builtin_home import builtin_home
-from pbrs_farm.sample import sample_cameras
+from pbrs_farm.sample.house_sampler import sample_cameras
 
 gl_items = pytest.importorskip("benchmarks.views.gl_items")
 

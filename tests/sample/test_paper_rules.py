@@ -14,9 +14,9 @@ from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.house import House, ItemKind
 from pbrs_farm.core.recipe import CameraFields
 from pbrs_farm.read.builtin.builtin_home import builtin_home
-from pbrs_farm.sample import sample_cameras
 from pbrs_farm.sample.camera_report import Verdict
 from pbrs_farm.sample.eye_probes import enclosed
+from pbrs_farm.sample.house_sampler import sample_cameras
 from tests.sample.sampled_rooms import (
     QUICK,
     IndependentLook,

@@ -15,10 +15,11 @@ from pbrs_farm.core.classes import NYU13_NAMES
 from pbrs_farm.core.house import House, ItemKind, geometry_from_house
 from pbrs_farm.core.recipe import CameraFields, recipe_from_name
 from pbrs_farm.raycast.caster import Caster
-from pbrs_farm.sample import photo_sampler, sample_cameras
+from pbrs_farm.sample import photo_sampler
 from pbrs_farm.sample.camera_report import Verdict
+from pbrs_farm.sample.camera_source import Sampling
 from pbrs_farm.sample.eye_probes import EnclosureLimits, enclosure_limits
-from pbrs_farm.sample.house_sampler import Sampling
+from pbrs_farm.sample.house_sampler import sample_cameras
 from pbrs_farm.sample.photo_sampler import PhotoSampler
 from pbrs_farm.sample.photo_score import (
     FOREGROUND,

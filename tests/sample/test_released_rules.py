@@ -8,8 +8,8 @@ import pytest
 
 from pbrs_farm.core.house import ItemKind
 from pbrs_farm.core.recipe import CameraFields, recipe_from_name
-from pbrs_farm.sample import sample_cameras
 from pbrs_farm.sample.camera_report import Verdict
+from pbrs_farm.sample.house_sampler import sample_cameras
 from pbrs_farm.sample.released_rules import room_grid, viewpoint_mask
 from pbrs_farm.sample.view_score import released_columns, released_score
 from tests.sample.sampled_rooms import box, counter_of, furnished, room_house, shell

@@ -6,8 +6,8 @@ import pytest
 from pbrs_farm.core.house import House
 from pbrs_farm.core.recipe import CameraFields
 from pbrs_farm.read.builtin.builtin_home import builtin_home
-from pbrs_farm.sample import sample_cameras
 from pbrs_farm.sample.eye_probes import ItemCounter
+from pbrs_farm.sample.house_sampler import sample_cameras
 from pbrs_farm.sample.sector_search import Coarse, FullScores, best_first
 from tests.sample.sampled_rooms import QUICK, IndependentLook, counter_of, furnished
 

@@ -9,7 +9,7 @@ from pbrs_farm.core.recipe import CameraFields, Recipe, recipe_from_name
 from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.read.sweethome3d.home import read_home
 from pbrs_farm.repair import repair
-from pbrs_farm.sample import sample_cameras
+from pbrs_farm.sample.house_sampler import sample_cameras
 from tests.example_homes import example_homes
 from tests.sample.sampled_rooms import IndependentLook
 from tests.sample.test_paper_rules import hold_the_rules

@@ -95,7 +95,7 @@ def test_a_reader_of_a_plugin_reads_its_files(installed: dict[str, str], tmp_pat
 
 @pytest.mark.slow
 def test_layers_cameras_and_exports_of_plugins(installed: dict[str, str], tmp_path: Path) -> None:
-    words = ["--layers", "height", "--set", "cameras.preset=corners", "--out", "o", *FEW]
+    words = ["--layers", "height", "--cameras", "corners,height_m=1.2", "--out", "o", *FEW]
     done(installed, tmp_path, "run", "builtin", *words)
     views = sorted((tmp_path / "o").glob("houses/*/views/*"))
     assert [v.name for v in views] == ["0_0_0", "0_1_0"]

@@ -1,6 +1,6 @@
-"""Cameras of one's own: one in each room, in a corner, looking at the middle.
+"""A source of cameras: views from a corner of each room to its middle.
 
-pbrs-farm run builtin --set cameras.preset=corners --out out/corners
+pbrs-farm run builtin --cameras corners,height_m=1.2 --out out/corners
 """
 
 from __future__ import annotations
@@ -8,19 +8,40 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from pydantic import BaseModel, Field
 
-from pbrs_farm.plugin import Camera, Intrinsics, View, view_id
+from pbrs_farm.plugin import (
+    Camera,
+    CameraRequest,
+    CameraSource,
+    Intrinsics,
+    Sampling,
+    View,
+    view_id,
+)
 
 
-def corners(house: Any, fields: Any, _seed: int, _caster: Any) -> list[View]:
-    """The views. house: finished. fields: the recipe's group cameras."""
+class Options(BaseModel, extra="forbid"):
+    """Options of `--cameras corners,...`."""
+
+    height_m: float = Field(1.5, gt=0, le=3)  # of the eye above the floor
+
+
+def corners(request: CameraRequest) -> Sampling:
+    """A view of each room."""
     views = []
+    fields, options = request.fields, request.options
     size = fields.score_width_px, fields.score_height_px
-    for room in house.rooms:
+    for room in request.house.rooms:
         middle = np.asarray(room.polygon).mean(0)
         x, z = room.polygon[0] + 0.15 * (middle - room.polygon[0])
-        eye = np.array([x, room.floor_y + 1.5, z])
+        eye = np.array([x, room.floor_y + options.height_m, z])
         target = np.array([middle[0], room.floor_y + 0.8, middle[1]])
         camera = Camera.look(Intrinsics.from_hfov(*size, fields.hfov_rad), eye, target - eye)
         views.append(View(view_id(room.id, 0), room.id, 0, camera))
-    return views
+    return Sampling.of_views(fields, views)
+
+
+SOURCE: Any = CameraSource(
+    name="corners", views=corners, help="a corner of each room", options=Options
+)

@@ -45,11 +45,12 @@ def candidates(store: Store, house_id: str) -> dict[str, Any]:
     from pbrs_farm.core.recipe import recipe_from_json
     from pbrs_farm.run.house_cache import CachedHouse
     from pbrs_farm.run.steps import camera_seed
-    from pbrs_farm.sample import sample_cameras
     from pbrs_farm.sample.camera_report import Verdict
+    from pbrs_farm.sample.camera_source import source_of
+    from pbrs_farm.sample.house_sampler import sample_cameras
 
     recipe = recipe_from_json(store.get(keys.RECIPE), keys.RECIPE)
-    if keys.is_object(house_id) or recipe.cameras.source == "file":
+    if keys.is_object(house_id) or not source_of(recipe.cameras).is_ranked:
         raise BadInput(house_id, "", "its cameras were given, not sampled")
     cached = CachedHouse(store, recipe, house_id, "")
     counters = cached.caster.item_counts, cached.caster.depth_pictures

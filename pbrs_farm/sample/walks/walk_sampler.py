@@ -16,8 +16,7 @@ from pbrs_farm.core.arrays import F64, I64, FirstHit
 from pbrs_farm.core.camera import Camera, Intrinsics, View
 from pbrs_farm.core.house import Geometry, House
 from pbrs_farm.core.recipe import CameraFields
-from pbrs_farm.sample.camera_report import CameraReport
-from pbrs_farm.sample.house_sampler import Sampling
+from pbrs_farm.sample.camera_source import Sampling
 from pbrs_farm.sample.stored_cameras import OUTSIDE, sector_of
 from pbrs_farm.sample.walks.camera_shake import Shake, shake
 from pbrs_farm.sample.walks.gaze import Walker, gaze, things_of
@@ -43,7 +42,7 @@ def sample_walk(
     spaces = walk_spaces(house)
     space = max(spaces, key=lambda s: s.interest, default=None)
     if space is None or not space.region.any():
-        return Sampling((), _walk_report(fields, 0, (_why_none(spaces),)), ())
+        return Sampling.of_views(fields, (), (_why_none(spaces),))
     # Find the way, then where the walker is and what is looked at.
     rng = np.random.default_rng(seed)
     times = np.arange(fields.walk_frames) / fields.walk_fps
@@ -59,7 +58,7 @@ def sample_walk(
     )  # fmt: skip
     views = _views_of_walk(house, space, fields, _poses(eyes, azimuth, tilt, shaken))
     notes = _notes(house, space, views, motion.length_m)
-    return Sampling(views, _walk_report(fields, len(views), notes), ())
+    return Sampling.of_views(fields, views, notes)
 
 
 def _eyes(space: WalkSpace, places: F64, fields: CameraFields, rng: np.random.Generator) -> F64:
@@ -134,10 +133,3 @@ def _notes(
     if shut := shut_doors(space):
         notes.append(f"doors that are shut: {', '.join(shut)}")
     return tuple(notes)
-
-
-def _walk_report(fields: CameraFields, n_views: int, notes: tuple[str, ...]) -> CameraReport:
-    return CameraReport(
-        preset=fields.preset, source=fields.source, n_views=n_views, n_candidates=n_views,
-        refused={}, rooms=(), notes=notes,
-    )  # fmt: skip

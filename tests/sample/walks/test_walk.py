@@ -12,8 +12,8 @@ from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.read.builtin.builtin_home import builtin_home
 from pbrs_farm.repair import repair
 from pbrs_farm.sample.camera_map import camera_map
+from pbrs_farm.sample.camera_source import Sampling
 from pbrs_farm.sample.clearance import near_any_triangle
-from pbrs_farm.sample.house_sampler import Sampling
 from pbrs_farm.sample.walks.walk_sampler import sample_walk
 from pbrs_farm.sample.walks.walk_space import shut_doors, walk_spaces
 from tests.sample.sampled_rooms import box, room_house, shell
