@@ -152,8 +152,13 @@ class FurnitureAudit(Record):
     n_unmeasured: int = 0  # minimum number of touching pairs beyond the limit of intersections
 
 
-class RepairReport(Record):
-    """All changes to a house, and measurements of the result."""
+class RepairReport(Record, extra="allow"):
+    """The changes to a house, and the measurements after them.
+
+    Facts of steps without a field here are sentences.
+    """
+
+    __pydantic_extra__: dict[str, str]
 
     house_id: str
     was_repaired: bool = False  # it came in repaired: nothing was changed

@@ -25,6 +25,7 @@ def summary_of_report(report: RepairReport) -> str:
         *_lines_of_rooms(report),
         *_lines_of_leaks(report),
         *_lines_of_furniture(report),
+        *filter(None, (report.model_extra or {}).values()),
     ]
     return "\n".join([f"{report.house_id}:", *(f"- {shown(line, MAX_MESSAGE)}" for line in lines)])
 
