@@ -12,13 +12,15 @@ from typing import Final
 from pbrs_farm.assets import furniture_package, homes_package
 from pbrs_farm.assets.debian import cache_folder, write_whole
 from pbrs_farm.core import keys
-from pbrs_farm.core.made_home import made_homes
 from pbrs_farm.core.plugins import plugin, plugin_homes, plugins
-from pbrs_farm.core.recipe import Recipe
+from pbrs_farm.core.recipe import CAMERA_SOURCES, Recipe
 from pbrs_farm.crash_notes import note_step
 from pbrs_farm.prepare.dress_catalogue import GENERATED, has_furniture
+from pbrs_farm.prepare.formats import format_of_source
+from pbrs_farm.prepare.home_kinds import HOME_KIND
 from pbrs_farm.prepare.passes import uses_catalogue
-from pbrs_farm.prepare.source import SourceRef, home_id, resolve, variants, words_of_homes
+from pbrs_farm.prepare.source import resolve, variants, words_of_homes
+from pbrs_farm.prepare.source_ref import SourceRef, home_id
 from pbrs_farm.read.common.source_files import SourceFiles
 from pbrs_farm.store.object_store import Store
 from workers.job import HouseEntry
@@ -63,20 +65,21 @@ def upload(store: Store, refs: Sequence[SourceRef]) -> None:
     # Homes take furniture from the examples' package: workers need it too.
     if any(_uses_packages(ref) for ref in refs):
         _upload_package(store, homes_package.PACKAGE)
-    if any(ref.kind == "plugin" or _is_furnished(ref) for ref in refs):
+    if any(has_own_furniture(ref) for ref in refs):
         _upload_package(store, furniture_package.PACKAGE)
 
 
 def _uses_packages(ref: SourceRef) -> bool:
     """Whether a home has models of the examples' package."""
-    entry = ref.format
-    is_from_package = ref.kind in ("example", "plugin") or _is_furnished(ref)
-    return is_from_package or (entry is not None and entry.uses_packages)
+    if ref.kind in HOME_KIND:
+        return ref.kind == "example" or has_own_furniture(ref)
+    entry = format_of_source(ref)
+    return entry is not None and entry.uses_packages
 
 
-def _is_furnished(ref: SourceRef) -> bool:
-    """A home that its seed makes and furnishes."""
-    return ref.kind == "made" and made_homes(ref.location)[0].furniture
+def has_own_furniture(ref: SourceRef) -> bool:
+    """True if a home takes furniture from the package before it is dressed."""
+    return ref.kind in HOME_KIND and HOME_KIND[ref.kind].has_furniture(ref)
 
 
 def needed_plugins(
@@ -94,7 +97,8 @@ def needed_plugins(
     if any(uses_catalogue(ref, recipe) for ref in refs):
         named += [("furniture", name) for name in plugins("furniture")]
     named += [("pictures", name) for name in recipe.tone.pictures.split(":") if name]
-    named += [("cameras", recipe.cameras.preset)] * (recipe.cameras.preset in plugins("cameras"))
+    source = recipe.cameras.source_name
+    named += [("cameras", source)] * (source not in CAMERA_SOURCES.own_names())
     named += [("layers", name) for name in layers if name in plugins("layers")]
     return tuple(dict.fromkeys(plugin(group, name).mark for group, name in named))
 
@@ -110,7 +114,7 @@ def is_left_in_place(ref: SourceRef) -> bool:
 
     SUNCG, files with others beside them or with a folder of models, and what plugins read.
     """
-    return ref.format is not None and _source_in_store(ref).location == ref.location
+    return format_of_source(ref) is not None and _source_in_store(ref).location == ref.location
 
 
 def placed_reference(path: Path) -> tuple[str, bytes]:
@@ -206,7 +210,7 @@ def fill_cache(store: Store, *, with_furniture: bool = False) -> None:
 
 def _source_in_store(ref: SourceRef) -> SourceRef:
     """The source as workers find it: a single file by its key in the store."""
-    entry = ref.format
+    entry = format_of_source(ref)
     if entry is None or ref.kind == "reader" or not entry.travels:
         return ref
     # A file with others beside it cannot travel as one object; Sweet Home 3D's are a package's.

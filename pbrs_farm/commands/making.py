@@ -26,12 +26,13 @@ from pbrs_farm.commands.arguments import (
 from pbrs_farm.commands.options import add_options, group_of, request_from
 from pbrs_farm.commands.using import write_sheets
 from pbrs_farm.core.errors import BadInput, MachineFailed
+from pbrs_farm.core.made_home import is_made
 from pbrs_farm.core.recipe import recipe_from_json
 from pbrs_farm.core.shown_text import hint_of_choice
 from pbrs_farm.installation import llvm_command, need
 
 if TYPE_CHECKING:
-    from pbrs_farm.prepare.source import SourceRef
+    from pbrs_farm.prepare.source_ref import SourceRef
     from pbrs_farm.read.objects.model_folders import ObjectModel
     from pbrs_farm.run.local_run import Observer, Run, Summary
     from pbrs_farm.run.processes.render_task import Event
@@ -107,7 +108,7 @@ def _run(args: argparse.Namespace) -> int:
 
 def _folder_of(home: str) -> str:
     """Where a run goes that is not told: out/ and the home's name, in small letters."""
-    name = Path(home.partition(":")[0] if home.startswith("made:") else home).stem
+    name = Path(home.partition(":")[0] if is_made(home) else home).stem
     plain = "".join(c if c.isalnum() or c in "-_" else "-" for c in name.lower()).strip("-")
     return f"out/{plain or 'home'}"
 
@@ -357,7 +358,7 @@ def _step(args: argparse.Namespace) -> int:
 
 
 def _objects(args: argparse.Namespace) -> int:
-    from pbrs_farm.prepare.source import object_source
+    from pbrs_farm.prepare.home_kinds import object_source
     from pbrs_farm.read.common.source_files import SourceFiles
     from pbrs_farm.read.objects.model_folders import pick_models
 

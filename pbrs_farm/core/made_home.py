@@ -8,7 +8,6 @@ from typing import Final
 from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.number_ranges import range_of
-from pbrs_farm.core.plugins import is_plugin, plugin_homes
 
 PREFIX: Final = "made:"
 VERSION: Final = 11
@@ -170,23 +169,6 @@ def check_wishes(
             f"homes of {of} bedrooms have {least:g} to {most:g} m2",
             hint=f"area={least:g}..{most:g}",
         )  # fmt: skip
-
-
-def expanded(words: list[str]) -> list[str]:
-    """The words, each that names a range of made or plugins' homes replaced by one word a home.
-
-    The order of the words is kept, and paths and other words pass unchanged. BadInput as of
-    `made_homes` and `plugin_homes`.
-    """
-    found: list[str] = []
-    for word in words:
-        if is_made(word):
-            found += [home.word for home in made_homes(word)]
-        elif is_plugin(word):
-            found += [home.word for home in plugin_homes(word)]
-        else:
-            found.append(word)
-    return found
 
 
 def _one_of(names: tuple[str, ...], word: str, option: str, text: str) -> str:

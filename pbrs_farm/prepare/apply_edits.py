@@ -51,7 +51,7 @@ from pbrs_farm.geometry.moving import house_at, moved_item
 from pbrs_farm.geometry.opened import moved_surface
 from pbrs_farm.geometry.solids import sphere
 from pbrs_farm.prepare.open_joints import keyed, opened, with_motions
-from pbrs_farm.prepare.source import SourceRef
+from pbrs_farm.prepare.source_ref import SourceRef
 from pbrs_farm.read.common.material_library import texture_from_bytes
 from pbrs_farm.read.objects.own_model import model_shape
 from pbrs_farm.regular_files import MAX_DIGEST_BYTES, fault_of, read_regular

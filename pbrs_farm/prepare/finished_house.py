@@ -13,7 +13,7 @@ from pbrs_farm.core.house import House
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.crash_notes import note_step
 from pbrs_farm.prepare.passes import PASSES, FinishedHouse, Pass, Preparation, cache_key
-from pbrs_farm.prepare.source import SourceRef
+from pbrs_farm.prepare.source_ref import SourceRef
 
 if TYPE_CHECKING:
     from pbrs_farm.repair import RepairReport

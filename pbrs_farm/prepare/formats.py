@@ -22,6 +22,8 @@ from pbrs_farm.core.house import House
 from pbrs_farm.core.plugins import plugin, plugins
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.installation import install_command, is_installed
+from pbrs_farm.prepare.home_kinds import HOME_KIND
+from pbrs_farm.prepare.source_ref import SourceRef
 from pbrs_farm.read.common.format import PLAN, Format, GivenFile
 from pbrs_farm.read.common.root_folder import RootFolder
 from pbrs_farm.read.common.source_files import SourceFiles
@@ -50,6 +52,15 @@ def formats_of_plugins() -> tuple[Format, ...]:
 def format_of_kind(kind: str) -> Format | None:
     """The format of the sources of a kind, the first of several; None for a kind without files."""
     return next((one for one in formats() if one.kind == kind), None)
+
+
+def format_of_source(source: SourceRef) -> Format | None:
+    """The format that reads a source; None for a source of HOME_KINDS."""
+    if source.kind in HOME_KIND:
+        return None
+    if source.kind == "reader":
+        return format_of_plugin(source.location.partition(":")[0])
+    return format_of_kind(source.kind)
 
 
 def format_of_plugin(name: str) -> Format:

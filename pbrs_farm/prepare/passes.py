@@ -21,7 +21,9 @@ from pbrs_farm.core.made_home import VERSION as GENERATE_VERSION
 from pbrs_farm.core.plugins import marks_in_digest
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.prepare.dress_catalogue import catalogue_of
-from pbrs_farm.prepare.source import SourceRef
+from pbrs_farm.prepare.formats import format_of_source
+from pbrs_farm.prepare.home_kinds import HOME_KIND
+from pbrs_farm.prepare.source_ref import SourceRef
 from pbrs_farm.read.common.format import PLAN
 
 if TYPE_CHECKING:
@@ -97,7 +99,8 @@ def dress_seed(source: SourceRef, recipe: Recipe) -> int:
     An object without context is never dressed. The source's own seed comes from the word of the
     command line, and stands before the recipe's.
     """
-    if source.kind == "object":
+    kind = HOME_KIND.get(source.kind)
+    if kind is not None and not kind.is_home:
         return 0
     return source.dress_seed or recipe.dress.seed
 
@@ -113,11 +116,13 @@ def uses_catalogue(source: SourceRef, recipe: Recipe) -> bool:
 
 def _is_home(source: SourceRef, _recipe: Recipe) -> bool:
     # An object without context has no walls to close; a plugin gives its homes finished.
-    return source.kind not in ("object", "plugin")
+    kind = HOME_KIND.get(source.kind)
+    return kind is None or (kind.is_home and kind.finish is None)
 
 
 def _has_stand_ins(source: SourceRef, _recipe: Recipe) -> bool:
-    return source.format is not None and source.format.has_box_only_items
+    entry = format_of_source(source)
+    return entry is not None and entry.has_box_only_items
 
 
 def _is_furnished(source: SourceRef, recipe: Recipe) -> bool:
@@ -155,7 +160,8 @@ def _float_seed(source: SourceRef, recipe: Recipe) -> int:
 def _read_depends(source: SourceRef, recipe: Recipe) -> list[object]:
     if source.kind == PLAN:
         return [_PLANS_VERSION]
-    if source.kind != "plugin":
+    kind = HOME_KIND.get(source.kind)
+    if kind is None or kind.finish is None:
         return []
     # Which passes the plugin's home goes through is known once it is made: any may.
     return [versions_of_passes(), recipe.digest("dress")]
@@ -185,24 +191,22 @@ def _dress_depends(source: SourceRef, recipe: Recipe) -> list[object]:
 def _read(work: Preparation) -> Preparation:
     """The house as its source gives it; of an object and of a plugin's home that is all there is."""
     from pbrs_farm.home.room_use import with_uses
-    from pbrs_farm.prepare.read_source import house_of_plugin, read_house
+    from pbrs_farm.prepare.read_source import read_house
+    from pbrs_farm.prepare.source import check_unchanged
     from pbrs_farm.repair import RepairReport
 
     source, recipe = work.source, work.recipe
-    if source.kind == "plugin":
-        plugins_own = house_of_plugin(source, recipe, work.finish)
-        return replace(
-            work,
-            current=plugins_own.house,
-            report=plugins_own.report,
-            dressing=plugins_own.dressing,
-        )
+    kind = HOME_KIND.get(source.kind)
+    if kind is not None and kind.finish is not None:
+        check_unchanged(source)
+        house, report, dressing = kind.finish(source, recipe, work.finish)
+        return replace(work, current=house, report=report, dressing=dressing)
     # An object without context has no walls to close and no rooms.
-    is_whole = source.kind == "object"
+    is_whole = kind is not None and not kind.is_home
     house = read_house(source, recipe.read)
     house = house if is_whole else with_uses(house)
-    report = RepairReport(house_id=house.id, was_repaired=True) if is_whole else None
-    return replace(work, current=house, report=report)
+    unrepaired = RepairReport(house_id=house.id, was_repaired=True) if is_whole else None
+    return replace(work, current=house, report=unrepaired)
 
 
 def _stand_in(work: Preparation) -> Preparation:

@@ -1,4 +1,4 @@
-"""Where houses come from: words of a command line -> SourceRefs, and whether a source is what it was.
+"""Sources of houses: words of a command line -> SourceRefs, and the check that a source is unchanged.
 
 Effects: reads files, and the example homes' package from the cache (or through apt).
 """
@@ -9,34 +9,28 @@ import os
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from shlex import quote
-from typing import TYPE_CHECKING, Final
-
-from pydantic import TypeAdapter
+from typing import Final
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.checked_json import checked
-from pbrs_farm.core.edits import Edit, SavedHome, edited_id, edits_digest
+from pbrs_farm.core.edits import SavedHome
 from pbrs_farm.core.errors import BadHouse, MachineFailed
-from pbrs_farm.core.made_home import expanded, is_made, made_homes
-from pbrs_farm.core.plugins import is_plugin, marks_in_digest, plugin_homes
-from pbrs_farm.core.record import Record
+from pbrs_farm.core.plugins import marks_in_digest
 from pbrs_farm.formats.serialise import json_bytes
 from pbrs_farm.prepare.formats import (
     format_of_file,
     format_of_kind,
-    format_of_plugin,
+    format_of_source,
     formats,
     is_beside_homes,
     plugin_of_file,
     summary,
 )
-from pbrs_farm.read.common.format import Format, GivenFile
-from pbrs_farm.read.common.root_folder import RootFolder
+from pbrs_farm.prepare.home_kinds import HOME_KIND, digest_of_file, kind_of_word
+from pbrs_farm.prepare.source_ref import SourceRef
+from pbrs_farm.read.common.format import Format
 from pbrs_farm.read.common.source_files import SourceFiles
-from pbrs_farm.regular_files import fault_of, naming_kind, real_path, text_given
-
-if TYPE_CHECKING:
-    from pbrs_farm.read.objects.model_folders import ObjectModel
+from pbrs_farm.regular_files import naming_kind, real_path, text_given
 
 _MODEL_SUFFIXES: Final = (".obj", ".sh3f")  # what `objects` reads; a .glb may be a scene
 _UNREAD_SUFFIXES: Final = frozenset({
@@ -48,8 +42,6 @@ _LONGEST_ID: Final = 255  # bytes of a folder's name
 _DEFAULT_KIND: Final = "sweethome3d"  # of a path that says nothing: its reader tells what is wrong
 SAVED_SUFFIX: Final = ".home.json"
 """Of a file of a home with its edits: `saved_home` writes it, `resolve` reads it."""
-WORD_KINDS: Final = ("builtin", "made", "example", "plugin", "object")
-"""Kinds of sources that are no file of a format."""
 
 _ROOT_HINT: Final = (
     "a SUNCG house is ROOT/house/ID/house.json beside ROOT/room/ID (v1) or ROOT/wall/ID (v2), "
@@ -57,88 +49,12 @@ _ROOT_HINT: Final = (
 )
 
 
-class SourceRef(Record):
-    """A house before it is read.
-
-    kind: of a format (prepare/formats.py), `reader` for a plugin's, or one of WORD_KINDS.
-    location: a path, an example home's name, "builtin" or the word of a made home; `NAME:path` of a
-    plugin's; of an object without context the JSON of its ObjectModel. sha256: of the file's bytes
-    (SUNCG: of house.json). companions: digest of all other files that reading opens, "" = none.
-    dress_seed: what it is dressed by between reading and repair; its id then ends in `-d<seed>`.
-    edits: what is changed of the repaired house, in order; its id then ends in `-e<digest>`.
-    models: the folder of the models that the file names, "" = where its format keeps them.
-    part: of a plan's file, what is meant of it: `apartment=ID`, `floor=K`; "" = the whole file.
-    """
-
-    kind: str
-    location: str
-    house_id: str
-    sha256: str
-    companions: str = ""
-    dress_seed: int = 0  # 0 = as it was drawn
-    edits: tuple[Edit, ...] = ()
-    models: str = ""
-    part: str = ""
-
-    @property
-    def word(self) -> str:
-        """The word of a command line that names the source before dressing and edits."""
-        return f"{self.location}#{self.part}" if self.part else self.location
-
-    @property
-    def given(self) -> GivenFile:
-        """The file, or the folder, of a source that is one."""
-        path = self.location.partition(":")[2] if self.kind == "reader" else self.location
-        return GivenFile(Path(path), self.models, self.part)
-
-    @property
-    def format(self) -> Format | None:
-        """The format that reads it; None for a source that is no file."""
-        if self.kind in WORD_KINDS:
-            return None
-        if self.kind == "reader":
-            return format_of_plugin(self.location.partition(":")[0])
-        return format_of_kind(self.kind)
-
-    @property
-    def fingerprint(self) -> str:
-        """Digest of every file the source reads; without companions that of its own file."""
-        known = (self.sha256, self.companions, edits_digest(self.edits))
-        return "+".join(part for part in known if part)
-
-    @property
-    def unedited(self) -> SourceRef:
-        """The same house before its edits.
-
-        Itself where it has no edits. Its id is that of the house before them, dressed or not.
-        """
-        if not self.edits:
-            return self
-        own = self.house_id.removesuffix(edited_id("", self.edits))
-        return self.model_copy(update={"house_id": own, "edits": ()})
-
-    def edited(self, *edits: Edit) -> SourceRef:
-        """The same house with these edits after its own.
-
-        Edits come after those that it has; the id follows from all of them together. Nothing is
-        read or checked here.
-        """
-        every = (*self.edits, *edits)
-        house_id = edited_id(self.unedited.house_id, every)
-        return self.model_copy(update={"house_id": house_id, "edits": every})
-
-
-def home_id(source: SourceRef) -> str:
-    """The id of the source's house as it was drawn, whatever it is dressed by."""
-    return source.unedited.house_id.removesuffix(keys.dressed_id("", source.dress_seed))
-
-
 def variants(source: SourceRef, seeds: Sequence[int]) -> list[SourceRef]:
     """The source dressed by each seed, a house of its own each; itself for seed 0.
 
     An object without context is never dressed: it is given back once.
     """
-    if source.kind == "object":
+    if source.kind in HOME_KIND and not HOME_KIND[source.kind].is_home:
         return [source]
     if source.edits and any(seeds):
         raise BadHouse(source.word, "", "has edits: a home is dressed before it is edited")
@@ -159,10 +75,11 @@ def words_of_homes(words: Sequence[str]) -> list[str]:
     in folders below but for a format whose homes are folders. A folder without one stays what it
     is, so that `resolve` says what is wrong with it.
     """
-    found: list[str] = []
-    for word in expanded(list(words)):
-        found += _homes_in(Path(word)) or [word]
-    return found
+    homes: list[str] = []
+    for word in words:
+        kind = kind_of_word(word)
+        homes += kind.words(word) if kind is not None else _homes_in(Path(word)) or [word]
+    return homes
 
 
 def _homes_in(folder: Path) -> list[str]:
@@ -224,15 +141,10 @@ def resolve(word: str, files: SourceFiles | None = None, *, models: str = "") ->
         raise BadHouse(word, "", "the path is no UTF-8", hint="rename the file or its folder")
     if path.name.endswith(SAVED_SUFFIX):
         return _of_saved_home(path, files)
-    # Go by the word's form first, then by what lies at the path.
-    if word.startswith('{"'):  # its JSON; a name may begin with a brace, too
-        kind = "object"
-    elif word == "builtin":
-        kind = "builtin"
-    elif is_made(word):
-        kind = "made"
-    elif is_plugin(word):
-        kind = "plugin"
+    # The form of the word decides first, then the file at the path.
+    home_kind = kind_of_word(word)
+    if home_kind is not None:
+        kind = home_kind.name
     elif (name := plugin_of_file(path)) is not None:
         kind, word = "reader", f"{name}:{real_path(path)}"
     elif not path.exists() and not path.suffix and "/" not in word:
@@ -246,7 +158,7 @@ def resolve(word: str, files: SourceFiles | None = None, *, models: str = "") ->
     if part and kind != "plan":
         raise BadHouse(word, f"#{part}", "names a part of a file that is no floor plan")
     folder = models and str(real_path(Path(models)))
-    return _reference(kind, word, files or SourceFiles(), folder, part)
+    return _source_of(kind, word, files or SourceFiles(), folder, part)
 
 
 def saved_home(source: SourceRef) -> bytes:
@@ -315,35 +227,17 @@ def _is_utf8(word: str) -> bool:
     return "\0" not in word
 
 
-def _reference(
-    kind: str, location: str, files: SourceFiles, models: str = "", part: str = ""
-) -> SourceRef:
+def _source_of(kind: str, location: str, files: SourceFiles, models: str, part: str) -> SourceRef:
     """The source at a location of a known kind, with the digests of its files."""
-    if kind == "builtin":
-        from pbrs_farm.read.builtin.builtin_home import builtin_home
-
-        home = builtin_home()
-        return SourceRef(kind=kind, location=location, house_id=home.id, sha256=home.source.sha256)
-    if kind == "made":
-        return _made(location)
-    if kind == "plugin":
-        return _of_plugin(location)
-    if kind == "object":
-        return object_source(model_of_object(location), files)
-    if kind == "example":
-        return _example(location)
-    return _of_file(kind, location, files, models, part)
-
-
-def _of_file(kind: str, location: str, files: SourceFiles, models: str, part: str) -> SourceRef:
-    """The source that is a file, or the folder of a home."""
+    if kind in HOME_KIND:
+        return HOME_KIND[kind].source(location, files)
     bare = SourceRef(kind=kind, location=location, house_id="", sha256="", models=models, part=part)
-    entry, given = bare.format, bare.given
+    entry, given = format_of_source(bare), bare.given
     if entry is None:
         raise BadHouse(location, "", f"is of a kind that is not read here: {kind}")
     if entry.main_file and given.path.parent.name != "house":
         raise BadHouse(given.path, "", "does not lie in a folder named house", hint=_ROOT_HINT)
-    sha = _sha256(given.path / entry.main_file if entry.main_file else given.path, files)
+    sha = digest_of_file(given.path / entry.main_file if entry.main_file else given.path, files)
     # The id depends on the file alone, so companions never rename a house; a part is its own house.
     stem = f"{given.path.stem}-{part}" if part else given.path.stem
     house_id = keys.house_id(stem, keys.digest(sha, part) if part else sha)
@@ -355,57 +249,6 @@ def _of_file(kind: str, location: str, files: SourceFiles, models: str, part: st
         "house_id": given.path.name if entry.main_file else house_id, "sha256": sha,
         "companions": companions,
     })  # fmt: skip
-
-
-def _example(name: str) -> SourceRef:
-    """The source of an example home."""
-    from pbrs_farm.assets import homes_package
-    from pbrs_farm.read.sweethome3d.packaged_home import package_digest
-
-    # A name that is none costs no download.
-    exact = homes_package.exact_name(name)
-    package = homes_package.fetch()
-    data, file = package.home(exact)
-    sha = keys.sha256(data)
-    return SourceRef(
-        kind="example", location=name, house_id=keys.house_id(Path(file).stem, sha), sha256=sha,
-        companions=package_digest(package),
-    )  # fmt: skip
-
-
-def _made(word: str) -> SourceRef:
-    """The source of a home that its seed makes; its companion is the furniture's package."""
-    from pbrs_farm.assets import furniture_package
-
-    homes = made_homes(word)
-    if len(homes) != 1:
-        raise BadHouse(word, "", f"names {len(homes)} homes", hint="name one at a time here")
-    # Ask for the furniture before the run begins, where the home wants some.
-    companions, package = "", furniture_package.cached() if homes[0].furniture else None
-    if homes[0].furniture and package is None:
-        raise MachineFailed(
-            "made homes take their furniture from a package that is not fetched",
-            hint="`pbrs-farm homes --furniture` (120 MB), or made:1,furniture=none",
-        )
-    if package is not None and package.note:
-        companions = keys.sha256(package.note.encode())
-    return SourceRef(
-        kind="made", location=homes[0].word, house_id=keys.house_id(homes[0].name, homes[0].digest),
-        sha256=homes[0].digest, companions=companions,
-    )  # fmt: skip
-
-
-def _of_plugin(word: str) -> SourceRef:
-    """The source of a home that a plugin makes; its package and version are part of it."""
-    homes = plugin_homes(word)
-    if len(homes) != 1:
-        raise BadHouse(word, "", f"names {len(homes)} homes", hint="name one at a time here")
-    (home,) = homes
-    sha = keys.digest(*marks_in_digest("homes", [home.name]), home.word)
-    house_id = keys.house_id(f"{home.name}-{home.seed}", sha)
-    return SourceRef(
-        kind="plugin", location=home.word, house_id=house_id, sha256=sha, companions=""
-    )
 
 
 def suncg_list(root: Path, list_file: Path) -> list[str]:
@@ -422,27 +265,6 @@ def suncg_list(root: Path, list_file: Path) -> list[str]:
     return [str(root / "house" / i) for i in ids if i and not i.startswith("#")]
 
 
-def object_source(model: ObjectModel, files: SourceFiles | None = None) -> SourceRef:
-    """The source of an object without context; files as in resolve."""
-    from pbrs_farm.read.objects.single_object import object_companions
-
-    files = files or SourceFiles()
-    return SourceRef(
-        kind="object",
-        location=TypeAdapter(type(model)).dump_json(model).decode(),
-        house_id=keys.OBJECT_PREFIX + model.id,
-        sha256=_sha256(model.path, files),
-        companions=files.digest(RootFolder(model.root), object_companions(model, files)),
-    )
-
-
-def model_of_object(location: str) -> ObjectModel:
-    """The model that the location of an object without context says."""
-    from pbrs_farm.read.objects.model_folders import ObjectModel
-
-    return checked(ObjectModel, location.encode(), location[:80], error=BadHouse)
-
-
 def check_unchanged(source: SourceRef) -> None:
     """Raise BadHouse or MachineFailed where a file is not what it was when the source was named.
 
@@ -450,15 +272,14 @@ def check_unchanged(source: SourceRef) -> None:
     is to blame, so that another machine may do it; BadHouse where the user's own file changed.
     """
     # Name the source again and compare the digests.
-    now = _reference(source.kind, source.location, SourceFiles(), source.models, source.part)
+    now = _source_of(source.kind, source.location, SourceFiles(), source.models, source.part)
     if now.sha256 == source.sha256 and now.companions == source.companions:
         return
     if source.kind in ("plugin", "reader") and now.house_id[:-8] == source.house_id[:-8]:
         text = f"the plugin of {source.location} here is another one than was asked for"
         raise MachineFailed(text, hint="install the same version everywhere")
-    if source.kind in ("example", "made") or (
-        source.kind == "sweethome3d" and now.sha256 == source.sha256
-    ):
+    is_of_package = source.kind in HOME_KIND and HOME_KIND[source.kind].is_of_package
+    if is_of_package or (source.kind == "sweethome3d" and now.sha256 == source.sha256):
         # The file is the same or comes from the package: this machine's package differs.
         raise MachineFailed(
             f"the package here holds another {source.location} or other models than was asked for",
@@ -486,10 +307,3 @@ def _of_folder(folder: Path) -> tuple[str, str]:
     else:
         hint = f"read are {summary()}"
     return "holds no house.json and no home file", hint
-
-
-def _sha256(path: Path, files: SourceFiles) -> str:
-    try:
-        return files.file_digest(path)
-    except OSError as error:
-        raise BadHouse(path, "", fault_of(error)) from None

@@ -12,7 +12,8 @@ from pbrs_farm.core.shown_text import MAX_PLACE, shown
 from pbrs_farm.crash_notes import note_step
 from pbrs_farm.prepare.dress_catalogue import fetch_catalogue
 from pbrs_farm.prepare.passes import uses_catalogue
-from pbrs_farm.prepare.source import SourceRef, resolve, variants
+from pbrs_farm.prepare.source import resolve, variants
+from pbrs_farm.prepare.source_ref import SourceRef
 from pbrs_farm.read.common.source_files import SourceFiles
 from pbrs_farm.run import plan
 from pbrs_farm.run.local_run import Observer, Run, Summary

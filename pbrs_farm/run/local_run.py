@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from pbrs_farm.core.recipe import Recipe
-from pbrs_farm.prepare.source import SourceRef
+from pbrs_farm.prepare.source_ref import SourceRef
 from pbrs_farm.run.processes.render_task import Event
 from pbrs_farm.run.request import Wanted
 from pbrs_farm.store import StoreSettings

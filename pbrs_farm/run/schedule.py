@@ -15,7 +15,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any, Final, TypeAlias
 
-from pbrs_farm.prepare.source import SourceRef
+from pbrs_farm.prepare.source_ref import SourceRef
 from pbrs_farm.run import plan
 from pbrs_farm.run.local_run import Run, Summary
 from pbrs_farm.run.processes.pool import FINISH, RENDER, Pool

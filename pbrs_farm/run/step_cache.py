@@ -22,7 +22,7 @@ from pbrs_farm.core.plugins import marks_in_digest, plugins
 from pbrs_farm.core.recipe import CAMERA_SOURCES, CameraFields, Recipe
 from pbrs_farm.formats.marker import Marker, StoredFile, read_marker
 from pbrs_farm.prepare import passes
-from pbrs_farm.prepare.source import SourceRef
+from pbrs_farm.prepare.source_ref import SourceRef
 from pbrs_farm.regular_files import (
     MAX_TEXT_BYTES,
     fault_of,

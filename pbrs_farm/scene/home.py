@@ -58,7 +58,8 @@ from pbrs_farm.core.recipe import Recipe, recipe_from_name, with_settings
 from pbrs_farm.core.shown_text import did_you_mean, shown
 from pbrs_farm.core.table import Table
 from pbrs_farm.formats.cameras_json import views_from_json
-from pbrs_farm.prepare.source import SAVED_SUFFIX, SourceRef, resolve, saved_home, variants
+from pbrs_farm.prepare.source import SAVED_SUFFIX, resolve, saved_home, variants
+from pbrs_farm.prepare.source_ref import SourceRef
 from pbrs_farm.regular_files import MAX_DIGEST_BYTES, fault_of, read_regular
 from pbrs_farm.run import plan
 from pbrs_farm.sample.camera_report import CameraReport

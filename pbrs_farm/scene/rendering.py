@@ -29,7 +29,7 @@ from pbrs_farm.operating_system import after_fork
 from pbrs_farm.prepare.apply_edits import apply_edits
 from pbrs_farm.prepare.dress_catalogue import fetch_catalogue
 from pbrs_farm.prepare.passes import FinishedHouse, cache_key, uses_catalogue
-from pbrs_farm.prepare.source import SourceRef
+from pbrs_farm.prepare.source_ref import SourceRef
 from pbrs_farm.run import plan
 from pbrs_farm.run.house_cache import CachedHouse, HouseCache
 from pbrs_farm.run.request import Wanted

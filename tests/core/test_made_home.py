@@ -5,11 +5,12 @@ from __future__ import annotations
 import pytest
 
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.core.made_home import MadeHome, expanded, made_homes
+from pbrs_farm.core.made_home import MadeHome, made_homes
+from pbrs_farm.prepare.source import words_of_homes
 
 
 def test_a_range_names_one_home_a_seed() -> None:
-    words = expanded(["builtin", "made:3..5,rooms=2..3"])
+    words = words_of_homes(["builtin", "made:3..5,rooms=2..3"])
     assert words == ["builtin", *(f"made:{k},rooms=2..3" for k in (3, 4, 5))]
 
 

@@ -26,12 +26,14 @@ from pbrs_farm.prepare.formats import (
     format_of_file,
     format_of_kind,
     format_of_plugin,
+    format_of_source,
     formats,
     missing_library,
     summary,
 )
 from pbrs_farm.prepare.read_source import read_house
-from pbrs_farm.prepare.source import SourceRef, resolve, words_of_homes
+from pbrs_farm.prepare.source import resolve, words_of_homes
+from pbrs_farm.prepare.source_ref import SourceRef
 from pbrs_farm.read.common.format import PLAN
 from pbrs_farm.repair.repair_report import RepairReport
 from pbrs_farm.run.house_cache import HouseCache
@@ -92,7 +94,7 @@ def test_a_file_travels_to_a_farm_or_is_left_in_place(tmp_path: Path, title: str
     upload(store, [ref])
     placed = SourceRef.model_validate_json(entry.source)
     if is_left_in_place(ref):
-        own = ref.format
+        own = format_of_source(ref)
         assert own is not None
         assert placed == ref
         assert ref.companions or not own.travels
@@ -216,7 +218,7 @@ def test_a_file_that_is_not_there_is_missing_in_its_own_format(tmp_path: Path) -
 
 
 def test_kinds_without_files_have_no_format() -> None:
-    assert resolve("builtin").format is None
+    assert format_of_source(resolve("builtin")) is None
     assert format_of_kind("nothing") is None
     plan = format_of_kind(PLAN)
     assert plan is not None

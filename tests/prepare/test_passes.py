@@ -16,7 +16,8 @@ from pbrs_farm.prepare import finished_house as finishing
 from pbrs_farm.prepare import passes as passes_module
 from pbrs_farm.prepare.finished_house import HouseBeforeEdits, finished_house
 from pbrs_farm.prepare.passes import GROUPS, PASS, PASSES, cache_key, step_depends
-from pbrs_farm.prepare.source import SourceRef, resolve, variants
+from pbrs_farm.prepare.source import resolve, variants
+from pbrs_farm.prepare.source_ref import SourceRef
 from pbrs_farm.run import plan
 from workers.job import work_version
 

@@ -13,7 +13,8 @@ from pbrs_farm.core.recipe import ReadFields, Recipe
 from pbrs_farm.generate.plans.plan_files import plan_from_file
 from pbrs_farm.prepare.plan_house import furnish_plan_file
 from pbrs_farm.prepare.read_source import read_house
-from pbrs_farm.prepare.source import SourceRef, home_id, resolve
+from pbrs_farm.prepare.source import resolve
+from pbrs_farm.prepare.source_ref import SourceRef, home_id
 from pbrs_farm.prepare.stand_ins import STAND_IN, with_stand_ins
 from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.repair import repair

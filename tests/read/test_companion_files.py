@@ -13,8 +13,10 @@ from pbrs_farm.assets import homes_package
 from pbrs_farm.core.errors import BadHouse, MachineFailed
 from pbrs_farm.core.recipe import ReadFields, Recipe
 from pbrs_farm.formats.glb import GlbWriter
+from pbrs_farm.prepare.home_kinds import object_source
 from pbrs_farm.prepare.read_source import read_house
-from pbrs_farm.prepare.source import SourceRef, object_source, resolve
+from pbrs_farm.prepare.source import resolve
+from pbrs_farm.prepare.source_ref import SourceRef
 from pbrs_farm.read.common.root_folder import RootFolder
 from pbrs_farm.read.common.source_files import SourceFiles
 from pbrs_farm.read.objects.model_folders import find_models

@@ -14,7 +14,8 @@ from pbrs_farm.core.house import House
 from pbrs_farm.core.recipe import ReadFields, Recipe
 from pbrs_farm.prepare.finished_house import repaired_house
 from pbrs_farm.prepare.read_source import read_house
-from pbrs_farm.prepare.source import SourceRef, resolve
+from pbrs_farm.prepare.source import resolve
+from pbrs_farm.prepare.source_ref import SourceRef
 from pbrs_farm.read.common.material_library import MaterialLibrary, texture_from_bytes
 from pbrs_farm.read.common.notes import HARMLESS, Notes
 from tests.example_homes import example_homes

@@ -7,7 +7,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
-from pbrs_farm.prepare.source import SourceRef, object_source, resolve
+from pbrs_farm.prepare.home_kinds import object_source
+from pbrs_farm.prepare.source import resolve
+from pbrs_farm.prepare.source_ref import SourceRef
 from pbrs_farm.read.objects.model_folders import find_models
 from tests.inputs import front3d_files, scenestate_files
 from tests.inputs.usd_files import UsdHome, walls_of

@@ -11,7 +11,8 @@ import pytest
 from pbrs_farm.check import verify
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.images import array_from_png, layers_from_exr
-from pbrs_farm.prepare.source import object_source, resolve
+from pbrs_farm.prepare.home_kinds import object_source
+from pbrs_farm.prepare.source import resolve
 from pbrs_farm.read.objects.model_folders import find_models
 from pbrs_farm.run.local import run_local
 from pbrs_farm.run.local_run import Run, Summary

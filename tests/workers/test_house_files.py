@@ -9,7 +9,7 @@ import pytest
 from pbrs_farm.assets import debian, furniture_package, homes_package
 from pbrs_farm.core import keys
 from pbrs_farm.core.recipe import recipe_from_name
-from pbrs_farm.prepare.source import SourceRef
+from pbrs_farm.prepare.source_ref import SourceRef
 from pbrs_farm.store import MemoryStore
 from workers.house_files import (
     entries_from_arguments,

@@ -18,7 +18,7 @@ from pbrs_farm.core.errors import BadHouse, MachineFailed, ObjectMissing
 from pbrs_farm.formats.marker import read_marker
 from pbrs_farm.prepare.dress_catalogue import fetch_catalogue
 from pbrs_farm.prepare.passes import uses_catalogue
-from pbrs_farm.prepare.source import SourceRef
+from pbrs_farm.prepare.source_ref import SourceRef
 from pbrs_farm.run import plan
 from pbrs_farm.run.house_cache import HouseCache
 from pbrs_farm.run.output_root import finish_house
@@ -31,7 +31,13 @@ from pbrs_farm.store import Store, store_from_url
 from pbrs_farm.store.laid_out import LaidOutStore, one_task
 from pbrs_farm.store.retrying import RetryingStore
 from workers.config import FarmConfig
-from workers.house_files import FOLDER, fill_cache, is_left_in_place, local_catalogue
+from workers.house_files import (
+    FOLDER,
+    fill_cache,
+    has_own_furniture,
+    is_left_in_place,
+    local_catalogue,
+)
 from workers.ids import GEOMETRY, GL, JOB, LIGHT, REDUCE, SHARD, job_key
 from workers.job import JobSpec
 from workers.node.merging import merge_job, merge_shard
@@ -135,7 +141,7 @@ class HouseRunner:
         with TemporaryDirectory(prefix="pbrs-source-") as folder:
             source = self._source(request.source, Path(folder))
             is_dressed = uses_catalogue(source, spec.recipe)
-            fill_cache(self._store, with_furniture=is_dressed or source.kind in ("made", "plugin"))
+            fill_cache(self._store, with_furniture=is_dressed or has_own_furniture(source))
             here = spec
             if is_dressed:
                 # Look for the furniture before the house is read: another worker may have it.

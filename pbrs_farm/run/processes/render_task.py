@@ -10,7 +10,7 @@ from typing import Any, Literal
 from pydantic import TypeAdapter
 
 from pbrs_farm.core.recipe import Recipe
-from pbrs_farm.prepare.source import SourceRef
+from pbrs_farm.prepare.source_ref import SourceRef
 from pbrs_farm.store.s3 import S3Settings
 from pbrs_farm.store.secret import Secret
 from pbrs_farm.store.url import StoreSettings
