@@ -26,7 +26,17 @@ PACKAGES = ("pbrs_farm", "workers")
 MARKERS = "not slow and not gpu and not chaos and not infra and not kube and not web and not sweethome3d and not notebooks"
 CODE = (".py", ".toml", ".lua", ".js", ".glsl")
 VENDORED = "pbrs_farm/board/vendor"  # code of others
-KINDS = ("format", "form", "pass", "layer", "thing", "option", "camera-source", "repair-step")
+KINDS = (
+    "format",
+    "form",
+    "pass",
+    "layer",
+    "thing",
+    "option",
+    "camera-source",
+    "repair-step",
+    "recipe-group",
+)
 """What comes in kinds, as tests name it: @pytest.mark.kinds("format") adds one in a file."""
 SHARED_BY = 3  # files that define a function of one name, and it counts as shared
 LINE_KINDS = (

@@ -19,6 +19,7 @@ from pbrs_farm.check.stored_view import StoredView
 from pbrs_farm.core import keys
 from pbrs_farm.core.classes import NYU13_FROM_NYU40, NYU13_NAMES
 from pbrs_farm.core.house import FLOATING
+from pbrs_farm.core.recipe import groups_of_step, picture_groups
 
 SAME = 1e-9  # of numbers that two files repeat
 POSE = 1e-6  # of a product of two poses: metres, and parts of a rotation
@@ -31,12 +32,6 @@ ROW_FIELDS: Mapping[str, str] = {
     "item": "id", "name": "name", "kind": "kind", "nyu40": "nyu40", "class": "class",
     "source_class": "source_class", "room": "room_id",
 }  # fmt: skip
-# Groups of the recipe whose digest view.json holds, and those that a view's light is drawn by.
-PICTURE_GROUPS = (
-    "blur", "cameras", "dress", "emission", "histogram", "image", "lens", "light", "materials",
-    "raster", "read", "repair", "rig", "sensor", "sky", "surroundings", "tone",
-)  # fmt: skip
-LIGHT_GROUPS = ("image", "light", "sky", "emission", "materials", "blur")
 # Integrator of the recipe -> as view.json may call it.
 INTEGRATORS: Mapping[str, tuple[str, ...]] = {
     "path": ("path", "mitsuba path"),
@@ -75,16 +70,13 @@ def check_facts(
 def _check_recipe(view: StoredView, house: StoredHouse, tally: Tally) -> None:
     if not house.recipe or "recipe" not in view.table:
         return
-    told, own = view.table["recipe"], _digest(house.recipe, PICTURE_GROUPS)
+    told, own = view.table["recipe"], _digest(house.recipe, picture_groups())
     what = f"tells of recipe {told}, that of recipe.json is {own}"
     tally.expect("recipe", view.place, told == own, what)
 
 
 def _digest(recipe: Mapping[str, Any], groups: tuple[str, ...]) -> str:
     fields = {g: recipe[g] for g in ("seed", *groups) if recipe.get(g) is not None}
-    if "light" in fields and groups is LIGHT_GROUPS:
-        # What only adds layers draws nothing.
-        fields["light"] = {k: v for k, v in fields["light"].items() if k != "groups"}
     return keys.digest(fields)
 
 
@@ -291,7 +283,9 @@ def _check_light_facts(view: StoredView, house: StoredHouse, tally: Tally) -> No
     # All frames that one eye takes share a seed.
     name, is_frame = view.folder.name, view.table.get("frame") is not None
     name = ("clip_right" if name.endswith("_right") else "clip") if is_frame else name
-    seed = keys.seed(house.id, name, "light", _digest(house.recipe, LIGHT_GROUPS))
+    # light.groups adds layers and changes no picture.
+    drawn = {**house.recipe, "light": {k: v for k, v in fields.items() if k != "groups"}}
+    seed = keys.seed(house.id, name, "light", _digest(drawn, groups_of_step("light")))
     what = f"its seed is {light.get('seed')}, the recipe's {seed}"
     tally.expect("light facts", place, light.get("seed") == seed, what)
     told = light.get("integrator")

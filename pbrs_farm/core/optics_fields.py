@@ -19,6 +19,8 @@ from pbrs_farm.core.recipe_fields import FieldGroup, Share
 class BlurFields(FieldGroup):
     """Depth of field, motion blur and rolling shutter of light (docs/lenses.md); labels are sharp, at mid-shutter."""
 
+    steps = ("light",)
+
     aperture_mm: float = Field(
         0.0, ge=0, le=1000, description="diameter of the entrance pupil; 0 = everything is sharp"
     )
@@ -91,6 +93,8 @@ LENS_PRESETS: Final[Mapping[str, Mapping[str, Any]]] = {
 
 class LensFields(FieldGroup):
     """The lens of every view: what bends straight lines (docs/lenses.md)."""
+
+    steps = ("cameras",)
 
     preset: Literal["none", "kinect", "tum_vi", "hypersim", "d435", "d455", "fisheye180"] = Field(
         "none", description="of a known camera; other fields override it"
@@ -238,6 +242,8 @@ SENSOR_PRESETS: Final[Mapping[str, Mapping[str, Any]]] = {
 
 class SensorFields(FieldGroup):
     """What a camera's sensor makes of the light modes (docs/lenses.md); labels do not change."""
+
+    steps = ("develop",)
 
     preset: Literal["none", "kinect", "phone", "slr", "webcam"] = Field(
         "none", description="a kind of camera; other fields override it"

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
-from typing import Any, Self
+from collections.abc import Iterator, Mapping
+from functools import cache
+from typing import Any, Self, get_args
 
 from pydantic import Field, ValidationError, model_validator
 from pydantic_core import ErrorDetails
@@ -66,6 +67,9 @@ __all__ = [
     "changed_recipe",
     "differences",
     "field_paths",
+    "groups",
+    "groups_of_step",
+    "picture_groups",
     "recipe_from_json",
     "recipe_from_name",
     "with_settings",
@@ -345,6 +349,30 @@ def field_paths() -> list[str]:
         fields = getattr(info.annotation, "model_fields", None)
         paths += [group] if fields is None else [f"{group}.{name}" for name in fields]
     return paths
+
+
+@cache
+def groups_of_step(step: str) -> tuple[str, ...]:
+    """The groups that a step depends on, in the order of the model.
+
+    >>> groups_of_step("develop")
+    ('sensor', 'light', 'tone')
+    """
+    return tuple(name for name, group in groups() if step in group.steps)
+
+
+@cache
+def picture_groups() -> tuple[str, ...]:
+    """The groups that any step depends on; those of selection make nothing."""
+    return tuple(name for name, group in groups() if group.steps)
+
+
+def groups() -> Iterator[tuple[str, type[FieldGroup]]]:
+    """Name and class of each group, in the order of the model."""
+    for name, info in Recipe.model_fields.items():
+        for kind in (info.annotation, *get_args(info.annotation)):  # `RigFields | None` is one, too
+            if isinstance(kind, type) and issubclass(kind, FieldGroup):
+                yield name, kind
 
 
 def recipe_from_json(data: bytes, place: str) -> Recipe:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Final, Literal, Self
+from typing import Annotated, Any, ClassVar, Final, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
@@ -27,13 +27,20 @@ Share = Annotated[float, Field(ge=0, le=1)]
 
 
 class FieldGroup(BaseModel):
-    """The fields of one stage; unknown ones are errors."""
+    """The fields of one stage; unknown ones are errors.
+
+    A group is added by its class and by its line in Recipe. steps: of run/plan.py, that depend on it.
+    """
+
+    steps: ClassVar[tuple[str, ...]] = ()
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
 class ReadFields(FieldGroup):
     """Limits of what is read."""
+
+    steps = ("house",)
 
     max_triangles: int = Field(
         5_000_000, gt=0, le=50_000_000, description="most triangles of a house; more is refused"
@@ -63,6 +70,8 @@ class ReadFields(FieldGroup):
 
 class DressFields(FieldGroup):
     """Dressing: how far a home is made to look lived in, between reading and repair (docs/dress.md)."""
+
+    steps = ("house",)
 
     seed: int = Field(0, ge=0, lt=2**32, description="seed of what is chosen; 0 = not dressed")
     surfaces: Share = Field(1.0, description="share of rooms that get floors and walls of a style")
@@ -118,6 +127,8 @@ class DressFields(FieldGroup):
 class RepairFields(FieldGroup):
     """Geometry repair (paper section 3, "Data")."""
 
+    steps = ("house",)
+
     wall_thickness_m: float = Field(
         0.10, gt=0, le=5, description="thickness of planar walls, paper section 3"
     )
@@ -156,6 +167,8 @@ class RepairFields(FieldGroup):
 class SurroundingFields(FieldGroup):
     """What lies before the windows (docs/dress/outside.md); rooms have its light."""
 
+    steps = ("house",)
+
     kind: Literal["none", "drawn", "street", "garden", "court", "blocks", "hills"] = Field(
         "none", description="on all sides; drawn: by the house's seed, storey and kind of home"
     )
@@ -163,6 +176,8 @@ class SurroundingFields(FieldGroup):
 
 class CameraFields(FieldGroup):
     """Camera sampling (paper section 3.1)."""
+
+    steps = ("cameras", "pairs")
 
     preset: str = Field(
         "paper",
@@ -278,6 +293,8 @@ class CameraFields(FieldGroup):
 class ImageFields(FieldGroup):
     """Size of the pictures."""
 
+    steps = ("tracks", "truth", "opengl_dl", "opengl_il", "light")
+
     width_px: int = Field(DEFAULT_SIZE[0], gt=0, le=MAX_EDGE_PX)
     height_px: int = Field(DEFAULT_SIZE[1], gt=0, le=MAX_EDGE_PX)
 
@@ -292,6 +309,8 @@ class ImageFields(FieldGroup):
 
 class LightFields(FieldGroup):
     """Light transport (paper section 3.2)."""
+
+    steps = ("light", "develop")
 
     integrator: Literal["path", "metropolis"] = "path"
     spp: int = Field(64, ge=1, le=MAX_SAMPLES, description="samples per pixel of `path`")
@@ -358,6 +377,8 @@ class LightFields(FieldGroup):
 class SkyFields(FieldGroup):
     """Outdoor light (docs/spec/sky.md)."""
 
+    steps = ("illuminance", "light")
+
     kind: Literal["sunsky", "panorama"] = "sunsky"
     panoramas: str = Field(
         "",
@@ -394,6 +415,8 @@ class SkyFields(FieldGroup):
 class EmissionFields(FieldGroup):
     """How strong lights are."""
 
+    steps = ("illuminance", "light")
+
     preset: Literal["photometric", "released"] = "photometric"
     sky_lx: float = Field(
         10_000.0,
@@ -417,11 +440,15 @@ class EmissionFields(FieldGroup):
 class MaterialFields(FieldGroup):
     """Materials (paper section 3.2; presets in docs/spec/suncg.md section 6)."""
 
+    steps = ("illuminance", "light")
+
     preset: Literal["physical", "released"] = "physical"
 
 
 class ToneFields(FieldGroup):
     """Radiance to 8 bits."""
+
+    steps = ("develop",)
 
     preset: Literal["photo", "released"] = "photo"
     key: float = Field(0.18, gt=0, le=1000, description="released: Reinhard's key value")
@@ -470,6 +497,8 @@ class ToneFields(FieldGroup):
 class RasterFields(FieldGroup):
     """The OpenGL modes."""
 
+    steps = ("opengl_dl", "opengl_il")
+
     samples: int = Field(4, ge=1, le=64, description="per pixel, resolved")
     lights_per_object: int = Field(8, ge=1, le=256, description="best ones, paper section 3.2")
 
@@ -479,6 +508,8 @@ class HistogramFields(FieldGroup):
 
     Bins are powers of two, so that every coarser binning is an exact sum of these.
     """
+
+    steps = ("view",)
 
     colour_space: Literal["rgb", "ycbcr"] = Field("rgb", description="sRGB-encoded; joint bins")
     colour_bins: Literal[2, 4, 8, 16] = Field(8, description="per channel, three channels jointly")

@@ -93,6 +93,8 @@ class RigCamera(FieldGroup):
 class RigFields(FieldGroup):
     """The cameras that take each view together; the first has the view's own id (docs/motion/rigs.md)."""
 
+    steps = ("cameras",)
+
     name: Name = "rig"
     cameras: tuple[RigCamera, ...] = Field(min_length=1, max_length=64)
 

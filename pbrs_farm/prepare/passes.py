@@ -19,7 +19,7 @@ from pbrs_farm.core.catalogue import EMPTY
 from pbrs_farm.core.house import House
 from pbrs_farm.core.made_home import VERSION as GENERATE_VERSION
 from pbrs_farm.core.plugins import marks_in_digest
-from pbrs_farm.core.recipe import Recipe
+from pbrs_farm.core.recipe import Recipe, groups_of_step
 from pbrs_farm.prepare.dress_catalogue import catalogue_of
 from pbrs_farm.prepare.formats import format_of_source
 from pbrs_farm.prepare.home_kinds import HOME_KIND
@@ -81,16 +81,16 @@ class Pass:
     """One pass of a house.
 
     version: raised when the pass makes another house of the same input; all that was made with the
-    former one is made anew. groups: the recipe groups it reads. depends: what else its result
-    follows from, as JSON knows it.
+    former one is made anew. depends: other inputs of its result, as JSON values. groups: recipe
+    groups that it reads and that do not name the step `house`.
     """
 
     name: str
     version: int
-    groups: tuple[str, ...]
     run: Callable[[Preparation], Preparation]
     is_needed: _IsNeeded
     depends: _Depends = field(default=lambda _source, _recipe: [])
+    groups: tuple[str, ...] = ()
 
 
 def dress_seed(source: SourceRef, recipe: Recipe) -> int:
@@ -313,23 +313,25 @@ def _edit(work: Preparation) -> Preparation:
 
 
 PASSES: Final = (
-    Pass("read", 5, ("read",), _read, lambda _source, _recipe: True, _read_depends),
-    Pass("stand-ins", 3, ("read", "dress"), _stand_in, _has_stand_ins, _stand_ins_depend),
-    Pass("furnish", GENERATE_VERSION + _FURNISH_VERSION, ("dress",), _furnish, _is_furnished, _furnish_depends),
-    Pass("dress", 10, ("dress",), _dress, _is_dressed, _dress_depends),
-    Pass("repair", 2, ("repair",), _repair, _is_home),
-    Pass("open", 1, ("dress",), _leave_open, _stands_open, _open_depends),
-    Pass("float", 1, ("dress",), _float, _has_floating_things, _float_depends),
+    Pass("read", 5, _read, lambda _source, _recipe: True, _read_depends),
+    Pass("stand-ins", 3, _stand_in, _has_stand_ins, _stand_ins_depend),
+    Pass("furnish", GENERATE_VERSION + _FURNISH_VERSION, _furnish, _is_furnished, _furnish_depends),
+    Pass("dress", 10, _dress, _is_dressed, _dress_depends),
+    Pass("repair", 2, _repair, _is_home),
+    Pass("open", 1, _leave_open, _stands_open, _open_depends),
+    Pass("float", 1, _float, _has_floating_things, _float_depends),
     Pass(
-        "surroundings", 2, ("surroundings",), _surround,
+        "surroundings", 2, _surround,
         lambda source, recipe: _is_home(source, recipe) and recipe.surroundings.kind != "none",
     ),
-    Pass("edits", 3, (), _edit, lambda source, _recipe: bool(source.edits)),
+    Pass("edits", 3, _edit, lambda source, _recipe: bool(source.edits)),
 )  # fmt: skip
 
 PASS: Final = {p.name: p for p in PASSES}
 
-GROUPS: Final = tuple(dict.fromkeys(group for p in PASSES for group in p.groups))
+GROUPS: Final = tuple(
+    dict.fromkeys([*groups_of_step("house"), *(g for p in PASSES for g in p.groups)])
+)
 """Every recipe group that a finished house may depend on."""
 
 STEP_GROUPS: Final = tuple(group for group in GROUPS if group != "dress")

@@ -16,7 +16,7 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.layers import LIGHT_LAYERS
 from pbrs_farm.core.lighting import ALL_MODES, Mode
-from pbrs_farm.core.recipe import Recipe
+from pbrs_farm.core.recipe import Recipe, groups_of_step
 from pbrs_farm.prepare import passes
 from pbrs_farm.run.request import Wanted, wanted_of
 from pbrs_farm.sample.camera_source import source_of
@@ -28,10 +28,14 @@ class Step:
 
     name: str
     version: int  # raised when its output changes
-    groups: tuple[str, ...]  # recipe groups it uses
     after: tuple[str, ...] = ()  # steps whose files it reads where they are: part of its digest
     per_view: bool = True
     needs: tuple[str, ...] = ()  # steps without which it cannot run
+
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """The recipe groups that its digest covers as a whole."""
+        return passes.STEP_GROUPS if self.name == "house" else groups_of_step(self.name)
 
 
 _VIEW_READS: Final = ("cameras", "truth", "opengl_dl", "opengl_il", "light", "develop")
@@ -39,31 +43,26 @@ _VIEW_READS: Final = ("cameras", "truth", "opengl_dl", "opengl_il", "light", "de
 STEPS: Final = {
     step.name: step
     for step in (
-        Step("house", 1, passes.STEP_GROUPS, per_view=False),
-        Step("cameras", 6, ("cameras", "rig", "lens"), ("house",), per_view=False),
-        Step("pairs", 2, ("cameras",), ("house", "cameras"), per_view=False, needs=("house", "cameras")),
-        Step("tracks", 2, ("image",), ("house", "cameras"), per_view=False, needs=("house", "cameras")),
-        Step("truth", 4, ("image",), ("house", "cameras")),
-        Step("opengl_dl", 3, ("image", "raster"), ("house", "cameras")),
-        Step("opengl_il", 3, ("image", "raster"), ("house", "cameras")),
-        Step("illuminance", 10, ("sky", "emission", "materials"), ("house",), per_view=False),
+        Step("house", 1, per_view=False),
+        Step("cameras", 6, ("house",), per_view=False),
+        Step("pairs", 2, ("house", "cameras"), per_view=False, needs=("house", "cameras")),
+        Step("tracks", 2, ("house", "cameras"), per_view=False, needs=("house", "cameras")),
+        Step("truth", 4, ("house", "cameras")),
+        Step("opengl_dl", 3, ("house", "cameras")),
+        Step("opengl_il", 3, ("house", "cameras")),
+        Step("illuminance", 10, ("house",), per_view=False),
         # Whatever changes illuminance changes light's digest, too: it need not stand in `after`.
         Step(
-            "light", 27, ("image", "light", "sky", "emission", "materials", "blur"), ("house", "cameras"),
+            "light", 27, ("house", "cameras"),
             needs=("illuminance",),
         ),
-        Step("develop", 8, ("tone", "light", "sensor"), ("light",), needs=("light",)),
-        Step("view", 3, ("histogram",), _VIEW_READS, needs=("truth",)),
+        Step("develop", 8, ("light",), needs=("light",)),
+        Step("view", 3, _VIEW_READS, needs=("truth",)),
     )
 }  # fmt: skip
 
 
 OPENGL_STEPS: Final = ("opengl_dl", "opengl_il")
-
-# Every recipe group that something stored depends on (selection judges, it makes nothing).
-PICTURE_GROUPS: Final = tuple(
-    sorted({*passes.GROUPS, *(g for s in STEPS.values() for g in s.groups)})
-)
 
 
 def wanted(

@@ -24,7 +24,7 @@ from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house import House, Room
 from pbrs_farm.core.layers import LAYER
 from pbrs_farm.core.lighting import ALL_MODES
-from pbrs_farm.core.recipe import Recipe
+from pbrs_farm.core.recipe import Recipe, picture_groups
 from pbrs_farm.crash_notes import note_step
 from pbrs_farm.formats.cameras_json import cameras_json
 from pbrs_farm.formats.illuminance_json import illuminance_json
@@ -378,7 +378,7 @@ def _view(work: Work) -> StepOutput:
     cached = _cached_house(work)
     view = cached.view(work.view_id or "", work.inputs["cameras"])
     facts = _facts_of_view(work)
-    digest = work.recipe.digest(*plan.PICTURE_GROUPS)
+    digest = work.recipe.digest(*picture_groups())
     description = view_description(
         view, work.house_id, facts, recipe_digest=digest, versions=versions()
     )

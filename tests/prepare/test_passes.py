@@ -11,7 +11,7 @@ import pytest
 
 from pbrs_farm.core.catalogue import EMPTY
 from pbrs_farm.core.edits import RemoveItems
-from pbrs_farm.core.recipe import Recipe, field_paths, with_settings
+from pbrs_farm.core.recipe import Recipe, field_paths, picture_groups, with_settings
 from pbrs_farm.prepare import finished_house as finishing
 from pbrs_farm.prepare import passes as passes_module
 from pbrs_farm.prepare.finished_house import HouseBeforeEdits, finished_house
@@ -36,7 +36,7 @@ def _sign(work: Preparation) -> Preparation:
 
 
 """
-row = """\\n    Pass("sign", 7, ("tone",), _sign, lambda _source, _recipe: True),"""
+row = """\\n    Pass("sign", 7, _sign, lambda _source, _recipe: True, groups=("tone",)),"""
 module = ModuleType("pbrs_farm.prepare.passes")
 import pbrs_farm.prepare
 sys.modules[module.__name__] = pbrs_farm.prepare.passes = module
@@ -130,7 +130,7 @@ def test_the_version_of_what_reads_plans_is_one_of_plans_alone(
 
 
 def test_every_group_of_a_pass_is_one_that_pictures_depend_on() -> None:
-    assert set(GROUPS) <= set(plan.PICTURE_GROUPS)
+    assert set(GROUPS) <= set(picture_groups())
     assert set(plan.STEPS["house"].groups) <= set(GROUPS)
 
 

@@ -11,13 +11,12 @@ from pbrs_farm.cli import main
 from pbrs_farm.commands.arguments import dress_seeds
 from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadInput, BadRecipe
-from pbrs_farm.core.recipe import recipe_from_name
+from pbrs_farm.core.recipe import picture_groups, recipe_from_name
 from pbrs_farm.dress.report import Credit, DressReport, Gate, summary_of_dressing
 from pbrs_farm.formats.serialise import json_bytes
 from pbrs_farm.prepare.source import resolve, variants
 from pbrs_farm.run.attributions import attribution_text, write_attribution
 from pbrs_farm.run.house_cache import HouseCache
-from pbrs_farm.run.plan import PICTURE_GROUPS
 from pbrs_farm.run.step_cache import Work
 from pbrs_farm.run.steps import run_step
 from pbrs_farm.store import MemoryStore
@@ -62,7 +61,7 @@ def test_an_object_without_context_is_never_dressed():
 
 def test_what_dresses_a_home_is_in_the_digest_of_a_recipe():
     recipe = recipe_from_name("paper")
-    assert "dress" in PICTURE_GROUPS
+    assert "dress" in picture_groups()
     dressed = recipe_from_name("paper", {"dress.seed": "3"})
     assert dressed.digest() != recipe.digest()
 
