@@ -21,11 +21,13 @@ Family = Callable[[np.random.Generator, Size, Palette], F32]
 
 _NONE: Mapping[str, int] = MappingProxyType({})
 EDGE_PX = 400  # the longer edge of a picture
+# fmt: off
 _WORDS = (
     "home", "slow down", "be kind", "breathe", "less is more", "dream", "hello", "good things",
     "coffee first", "eat well", "stay wild", "paris", "tokyo", "lisboa", "havana", "rest",
     "today", "love", "light", "42", "&", "yes.", "gather", "the sea", "no. 7", "sunday",
-)  # fmt: skip
+)
+# fmt: on
 
 
 def print_pixels(
@@ -172,7 +174,9 @@ def _sea(rng: np.random.Generator, size: Size, palette: Palette) -> F32:
     depth = np.clip((v - horizon) / (h - horizon), 0, 1)
     water = _mix_pixels(mix(warm, cool, 0.55), shade(cool, 0.45), depth)
     ripple = _noise(rng, size, 1.0, 8.0) * (0.03 + 0.07 * depth)
-    glitter = np.exp(-(((u - 0.5 * w) / (0.06 + 0.2 * depth)) ** 2)) * np.clip(_noise(rng, size, 0.8, 6.0), 0, 2)  # fmt: skip
+    glitter = np.exp(-(((u - 0.5 * w) / (0.06 + 0.2 * depth)) ** 2)) * np.clip(
+        _noise(rng, size, 0.8, 6.0), 0, 2
+    )
     water = water + ripple[..., None] + 0.22 * (glitter * (1 - 0.6 * depth))[..., None]
     return _mix_pixels(sky, water, _smooth(v - horizon, 0.006))
 
@@ -276,7 +280,11 @@ def _map(rng: np.random.Generator, size: Size, palette: Palette) -> F32:
     picture = _mix_pixels(
         sea, shade(sea, 1.15), np.clip(0.5 + 0.5 * np.sin(height * 14), 0, 1) * (height < 0)
     )
-    land = _mix_pixels(mix((0.88, 0.83, 0.68), palette[2], 0.3), mix((0.6, 0.5, 0.36), palette[3], 0.3), np.clip(height, 0, 1.6) / 1.6)  # fmt: skip
+    land = _mix_pixels(
+        mix((0.88, 0.83, 0.68), palette[2], 0.3),
+        mix((0.6, 0.5, 0.36), palette[3], 0.3),
+        np.clip(height, 0, 1.6) / 1.6,
+    )
     picture = _mix_pixels(picture, land, _smooth(height, 0.05))
     picture = _mix_pixels(picture, (0.25, 0.22, 0.2), 0.8 * _smooth(0.035 - np.abs(height), 0.03))
     graticule = np.minimum(np.abs((u * 6) % 1 - 0.5), np.abs((v * 6) % 1 - 0.5))
@@ -295,7 +303,9 @@ def _tile_poster(rng: np.random.Generator, size: Size, palette: Palette) -> F32:
     x, y = u * n - cell_u, v * n - cell_v
     x, y = np.where(corner % 2 == 1, 1 - x, x), np.where(corner >= 2, 1 - y, y)
     kind = rng.integers(0, 3, shape)[cell_v, cell_u]
-    inside = np.select([kind == 0, kind == 1], [1 - np.hypot(x, y), x - y], 0.5 - np.hypot(x - 0.5, y - 0.5))  # fmt: skip
+    inside = np.select(
+        [kind == 0, kind == 1], [1 - np.hypot(x, y), x - y], 0.5 - np.hypot(x - 0.5, y - 0.5)
+    )
     t = _smooth(np.asarray(inside, np.float32), 0.04)
     return np.asarray(
         ground[cell_v, cell_u] * (1 - t[..., None]) + ink[cell_v, cell_u] * t[..., None]
@@ -386,9 +396,11 @@ def _halved(image: Image.Image) -> F32:
     return np.asarray(np.asarray(half, np.float32) / 255, np.float32)
 
 
+# fmt: off
 FAMILIES: dict[str, Family] = {
     "shapes": _shapes, "colour field": _colour_field, "ridges": _ridges, "sea": _sea,
     "forest": _forest, "bokeh": _bokeh, "lines": _line_drawing, "botanical": _botanical, "map": _map,
     "tiles": _tile_poster, "marbled": _marbled, "words": _word_poster, "skyline": _skyline,
-}  # fmt: skip
+}
+# fmt: on
 _LIKED = np.array([1.4, 1.0, 1.2, 1.2, 1.0, 0.6, 1.2, 1.3, 0.7, 1.0, 1.0, 0.7, 0.8])

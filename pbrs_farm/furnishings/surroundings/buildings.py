@@ -17,15 +17,16 @@ from pbrs_farm.furnishings.surroundings.scenery import (
     paved,
 )
 
+# fmt: off
+
 STOREY_M: Final = 3.0
 
 _REVEAL_M: Final = 0.17  # that windows lie behind their front
 _EAVES_M: Final = 0.45
 _PLINTH_M: Final = 0.5
 _DOOR_M: Final = (1.15, 2.45)
-_PAINTS: Final[tuple[Rgb, ...]] = (
-    (0.55, 0.56, 0.58), (0.03, 0.03, 0.035), (0.20, 0.21, 0.22), (0.30, 0.03, 0.03), (0.05, 0.09, 0.20), (0.70, 0.70, 0.68),
-)  # fmt: skip
+_PAINTS: Final[tuple[Rgb, ...]] = ((0.55, 0.56, 0.58), (0.03, 0.03, 0.035), (0.20, 0.21, 0.22),
+    (0.30, 0.03, 0.03), (0.05, 0.09, 0.20), (0.70, 0.70, 0.68))
 _IRON: Final = SceneryMaterial("iron", rgb=(0.2, 0.2, 0.21))
 
 
@@ -39,12 +40,8 @@ class Front(NamedTuple):
     def at(self, s: F64 | float, y: F64 | float, out: F64 | float = 0.0) -> F64:
         """World places s along, y up, out towards the home."""
         s, y, out = np.broadcast_arrays(*(np.asarray(v, np.float64) for v in (s, y, out)))
-        return np.asarray(
-            self.foot
-            + s[..., None] * self.along
-            + y[..., None] * np.array([0.0, 1.0, 0.0])
-            + out[..., None] * self.to_home
-        )
+        return np.asarray(self.foot + s[..., None] * self.along + y[...,
+            None] * np.array([0.0, 1.0, 0.0]) + out[..., None] * self.to_home)
 
 
 def _rectangles(front: Front, s0: F64, y0: F64, s1: F64, y1: F64, out: F64 | float) -> F64:
@@ -52,15 +49,16 @@ def _rectangles(front: Front, s0: F64, y0: F64, s1: F64, y1: F64, out: F64 | flo
     return np.stack(corners, -2).reshape(-1, 4, 3)
 
 
-def _front_box(
-    scenery: Scenery, thing: str, look: SceneryMaterial, front: Front, s0: float, s1: float, y0: float, y1: float,
-    out0: float, out1: float,
-) -> None:  # fmt: skip
+def _front_box(scenery: Scenery, thing: str, look: SceneryMaterial, front: Front, s0: float,
+    s1: float, y0: float, y1: float, out0: float, out1: float) -> None:
     low, high = np.array([s0, y0, out0]), np.array([s1, y1, out1])
-    corners = np.array([[low[0], low[1], high[2]], [high[0], low[1], high[2]], [high[0], high[1], high[2]], [low[0], high[1], high[2]],
-                        [low[0], low[1], low[2]], [high[0], low[1], low[2]], [high[0], high[1], low[2]], [low[0], high[1], low[2]]])  # fmt: skip
+    corners = np.array([[low[0], low[1], high[2]], [high[0], low[1], high[2]],
+        [high[0], high[1], high[2]], [low[0], high[1], high[2]], [low[0], low[1], low[2]],
+        [high[0], low[1], low[2]], [high[0], high[1], low[2]], [low[0], high[1], low[2]]])
     world = front.at(corners[:, 0], corners[:, 1], corners[:, 2])
-    scenery.add(thing, look, world[[[0, 1, 2, 3], [3, 2, 6, 7], [4, 0, 3, 7], [1, 5, 6, 2], [4, 5, 1, 0]]])  # fmt: skip
+    scenery.add(
+        thing, look, world[[[0, 1, 2, 3], [3, 2, 6, 7], [4, 0, 3, 7], [1, 5, 6, 2], [4, 5, 1, 0]]]
+    )
 
 
 class _Holes(NamedTuple):
@@ -73,10 +71,9 @@ class _Holes(NamedTuple):
     has_balcony: Any  # (N,) bool
 
 
-def block(
-    scenery: Scenery, thing: str, rng: np.random.Generator, front: Front, own: Facade, rooms: SceneryMaterial,
-    n_bays: int, n_storeys: int, *, depth_m: float = 10.0, is_lit: float = 0.3, has_balconies: bool = False,
-) -> None:  # fmt: skip
+def block(scenery: Scenery, thing: str, rng: np.random.Generator, front: Front, own: Facade,
+    rooms: SceneryMaterial, n_bays: int, n_storeys: int, *, depth_m: float = 10.0,
+    is_lit: float = 0.3, has_balconies: bool = False) -> None:
     """A building of several storeys: a front with windows, sides, a roof and what sticks out.
 
     rooms: the look of `lit_rooms`, for windows of lit rooms.
@@ -91,7 +88,8 @@ def block(
     _front_box(
         scenery, thing, own.trim, front, -0.1, width + 0.1, top - 0.1, top + 0.22, -0.1, cornice
     )
-    _front_box(scenery, thing, own.trim, front, -0.05, width + 0.05, top - 0.32, top - 0.1, -0.1, 0.45 * cornice)  # fmt: skip
+    _front_box(scenery, thing, own.trim, front, -0.05, width + 0.05, top - 0.32, top - 0.1, -0.1,
+        0.45 * cornice)
     if own.style.surround_m:
         y = _PLINTH_M + STOREY_M
         _front_box(scenery, thing, own.trim, front, 0, width, y - 0.1, y + 0.08, -0.05, 0.09)
@@ -101,13 +99,12 @@ def block(
     else:
         _roof(scenery, thing, rng, front, own, width, top, depth_m)
     for k in np.flatnonzero(holes.has_balcony):
-        _balcony(scenery, thing, front, own, holes.left[k] - 0.35, holes.right[k] + 0.35, holes.low[k] - 0.1)  # fmt: skip
+        _balcony(scenery, thing, front, own, holes.left[k] - 0.35, holes.right[k] + 0.35,
+            holes.low[k] - 0.1)
 
 
-def house(
-    scenery: Scenery, thing: str, rng: np.random.Generator, front: Front, own: Facade, rooms: SceneryMaterial,
-    *, is_lit: float = 0.3,
-) -> None:  # fmt: skip
+def house(scenery: Scenery, thing: str, rng: np.random.Generator, front: Front, own: Facade,
+    rooms: SceneryMaterial, *, is_lit: float = 0.3) -> None:
     """A house of one or two storeys with a gable."""
     n_bays, n_storeys = int(rng.integers(3, 5)), int(rng.integers(1, 3))
     width, depth = n_bays * own.bay_m, float(rng.uniform(7, 10))
@@ -122,7 +119,9 @@ def house(
         return
     # The gable looks at the home, under slopes that reach over it.
     middle = width / 2
-    gable = np.stack([front.at(0, top), front.at(width, top), front.at(middle, ridge), front.at(middle, ridge)])  # fmt: skip
+    gable = np.stack(
+        [front.at(0, top), front.at(width, top), front.at(middle, ridge), front.at(middle, ridge)]
+    )
     uvs = np.array([[0, top], [width, top], [middle, ridge], [middle, ridge]])
     scenery.add(thing, own.wall, gable[None], (uvs / own.wall.size_m)[None])
     for s in (-_EAVES_M, width + _EAVES_M):
@@ -141,15 +140,15 @@ def _body(
     stone = SceneryMaterial("stone", rgb=(0.46, 0.45, 0.43))
     _front_box(scenery, thing, stone, front, 0, width, -0.5, _PLINTH_M, -0.1, 0.05)
     for s in (0.0, width):
-        side = np.stack([front.at(s, y, o) for y, o in ((-0.5, 0), (-0.5, -depth), (top, -depth), (top, 0))])  # fmt: skip
+        side = np.stack(
+            [front.at(s, y, o) for y, o in ((-0.5, 0), (-0.5, -depth), (top, -depth), (top, 0))]
+        )
         uvs = np.array([[0, -0.5], [depth, -0.5], [depth, top], [0, top]]) / own.wall.size_m
         scenery.add(thing, own.wall, side[None], uvs[None])
 
 
-def _front(
-    scenery: Scenery, thing: str, rng: np.random.Generator, front: Front, own: Facade, n_bays: int,
-    n_storeys: int, balconies: float,
-) -> _Holes:  # fmt: skip
+def _front(scenery: Scenery, thing: str, rng: np.random.Generator, front: Front, own: Facade,
+    n_bays: int, n_storeys: int, balconies: float) -> _Holes:
     """The wall of a front, with windows that lie in it, and a door; the windows are returned."""
     x0, y0, x1, y1 = own.window
     bay, storey = np.indices((n_bays, n_storeys), np.float64).reshape(2, -1)
@@ -161,18 +160,24 @@ def _front(
     low, high = floor + np.where(has_balcony, 0.1, y0), floor + y1
     is_door = (storey == 0) & (bay == int(rng.integers(0, n_bays)))
     middle = (left + right) / 2
-    left, right = np.where(is_door, middle - _DOOR_M[0] / 2, left), np.where(is_door, middle + _DOOR_M[0] / 2, right)  # fmt: skip
+    left, right = (
+        np.where(is_door, middle - _DOOR_M[0] / 2, left),
+        np.where(is_door, middle + _DOOR_M[0] / 2, right),
+    )
     low, high = np.where(is_door, 0.06, low), np.where(is_door, 0.06 + _DOOR_M[1], high)
     # The wall about each window of a bay, from the storey's floor to its ceiling.
     a, b = bay * own.bay_m, (bay + 1) * own.bay_m
     bottom, top = np.where(storey == 0, _PLINTH_M, floor), floor + STOREY_M
     at_sill = np.maximum(low, bottom)
-    for s0, t0, s1, t1 in ((a, bottom, left, top), (right, bottom, b, top), (left, bottom, right, at_sill), (left, high, right, top)):  # fmt: skip
+    for s0, t0, s1, t1 in ((a, bottom, left, top), (right, bottom, b, top),
+        (left, bottom, right, at_sill), (left, high, right, top)):
         _add_wall(scenery, thing, own.wall, front, s0, t0, s1, t1)
     # Reveals, and what stands in them.
     inner = own.trim if own.style.surround_m else own.wall
-    for p, q, r, t in ((left, low, left, high), (right, high, right, low), (left, high, right, high), (right, low, left, low)):  # fmt: skip
-        reveal = np.stack([front.at(p, q), front.at(r, t), front.at(r, t, -_REVEAL_M), front.at(p, q, -_REVEAL_M)], -2)  # fmt: skip
+    for p, q, r, t in ((left, low, left, high), (right, high, right, low),
+        (left, high, right, high), (right, low, left, low)):
+        reveal = np.stack([front.at(p, q), front.at(r, t), front.at(r, t, -_REVEAL_M),
+            front.at(p, q, -_REVEAL_M)], -2)
         scenery.add(thing, inner, reveal)
     is_glass = ~is_door
     cells = rng.integers(0, COLUMNS * ROWS, n)
@@ -183,39 +188,40 @@ def _front(
     scenery.add(thing, own.windows, panes[is_glass], uvs[is_glass])
     if is_door.any():
         scenery.add(thing, own.door, panes[is_door], unit[None].astype(np.float64))
-    _about_windows(scenery, thing, front, own, left[is_glass], low[is_glass], right[is_glass], high[is_glass])  # fmt: skip
+    _about_windows(
+        scenery, thing, front, own, left[is_glass], low[is_glass], right[is_glass], high[is_glass]
+    )
     found = left, low, right, high, has_balcony
     return _Holes(*(v[is_glass] for v in found))
 
 
-def _add_wall(
-    scenery: Scenery, thing: str, look: SceneryMaterial, front: Front, s0: F64, y0: F64, s1: F64, y1: F64
-) -> None:  # fmt: skip
+def _add_wall(scenery: Scenery, thing: str, look: SceneryMaterial, front: Front, s0: F64, y0: F64,
+    s1: F64, y1: F64) -> None:
     """Rectangles of a front, its picture in metres on it."""
-    corners = [np.stack(np.broadcast_arrays(s, y), -1) for s, y in ((s0, y0), (s1, y0), (s1, y1), (s0, y1))]  # fmt: skip
-    scenery.add(thing, look, _rectangles(front, s0, y0, s1, y1, 0.0), np.stack(corners, -2) / look.size_m)  # fmt: skip
+    corners = [
+        np.stack(np.broadcast_arrays(s, y), -1) for s, y in ((s0, y0), (s1, y0), (s1, y1), (s0, y1))
+    ]
+    scenery.add(
+        thing, look, _rectangles(front, s0, y0, s1, y1, 0.0), np.stack(corners, -2) / look.size_m
+    )
 
 
-def _about_windows(
-    scenery: Scenery,
-    thing: str,
-    front: Front,
-    own: Facade,
-    left: F64,
-    low: F64,
-    right: F64,
-    high: F64,
-) -> None:
+def _about_windows(scenery: Scenery, thing: str, front: Front, own: Facade, left: F64, low: F64,
+    right: F64, high: F64) -> None:
     """Sills, bands about windows or lintels over them, and shutters."""
-    over = np.stack([front.at(left - 0.08, low), front.at(right + 0.08, low), front.at(right + 0.08, low, 0.1), front.at(left - 0.08, low, 0.1)], -2)  # fmt: skip
+    over = np.stack([front.at(left - 0.08, low), front.at(right + 0.08, low),
+        front.at(right + 0.08, low, 0.1), front.at(left - 0.08, low, 0.1)], -2)
     lip = _rectangles(front, left - 0.08, low - 0.07, right + 0.08, low, 0.1)
     scenery.add(thing, own.trim, np.concatenate([over, lip]))
     band = own.style.surround_m
     if band:
-        for s0, t0, s1, t1 in ((left - band, low, left, high + band), (right, low, right + band, high + band), (left, high, right, high + band)):  # fmt: skip
+        for s0, t0, s1, t1 in ((left - band, low, left, high + band),
+            (right, low, right + band, high + band), (left, high, right, high + band)):
             scenery.add(thing, own.trim, _rectangles(front, s0, t0, s1, t1, 0.025))
     elif own.style.wall == "brick":
-        scenery.add(thing, own.trim, _rectangles(front, left - 0.12, high, right + 0.12, high + 0.2, 0.015))  # fmt: skip
+        scenery.add(
+            thing, own.trim, _rectangles(front, left - 0.12, high, right + 0.12, high + 0.2, 0.015)
+        )
     if own.shutter is not None:
         half = (right - left) / 2
         for s0, s1 in ((left - band - half, left - band), (right + band, right + band + half)):
@@ -233,20 +239,20 @@ def _balcony(
         return
     rods = np.arange(s0, s1, 0.12)
     n = len(rods)
-    scenery.add(thing, _IRON, _rectangles(front, rods - 0.009, np.full(n, floor), rods + 0.009, np.full(n, floor + 1.0), out - 0.03))  # fmt: skip
+    scenery.add(thing, _IRON, _rectangles(front, rods - 0.009, np.full(n, floor), rods + 0.009,
+        np.full(n, floor + 1.0), out - 0.03))
     _front_box(
         scenery, thing, _IRON, front, s0, s1, floor + 0.97, floor + 1.02, out - 0.05, out - 0.01
     )
     for s in (s0, s1):
         depth = np.linspace(0.1, out - 0.03, 8)
-        sides = np.stack([front.at(s, floor, depth - 0.009), front.at(s, floor, depth + 0.009), front.at(s, floor + 1.0, depth + 0.009), front.at(s, floor + 1.0, depth - 0.009)], -2)  # fmt: skip
+        sides = np.stack([front.at(s, floor, depth - 0.009), front.at(s, floor, depth + 0.009),
+            front.at(s, floor + 1.0, depth + 0.009), front.at(s, floor + 1.0, depth - 0.009)], -2)
         scenery.add(thing, _IRON, sides)
 
 
-def _lit_windows(
-    scenery: Scenery, thing: str, rng: np.random.Generator, front: Front, holes: _Holes,
-    rooms: SceneryMaterial, share: float,
-) -> None:  # fmt: skip
+def _lit_windows(scenery: Scenery, thing: str, rng: np.random.Generator, front: Front,
+    holes: _Holes, rooms: SceneryMaterial, share: float) -> None:
     """Light behind a share of the windows, in both halves of their frames."""
     on = np.flatnonzero(rng.random(len(holes.left)) < share)
     room = rng.integers(0, N_ROOMS, len(on))
@@ -254,7 +260,9 @@ def _lit_windows(
     frame = 0.075 * (right - left)
     middle = (left + right) / 2
     unit = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
-    for half, (a, b) in enumerate(((left + frame, middle - 0.5 * frame), (middle + 0.5 * frame, right - frame))):  # fmt: skip
+    for half, (a, b) in enumerate(
+        ((left + frame, middle - 0.5 * frame), (middle + 0.5 * frame, right - frame))
+    ):
         quads = _rectangles(front, a, low + frame, b, high - frame, 0.012 - _REVEAL_M)
         first = (room + 0.5 * half) / N_ROOMS
         uvs = np.stack([first, 0 * first], -1)[:, None] + unit * [0.5 / N_ROOMS, 1.0]
@@ -272,14 +280,14 @@ def _flat_roof(
     scenery: Scenery, thing: str, front: Front, own: Facade, width: float, top: float, depth: float
 ) -> None:
     """A roof that is not seen from below, and a housing on it."""
-    scenery.add(thing, own.trim, np.stack([front.at(s, top + 0.1, o) for s, o in ((0, 0), (width, 0), (width, -depth), (0, -depth))])[None])  # fmt: skip
-    _front_box(scenery, thing, own.wall, front, 0.35 * width, 0.35 * width + 2.6, top, top + 2.2, -5.5, -3.0)  # fmt: skip
+    scenery.add(thing, own.trim, np.stack([front.at(s, top + 0.1, o) for s,
+        o in ((0, 0), (width, 0), (width, -depth), (0, -depth))])[None])
+    _front_box(scenery, thing, own.wall, front, 0.35 * width, 0.35 * width + 2.6, top, top + 2.2,
+        -5.5, -3.0)
 
 
-def _roof(
-    scenery: Scenery, thing: str, rng: np.random.Generator, front: Front, own: Facade, width: float,
-    top: float, depth: float,
-) -> None:  # fmt: skip
+def _roof(scenery: Scenery, thing: str, rng: np.random.Generator, front: Front, own: Facade,
+    width: float, top: float, depth: float) -> None:
     """Two slopes over eaves with a gutter, and chimneys."""
     ridge = top + rng.uniform(2.2, 3.6)
     drop = _EAVES_M * (ridge - top) / (depth / 2)
@@ -289,13 +297,16 @@ def _roof(
     _slope(scenery, thing, own, a, b, c, d)
     _slope(scenery, thing, own, e, f, d, c)
     y = top + 0.2 - drop
-    _front_box(scenery, thing, _IRON, front, -0.2, width + 0.2, y - 0.09, y + 0.03, _EAVES_M - 0.02, _EAVES_M + 0.1)  # fmt: skip
+    _front_box(scenery, thing, _IRON, front, -0.2, width + 0.2, y - 0.09, y + 0.03, _EAVES_M - 0.02,
+        _EAVES_M + 0.1)
     for s in (0.0, width):
-        gable = np.stack([front.at(s, top, 0), front.at(s, top, -depth), front.at(s, ridge, -depth / 2), front.at(s, ridge, -depth / 2)])  # fmt: skip
+        gable = np.stack([front.at(s, top, 0), front.at(s, top, -depth),
+            front.at(s, ridge, -depth / 2), front.at(s, ridge, -depth / 2)])
         uvs = np.array([[0, top], [depth, top], [depth / 2, ridge], [depth / 2, ridge]])
         scenery.add(thing, own.wall, gable[None], (uvs / own.wall.size_m)[None])
     for s in rng.uniform(0.15, 0.85, int(rng.integers(1, 3))) * width:
-        _front_box(scenery, thing, own.wall, front, s, s + 0.7, ridge - 1.4, ridge + 0.9, -depth / 2 - 0.3, -depth / 2 + 0.4)  # fmt: skip
+        _front_box(scenery, thing, own.wall, front, s, s + 0.7, ridge - 1.4, ridge + 0.9,
+            -depth / 2 - 0.3, -depth / 2 + 0.4)
 
 
 def car(scenery: Scenery, thing: str, rng: np.random.Generator, front: Front) -> None:
@@ -311,7 +322,9 @@ def car(scenery: Scenery, thing: str, rng: np.random.Generator, front: Front) ->
         SceneryMaterial("tyre", rgb=(0.12, 0.12, 0.12)),
     )
     scale = rng.uniform(0.94, 1.12)
-    flank = np.array([[0, 0.3], [0.05, 0.72], [0.75, 0.88], [3.9, 0.9], [4.2, 0.7], [4.2, 0.3]]) * scale  # fmt: skip
+    flank = (
+        np.array([[0, 0.3], [0.05, 0.72], [0.75, 0.88], [3.9, 0.9], [4.2, 0.7], [4.2, 0.3]]) * scale
+    )
     cabin = np.array([[0.85, 0.87], [1.5, 1.42], [3.0, 1.45], [3.75, 0.89]]) * scale
     for outline, look, inset in ((flank, body, 0.0), (cabin, glass, 0.14)):
         near, far = -inset, -1.72 * scale + inset
@@ -346,9 +359,8 @@ def lamp_post(scenery: Scenery, thing: str, front: Front) -> None:
     )
 
 
-def fence(
-    scenery: Scenery, thing: str, rng: np.random.Generator, front: Front, length: float, height: float
-) -> None:  # fmt: skip
+def fence(scenery: Scenery, thing: str, rng: np.random.Generator, front: Front, length: float,
+    height: float) -> None:
     """A fence of boards along the front's line."""
     wood = SceneryMaterial(
         "fence boards", picture=mottled(rng, (0.10, 0.07, 0.045), (0.30, 0.22, 0.15))
@@ -366,16 +378,17 @@ def railing(scenery: Scenery, thing: str, front: Front, length: float) -> None:
     for y in (0.08, 0.98):
         _front_box(scenery, thing, iron, front, 0, length, y, y + 0.035, 0, 0.03)
     s = np.linspace(0.01, length - 0.01, max(round(length / 0.11), 2))
-    scenery.add(thing, iron, _rectangles(front, s - 0.008, np.full(len(s), 0.1), s + 0.008, np.full(len(s), 0.98), 0.015))  # fmt: skip
+    scenery.add(thing, iron, _rectangles(front, s - 0.008, np.full(len(s), 0.1), s + 0.008,
+        np.full(len(s), 0.98), 0.015))
 
 
 def ground_looks(rng: np.random.Generator) -> dict[str, SceneryMaterial]:
     """What the ground is made of."""
-    return {
-        "lawn": SceneryMaterial("lawn", picture=mottled(rng, (0.030, 0.052, 0.014), (0.115, 0.155, 0.042), size=256, slope=1.0), size_m=(3.7, 3.7)),
-        "asphalt": SceneryMaterial("asphalt", picture=mottled(rng, (0.045, 0.045, 0.048), (0.10, 0.10, 0.10), slope=0.6), size_m=(3.1, 3.1)),
-        "slabs": SceneryMaterial("slabs", picture=paved(rng, (0.33, 0.31, 0.28), 4), size_m=(2.0, 2.0)),
-        "gravel": SceneryMaterial("gravel", picture=mottled(rng, (0.14, 0.13, 0.11), (0.42, 0.39, 0.34), slope=0.1), size_m=(1.0, 1.0)),
-        "kerb": SceneryMaterial("kerb", rgb=(0.58, 0.57, 0.55)),
-        "line": SceneryMaterial("road line", rgb=(0.85, 0.85, 0.83)),
-    }  # fmt: skip
+    return {"lawn": SceneryMaterial("lawn", picture=mottled(rng, (0.030, 0.052, 0.014),
+        (0.115, 0.155, 0.042), size=256, slope=1.0), size_m=(3.7, 3.7)),
+        "asphalt": SceneryMaterial("asphalt", picture=mottled(rng, (0.045, 0.045, 0.048),
+        (0.10, 0.10, 0.10), slope=0.6), size_m=(3.1, 3.1)), "slabs": SceneryMaterial("slabs",
+        picture=paved(rng, (0.33, 0.31, 0.28), 4), size_m=(2.0, 2.0)),
+        "gravel": SceneryMaterial("gravel", picture=mottled(rng, (0.14, 0.13, 0.11),
+        (0.42, 0.39, 0.34), slope=0.1), size_m=(1.0, 1.0)), "kerb": SceneryMaterial("kerb",
+        rgb=(0.58, 0.57, 0.55)), "line": SceneryMaterial("road line", rgb=(0.85, 0.85, 0.83))}

@@ -38,9 +38,15 @@ class Style(NamedTuple):
 
 
 _RED, _SLATE, _BROWN = (0.27, 0.085, 0.045), (0.085, 0.09, 0.10), (0.15, 0.085, 0.06)
-_WHITE, _DARK, _OAK, _GREEN = (0.72, 0.72, 0.69), (0.035, 0.04, 0.045), (0.16, 0.085, 0.04), (0.03, 0.07, 0.05)  # fmt: skip
+_WHITE, _DARK, _OAK, _GREEN = (
+    (0.72, 0.72, 0.69),
+    (0.035, 0.04, 0.045),
+    (0.16, 0.085, 0.04),
+    (0.03, 0.07, 0.05),
+)
 _SAND, _GREY, _PALE = (0.50, 0.44, 0.34), (0.33, 0.32, 0.30), (0.62, 0.60, 0.55)
 
+# fmt: off
 TOWN: Final[tuple[Style, ...]] = (
     Style("rendered", "plaster", ((0.52, 0.44, 0.31), (0.60, 0.57, 0.50), (0.45, 0.33, 0.22), (0.42, 0.42, 0.39), (0.50, 0.40, 0.20), (0.44, 0.27, 0.20)),
           (_PALE, _SAND), (_WHITE, _OAK), (_RED, _BROWN), (2.6, 3.2), (1.05, 1.65), ("two", "transom"), 0.13, shutters=0.4, balconies=0.2),
@@ -52,7 +58,9 @@ TOWN: Final[tuple[Style, ...]] = (
           (3.2, 4.0), (1.9, 1.6), ("one", "two"), 0.0, is_flat=True, balconies=0.35, cornice_m=0.12),
     Style("panels", "panels", ((0.46, 0.45, 0.42), (0.52, 0.48, 0.40), (0.40, 0.43, 0.45)), (_PALE,), (_WHITE,), (_GREY,),
           (3.0, 3.6), (1.6, 1.4), ("one", "two"), 0.0, is_flat=True, balconies=0.4, cornice_m=0.15),
-)  # fmt: skip
+)
+# fmt: on
+# fmt: off
 HOUSES: Final[tuple[Style, ...]] = (
     Style("cottage", "plaster", ((0.66, 0.64, 0.58), (0.56, 0.47, 0.33), (0.55, 0.55, 0.52)), (_PALE, _SAND), (_WHITE, _OAK), (_RED, _BROWN, _SLATE),
           (2.9, 3.5), (1.25, 1.3), ("two", "transom"), 0.1, shutters=0.5),
@@ -60,7 +68,8 @@ HOUSES: Final[tuple[Style, ...]] = (
           (2.9, 3.5), (1.3, 1.35), ("sash", "two"), 0.0),
     Style("timber house", "boards", ((0.30, 0.08, 0.055), (0.55, 0.53, 0.47), (0.20, 0.12, 0.07), (0.25, 0.30, 0.32)), (_WHITE,), (_WHITE,), (_SLATE, _BROWN),
           (2.9, 3.5), (1.2, 1.35), ("sash", "two"), 0.11),
-)  # fmt: skip
+)
+# fmt: on
 
 
 class Facade(NamedTuple):
@@ -87,7 +96,9 @@ def facade(rng: np.random.Generator, number: int, styles: tuple[Style, ...]) -> 
     name = f"facade {style.name} {number}"
     shutter = None
     if rng.random() < style.shutters and bay > 2 * wide + 0.3:
-        rgb = _one(rng, ((0.05, 0.10, 0.08), (0.09, 0.13, 0.18), (0.16, 0.07, 0.045), (0.28, 0.27, 0.24)))  # fmt: skip
+        rgb = _one(
+            rng, ((0.05, 0.10, 0.08), (0.09, 0.13, 0.18), (0.16, 0.07, 0.045), (0.28, 0.27, 0.24))
+        )
         shutter = SceneryMaterial(f"{name} shutter", picture=slats(rng, rgb), size_m=(0.6, 0.6))
     picture, size_m = _wall(rng, style.wall, wall)
     roof = _one(rng, style.roofs)
@@ -122,7 +133,10 @@ def _wall(rng: np.random.Generator, kind: str, rgb: Rgb) -> tuple[F32, tuple[flo
     y, x = np.arange(_PX)[:, None], np.arange(_PX)[None]
     match kind:
         case "brick":
-            return _laid(rng, picture, 28, 8, joint=1.5, spread=0.17, mortar=(0.34, 0.31, 0.27)), (2.0, 2.1)  # fmt: skip
+            return _laid(rng, picture, 28, 8, joint=1.5, spread=0.17, mortar=(0.34, 0.31, 0.27)), (
+                2.0,
+                2.1,
+            )
         case "stone":
             mortar = tuple(0.62 * c for c in rgb)
             return _laid(rng, picture, 6, 4, joint=1.2, spread=0.07, mortar=mortar), (2.4, 2.0)  # type: ignore[arg-type]
@@ -143,15 +157,26 @@ def _wall(rng: np.random.Generator, kind: str, rgb: Rgb) -> tuple[F32, tuple[flo
 
 
 def _laid(
-    rng: np.random.Generator, picture: F64, n_rows: int, n_columns: int, *, joint: float, spread: float,
+    rng: np.random.Generator,
+    picture: F64,
+    n_rows: int,
+    n_columns: int,
+    *,
+    joint: float,
+    spread: float,
     mortar: Rgb,
-) -> F32:  # fmt: skip
+) -> F32:
     """The picture as stones laid in running bond with mortar between."""
     at = np.arange(_PX) + 0.5
     row = (at * n_rows / _PX).astype(int)
     shifted = at[None] * n_columns / _PX + 0.5 * (row % 2)[:, None]
     column = shifted.astype(int) % n_columns
-    laid = picture * rng.normal(1, spread, (n_rows, n_columns)).clip(0.45, 1.5)[row[:, None], column][..., None]  # fmt: skip
+    laid = (
+        picture
+        * rng.normal(1, spread, (n_rows, n_columns)).clip(0.45, 1.5)[row[:, None], column][
+            ..., None
+        ]
+    )
     warm = rng.normal(0, 0.25 * spread, (n_rows, n_columns))[row[:, None], column]
     laid *= 1 + np.stack([warm, 0 * warm, -warm], -1)
     in_row, in_column = at * n_rows / _PX % 1 * _PX / n_rows, shifted % 1 * _PX / n_columns
@@ -177,7 +202,9 @@ def slats(rng: np.random.Generator, rgb: Rgb) -> F32:
     """(64, 64, 3) linear: slats of shutters or fences, level."""
     shade = 0.55 + 0.5 * (np.arange(64) % 8) / 7
     grain = 1 + 0.06 * noise(rng, (64, 64), slope=1.0)
-    return np.asarray(np.clip((shade[:, None] * grain)[..., None] * np.array(rgb), 0, 0.8), np.float32)  # fmt: skip
+    return np.asarray(
+        np.clip((shade[:, None] * grain)[..., None] * np.array(rgb), 0, 0.8), np.float32
+    )
 
 
 def _windows(rng: np.random.Generator, bars: tuple[str, ...], frame: Rgb) -> F32:
@@ -200,7 +227,11 @@ def _draw_behind(rng: np.random.Generator, own: F32) -> None:
     # The room is a little lighter towards its ceiling and where its far wall is.
     depth = 0.7 + 0.6 * np.exp(-(((y - 0.25) / 0.22) ** 2)) + 0.25 * (x > rng.uniform(0.3, 0.7))
     own[:] = (depth * rng.uniform(0.7, 1.5))[..., None] * np.array(_GLASS)
-    cloth = np.array(((0.42, 0.41, 0.38), (0.34, 0.28, 0.20), (0.25, 0.26, 0.28), (0.40, 0.36, 0.29))[int(rng.integers(0, 4))])  # fmt: skip
+    cloth = np.array(
+        ((0.42, 0.41, 0.38), (0.34, 0.28, 0.20), (0.25, 0.26, 0.28), (0.40, 0.36, 0.29))[
+            int(rng.integers(0, 4))
+        ]
+    )
     folds = 0.75 + 0.25 * np.sin(x * rng.uniform(60, 100) + 2 * np.sin(7 * x + rng.uniform(0, 6)))
     kind = rng.random()
     if kind < 0.3:  # drapes at both sides
@@ -210,7 +241,9 @@ def _draw_behind(rng: np.random.Generator, own: F32) -> None:
         own[drawn] = (folds * np.ones((high, 1)))[drawn][:, None] * cloth * 0.55
     elif kind < 0.55:  # a thin curtain before all, or before the lower part
         drawn = np.broadcast_to(y > (0.0 if rng.random() < 0.7 else 0.45), (high, wide))
-        own[drawn] += (0.5 * folds * np.ones((high, 1)))[drawn][:, None] * np.array([0.36, 0.36, 0.34])  # fmt: skip
+        own[drawn] += (0.5 * folds * np.ones((high, 1)))[drawn][:, None] * np.array(
+            [0.36, 0.36, 0.34]
+        )
     elif kind < 0.75:  # a blind drawn part of the way
         drawn = np.broadcast_to(y < rng.uniform(0.25, 0.9), (high, wide))
         lines = 0.8 + 0.2 * ((y * high) % 5 < 3.5) if rng.random() < 0.5 else np.ones((high, 1))
@@ -226,11 +259,18 @@ def _draw_bars(own: F32, kind: str, frame: Rgb) -> None:
     """The frame and its bars: light from above left, so that each has an edge and throws a shadow."""
     high, wide = own.shape[:2]
     bars = {
-        "one": (), "two": ((0, 0.5, 1, 0.5),), "transom": ((0, 0.5, 1, 0.5), (0.3, 0, 0.3, 1)),
+        "one": (),
+        "two": ((0, 0.5, 1, 0.5),),
+        "transom": ((0, 0.5, 1, 0.5), (0.3, 0, 0.3, 1)),
         "sash": ((0.5, 0, 0.5, 1), (0, 0.5, 1, 0.5)),
-    }[kind]  # fmt: skip
+    }[kind]
     body, line = 7, 6
-    rows = [(0, body, 0, wide), (high - body, high, 0, wide), (0, high, 0, body), (0, high, wide - body, wide)]  # fmt: skip
+    rows = [
+        (0, body, 0, wide),
+        (high - body, high, 0, wide),
+        (0, high, 0, body),
+        (0, high, wide - body, wide),
+    ]
     for y0, x0, y1, x1 in bars:
         a, b, c, d = (round(v * n) for v, n in ((y0, high), (y1, high), (x0, wide), (x1, wide)))
         half = line // 2
@@ -249,7 +289,15 @@ def _draw_bars(own: F32, kind: str, frame: Rgb) -> None:
 
 def _door(rng: np.random.Generator) -> F32:
     """(160, 80, 3) linear: a house's door with panels and a light above."""
-    rgb = np.array(((0.10, 0.05, 0.025), (0.03, 0.06, 0.09), (0.20, 0.025, 0.02), (0.03, 0.07, 0.045), (0.30, 0.30, 0.28))[int(rng.integers(0, 5))])  # fmt: skip
+    rgb = np.array(
+        (
+            (0.10, 0.05, 0.025),
+            (0.03, 0.06, 0.09),
+            (0.20, 0.025, 0.02),
+            (0.03, 0.07, 0.045),
+            (0.30, 0.30, 0.28),
+        )[int(rng.integers(0, 5))]
+    )
     own = np.broadcast_to(rgb, (160, 80, 3)).astype(np.float32)
     own[:30] = np.array(_GLASS) * 1.4
     own[:4], own[28:34], own[:, :4], own[:, -4:] = rgb, rgb, 0.7 * rgb, 0.7 * rgb

@@ -29,6 +29,7 @@ class Species(NamedTuple):
 
 
 _BROWN_BARK: Final = ((0.03, 0.022, 0.015), (0.12, 0.09, 0.065))
+# fmt: off
 SPECIES: Final[tuple[Species, ...]] = (
     Species("lime", (0.022, 0.05, 0.010), (0.11, 0.19, 0.035), (21, 15), 62, 0.32, 0.30, _BROWN_BARK),
     Species("oak", (0.016, 0.036, 0.010), (0.065, 0.12, 0.030), (20, 10), 78, 0.38, 0.26, _BROWN_BARK),
@@ -36,7 +37,8 @@ SPECIES: Final[tuple[Species, ...]] = (
     Species("fir", (0.008, 0.022, 0.012), (0.035, 0.075, 0.038), (30, 2.6), 150, 0.2, 0.10, _BROWN_BARK),
     Species("copper beech", (0.03, 0.010, 0.008), (0.12, 0.045, 0.03), (18, 11), 74, 0.34, 0.24, _BROWN_BARK),
     Species("plane", (0.03, 0.055, 0.018), (0.13, 0.19, 0.06), (24, 20), 42, 0.36, 0.34, ((0.10, 0.09, 0.06), (0.30, 0.28, 0.21))),
-)  # fmt: skip
+)
+# fmt: on
 FIR: Final = 3
 
 
@@ -58,9 +60,13 @@ def leaves_of(rng: np.random.Generator, number: int) -> Leaves:
         own,
         SceneryMaterial(f"{own.name} leaves", picture=spray),
         SceneryMaterial(f"{own.name} leaves in shade", rgb=(_SHADE,) * 3, picture=spray),
-        SceneryMaterial(f"{own.name} dark", picture=mottled(rng, dark, own.dark, size=64), size_m=(0.7, 0.7)),  # type: ignore[arg-type]
-        SceneryMaterial(f"{own.name} bark", picture=mottled(rng, *own.bark, size=64), size_m=(0.5, 0.5)),
-    )  # fmt: skip
+        SceneryMaterial(
+            f"{own.name} dark", picture=mottled(rng, dark, own.dark, size=64), size_m=(0.7, 0.7)
+        ),  # type: ignore[arg-type]
+        SceneryMaterial(
+            f"{own.name} bark", picture=mottled(rng, *own.bark, size=64), size_m=(0.5, 0.5)
+        ),
+    )
 
 
 def _spray(rng: np.random.Generator, own: Species) -> F32:
@@ -117,9 +123,15 @@ def tree_line(rng: np.random.Generator) -> F32:
 
 
 def tree(
-    scenery: Scenery, thing: str, rng: np.random.Generator, foot: F64, height: float, leaves: Leaves,
-    *, n: int = 340,
-) -> None:  # fmt: skip
+    scenery: Scenery,
+    thing: str,
+    rng: np.random.Generator,
+    foot: F64,
+    height: float,
+    leaves: Leaves,
+    *,
+    n: int = 340,
+) -> None:
     """A tree on foot (3,): a trunk, branches, and n sprays of leaves about them, of a fir in a cone."""
     own = leaves.species
     crown_low = own.crown_from * height * rng.uniform(0.9, 1.1)
@@ -133,7 +145,16 @@ def tree(
         places = np.stack([away * np.cos(turn), y, away * np.sin(turn)], 1)
         outward = np.stack([np.cos(turn), np.full(n, 0.7), np.sin(turn)], 1)
         depth = away / np.maximum(radius * (1 - share), 1e-6)
-        _add_sprays(scenery, thing, rng, leaves, foot + places, outward, 1.75 * height / np.sqrt(n), depth > 0.72)  # fmt: skip
+        _add_sprays(
+            scenery,
+            thing,
+            rng,
+            leaves,
+            foot + places,
+            outward,
+            1.75 * height / np.sqrt(n),
+            depth > 0.72,
+        )
         return
     # Round clumps make a crown, each at the end of a branch; leaves sit near their surfaces.
     n_clumps = int(rng.integers(9, 14))
@@ -155,7 +176,9 @@ def tree(
     from_middle = (places - middle) / np.array([radius, 0.55 * (height - crown_low), radius])
     is_outer = np.linalg.norm(from_middle, axis=1) + 0.35 * from_middle[:, 1] > 0.62
     looks = outward + 0.6 * from_middle
-    _add_sprays(scenery, thing, rng, leaves, foot + places, looks, 1.85 * height / np.sqrt(n), is_outer)  # fmt: skip
+    _add_sprays(
+        scenery, thing, rng, leaves, foot + places, looks, 1.85 * height / np.sqrt(n), is_outer
+    )
 
 
 def bush(
@@ -183,7 +206,9 @@ def hedge(
     half = 0.35
     axes = np.stack([along, [0, 1, 0], across], 1)
     low, high = np.array([0, 0, -half + 0.1]), np.array([length, height - 0.12, half - 0.1])
-    scenery.add(thing, leaves.solid, box_quads((low + high) / 2, (high - low) / 2) @ axes.T + ends[0])  # fmt: skip
+    scenery.add(
+        thing, leaves.solid, box_quads((low + high) / 2, (high - low) / 2) @ axes.T + ends[0]
+    )
     # Sprays on both sides and on top hide it.
     n = int(40 * length)
     s, v = rng.uniform(0, length, n), rng.uniform(-half, height + half, n)
@@ -197,8 +222,15 @@ def hedge(
 
 
 def _limb(
-    scenery: Scenery, thing: str, look: SceneryMaterial, start: F64, end: F64, radius: float, *, n: int = 7
-) -> None:  # fmt: skip
+    scenery: Scenery,
+    thing: str,
+    look: SceneryMaterial,
+    start: F64,
+    end: F64,
+    radius: float,
+    *,
+    n: int = 7,
+) -> None:
     """A trunk or branch that tapers to its end."""
     axis = end - start
     length = float(np.linalg.norm(axis))
@@ -224,9 +256,15 @@ def _directions(rng: np.random.Generator, n: int) -> F64:
 
 
 def _add_sprays(
-    scenery: Scenery, thing: str, rng: np.random.Generator, leaves: Leaves, places: F64, outward: F64,
-    side: float, is_outer: Bools,
-) -> None:  # fmt: skip
+    scenery: Scenery,
+    thing: str,
+    rng: np.random.Generator,
+    leaves: Leaves,
+    places: F64,
+    outward: F64,
+    side: float,
+    is_outer: Bools,
+) -> None:
     """Squares of about that side at places (N, 3), each looking outward and somewhere else."""
     n = len(places)
     normal = outward / np.linalg.norm(outward, axis=1, keepdims=True) + 0.55 * _directions(rng, n)

@@ -125,11 +125,13 @@ class Scenery:
             gloss = {"specular": (0.5, 0.5, 0.5), "shininess": 2000.0} if look.is_glossy else {}
             materials.append(
                 Material(
-                    look.name, diffuse=look.rgb, texture_id=texture.id if texture else None,
+                    look.name,
+                    diffuse=look.rgb,
+                    texture_id=texture.id if texture else None,
                     alpha_cutout=look.picture is not None and look.picture.shape[2] == 4,
                     **gloss,  # type: ignore[arg-type]
                 )
-            )  # fmt: skip
+            )
         items = []
         for thing in dict.fromkeys((*self._level, *self._quads)):
             surfaces = [replace(s, material=index[name]) for name, s in self._level.get(thing, [])]
@@ -139,10 +141,15 @@ class Scenery:
             ]
             items.append(
                 Item(
-                    id=f"{OUTSIDE}_{thing}", name=thing.replace("_", " "), kind=ItemKind.GROUND,
-                    level_id=level_id, surfaces=tuple(surfaces), source_class=OUTSIDE, tags=(OUTSIDE,),
+                    id=f"{OUTSIDE}_{thing}",
+                    name=thing.replace("_", " "),
+                    kind=ItemKind.GROUND,
+                    level_id=level_id,
+                    surfaces=tuple(surfaces),
+                    source_class=OUTSIDE,
+                    tags=(OUTSIDE,),
                 )
-            )  # fmt: skip
+            )
         return items, materials, textures
 
 
@@ -184,7 +191,11 @@ def mottled(
     rng: np.random.Generator, dark: Rgb, light: Rgb, *, size: int = 128, slope: float = 1.4
 ) -> F32:
     """(size, size, 3) linear: two colours in clouds and grains."""
-    tone = 0.5 + 0.22 * noise(rng, (size, size), slope=slope) + 0.12 * noise(rng, (size, size), slope=0.2)  # fmt: skip
+    tone = (
+        0.5
+        + 0.22 * noise(rng, (size, size), slope=slope)
+        + 0.12 * noise(rng, (size, size), slope=0.2)
+    )
     tone = np.clip(tone, 0, 1)[..., None]
     return np.asarray(np.array(dark) * (1 - tone) + np.array(light) * tone, np.float32)
 

@@ -43,6 +43,8 @@ from pbrs_farm.furnishings.surroundings.plants import (
 from pbrs_farm.furnishings.surroundings.scenery import Drawn, Scenery, SceneryMaterial, lit, mottled
 from pbrs_farm.home.room_use import RoomKind, named_kind
 
+# fmt: off
+
 LEAST_M: Final = 3.0
 """Nothing but ground and railings is nearer to a wall."""
 
@@ -112,14 +114,11 @@ def with_surroundings(home: House, kind: str, seed: int) -> House:
     top = max(float(o.quad[:, 1].max()) for o in windows)
     town = tuple(TOWN[int(k)] for k in rng.permutation(len(TOWN)))
     looks = int(rng.integers(0, 1 << 31))
-    place = _Place(
-        scenery=Scenery(), rng=rng, leaves=Drawn(looks, len(SPECIES), leaves_of),
-        street_tree=int(rng.choice(_TOWN_TREES)),
-        facades=Drawn(looks + 1, len(TOWN), lambda own, k: facade(own, k, town)),
-        cottages=Drawn(looks + 2, len(HOUSES), lambda own, k: facade(own, k, HOUSES)),
-        rooms=lit("rooms", picture=lit_rooms(rng)), ground=ground_looks(rng),
-        eye_m=max(top - ground_y - 0.5, 1.6),
-    )  # fmt: skip
+    place = _Place(scenery=Scenery(), rng=rng, leaves=Drawn(looks, len(SPECIES), leaves_of),
+        street_tree=int(rng.choice(_TOWN_TREES)), facades=Drawn(looks + 1, len(TOWN), lambda own,
+        k: facade(own, k, town)), cottages=Drawn(looks + 2, len(HOUSES), lambda own,
+        k: facade(own, k, HOUSES)), rooms=lit("rooms", picture=lit_rooms(rng)),
+        ground=ground_looks(rng), eye_m=max(top - ground_y - 0.5, 1.6))
     sides = _sides(footprint, ground_y)
     kinds = _kinds(rng, kind, is_flat=n_below > 0)
     _lay_ground(place, footprint, sides, kinds, ground_y)
@@ -131,12 +130,8 @@ def with_surroundings(home: House, kind: str, seed: int) -> House:
         _railings(place, windows, rooms)
     level = min(home.levels, key=lambda x: x.elevation).id
     items, materials, textures = place.scenery.items(level, len(home.materials))
-    return replace(
-        home,
-        items=(*home.items, *items),
-        materials=(*home.materials, *materials),
-        textures={**home.textures, **textures},
-    )
+    return replace(home, items=(*home.items, *items), materials=(*home.materials, *materials),
+        textures={**home.textures, **textures})
 
 
 def _walled_area(room: Room) -> BaseGeometry:
@@ -182,7 +177,10 @@ def _kinds(rng: np.random.Generator, kind: str, *, is_flat: bool) -> list[str]:
         return [kind] * 4
     front = int(rng.integers(0, 4))
     if is_flat:
-        back, aside = rng.choice(["court", "garden", "blocks"]), rng.choice(["blocks", "street", "court"])  # fmt: skip
+        back, aside = (
+            rng.choice(["court", "garden", "blocks"]),
+            rng.choice(["blocks", "street", "court"]),
+        )
     else:
         back, aside = "garden", rng.choice(["garden", "garden", "hills"])
     drawn = {front: "street", (front + 2) % 4: str(back)}
@@ -216,7 +214,10 @@ def _lay_ground(
             )
             middle = (near + far) / 2
             for s in np.arange(-side.half - 30, side.half + 30, 6.0):
-                dash = [side.at(s + a, middle + b)[[0, 2]] for a, b in ((0, -0.06), (3, -0.06), (3, 0.06), (0, 0.06))]  # fmt: skip
+                dash = [
+                    side.at(s + a, middle + b)[[0, 2]]
+                    for a, b in ((0, -0.06), (3, -0.06), (3, 0.06), (0, 0.06))
+                ]
                 place.scenery.lay("ground", place.ground["line"], shapely.Polygon(dash), y + 0.012)
         elif kind == "court":
             name = "slabs" if place.rng.random() < 0.5 else "gravel"
@@ -241,9 +242,11 @@ def _street(place: _Place, side: _Side, number: int) -> None:
             car(scenery, f"cars_{number}", rng, side.front(s + rng.uniform(0, 0.5), at))
     for k, s in enumerate(np.arange(-side.half - 12, side.half + 12, rng.uniform(8, 11))):
         if k % 2 == 0:
-            lamp_post(scenery, f"lamps_{number}", Front(side.at(s, _ROAD[1] + 0.6), side.along, side.out * -1))  # fmt: skip
+            lamp_post(scenery, f"lamps_{number}", Front(side.at(s, _ROAD[1] + 0.6), side.along,
+                side.out * -1))
         foot = side.at(s + 3.5, _ROAD[1] + 0.9)
-        tree(scenery, f"trees_{number}", rng, foot, rng.uniform(4.5, 7.5), place.leaves[place.street_tree])  # fmt: skip
+        tree(scenery, f"trees_{number}", rng, foot, rng.uniform(4.5, 7.5),
+            place.leaves[place.street_tree])
 
 
 def _court(place: _Place, side: _Side, number: int) -> None:
@@ -253,17 +256,21 @@ def _court(place: _Place, side: _Side, number: int) -> None:
     _row_of_blocks(place, side, number, away, extent=side.half + away, is_town=True, balconies=True)
     for _ in range(int(rng.integers(2, 5))):
         foot = side.at(rng.uniform(-1, 1) * (side.half + 5), rng.uniform(5.5, away - 2.5))
-        tree(scenery, f"trees_{number}", rng, foot, rng.uniform(4, 8), place.leaves[int(rng.choice(_TOWN_TREES))])  # fmt: skip
+        tree(scenery, f"trees_{number}", rng, foot, rng.uniform(4, 8),
+            place.leaves[int(rng.choice(_TOWN_TREES))])
     for _ in range(9):
         foot = side.at(rng.uniform(-1, 1) * (side.half + 6), rng.uniform(4.2, away - 1.5))
-        bush(scenery, f"bushes_{number}", rng, foot, rng.uniform(0.6, 1.3), place.leaves[int(rng.choice(_BUSHES))])  # fmt: skip
+        bush(scenery, f"bushes_{number}", rng, foot, rng.uniform(0.6, 1.3),
+            place.leaves[int(rng.choice(_BUSHES))])
 
 
 def _blocks(place: _Place, side: _Side, number: int) -> None:
     """Lawn with trees, and blocks of flats across it."""
     rng = place.rng
     away = rng.uniform(20.0, 27.0)
-    _row_of_blocks(place, side, number, away, extent=side.half + away, is_town=False, balconies=True)  # fmt: skip
+    _row_of_blocks(
+        place, side, number, away, extent=side.half + away, is_town=False, balconies=True
+    )
     _trees(place, side, number, 8, (6.0, away - 3.0), side.half + 14)
 
 
@@ -281,7 +288,8 @@ def _garden(place: _Place, side: _Side, number: int) -> None:
         fence(scenery, f"fence_{number}", rng, front, 2 * half, rng.uniform(1.2, 1.9))
     for _ in range(10):
         foot = side.at(rng.uniform(-1, 1) * half, rng.uniform(4.2, depth - 0.8))
-        bush(scenery, f"bushes_{number}", rng, foot, rng.uniform(0.5, 1.4), place.leaves[int(rng.choice(_BUSHES))])  # fmt: skip
+        bush(scenery, f"bushes_{number}", rng, foot, rng.uniform(0.5, 1.4),
+            place.leaves[int(rng.choice(_BUSHES))])
     _trees(place, side, number, 4, (5.0, depth + 6.0), half)
     s = -half - 4.0
     while s < half:
@@ -298,18 +306,17 @@ def _hills(place: _Place, side: _Side, number: int) -> None:
     rng = place.rng
     away = rng.uniform(8.0, 14.0)
     half = side.half + away
-    fence(place.scenery, f"fence_{number}", rng, side.front(-half, away), 2 * half, rng.uniform(0.9, 1.3))  # fmt: skip
+    fence(place.scenery, f"fence_{number}", rng, side.front(-half, away), 2 * half,
+        rng.uniform(0.9, 1.3))
     _trees(place, side, number, 9, (away + 2.0, 34.0), half + 14)
 
 
-_STRIPS: Final[dict[str, Callable[[_Place, _Side, int], None]]] = {
-    "street": _street, "court": _court, "blocks": _blocks, "garden": _garden, "hills": _hills,
-}  # fmt: skip
+_STRIPS: Final[dict[str, Callable[[_Place, _Side, int], None]]] = {"street": _street,
+    "court": _court, "blocks": _blocks, "garden": _garden, "hills": _hills}
 
 
-def _row_of_blocks(
-    place: _Place, side: _Side, number: int, away: float, *, extent: float, is_town: bool, balconies: bool = False
-) -> None:  # fmt: skip
+def _row_of_blocks(place: _Place, side: _Side, number: int, away: float, *, extent: float,
+    is_town: bool, balconies: bool = False) -> None:
     """Buildings in a row, the eye of the home no higher than most of their storeys."""
     rng = place.rng
     least = int(np.ceil((place.eye_m + 0.22 * away) / STOREY_M)) + (0 if is_town else 1)
@@ -323,10 +330,9 @@ def _row_of_blocks(
         n_storeys = int(np.clip(least + rng.integers(-1, 3), 2, 11))
         width = n_bays * own.bay_m
         set_back = 0.0 if is_town else rng.uniform(0, 6)
-        block(
-            place.scenery, f"buildings_{number}", rng, side.front(s, away + set_back), own, place.rooms, n_bays, n_storeys,
-            depth_m=10.0, has_balconies=balconies or rng.random() < 0.25,
-        )  # fmt: skip
+        block(place.scenery, f"buildings_{number}", rng, side.front(s, away + set_back), own,
+            place.rooms, n_bays, n_storeys, depth_m=10.0,
+            has_balconies=balconies or rng.random() < 0.25)
         s += width + (0.0 if is_town else rng.uniform(3, 9))
 
 
@@ -351,7 +357,8 @@ def _far_ring(place: _Place, footprint: BaseGeometry, ground_y: float, kinds: li
     waves = sum(rng.uniform(0.4, 1) / k * np.sin(k * turn + rng.uniform(0, 7)) for k in range(1, 8))
     far = "hills" in kinds
     trees = SceneryMaterial("far trees", picture=tree_line(rng))
-    hills = SceneryMaterial("far hills", picture=mottled(rng, (0.09, 0.12, 0.10), (0.14, 0.18, 0.13), slope=2.4), size_m=(90.0, 90.0))  # fmt: skip
+    hills = SceneryMaterial("far hills", picture=mottled(rng, (0.09, 0.12, 0.10),
+        (0.14, 0.18, 0.13), slope=2.4), size_m=(90.0, 90.0))
     for look, away, share, wave_m in (
         (trees, radius, 0.15, 1.5),
         (hills, radius + 8.0, 0.30 if far else 0.22, 5.0 if far else 2.0),
@@ -366,7 +373,8 @@ def _far_ring(place: _Place, footprint: BaseGeometry, ground_y: float, kinds: li
             # The picture goes round some whole times, each tree twice as high as wide, about.
             n = round(2 * np.pi * away / (4.0 * float(top.mean())))
             u = np.linspace(0, n, _N_RING + 1)
-            uvs = np.stack([np.stack([p, q], -1) for p, q in ((u[:-1], 0 * u[1:]), (u[1:], 0 * u[1:]), (u[1:], 0 * u[1:] + 1), (u[:-1], 0 * u[1:] + 1))], 1)  # fmt: skip
+            uvs = np.stack([np.stack([p, q], -1) for p, q in ((u[:-1], 0 * u[1:]),
+                (u[1:], 0 * u[1:]), (u[1:], 0 * u[1:] + 1), (u[:-1], 0 * u[1:] + 1))], 1)
             uvs[..., 1] *= 1 - 1 / 96
         place.scenery.add("horizon", look, quads, uvs)
 
@@ -386,10 +394,9 @@ def _railings(place: _Place, windows: list[Opening], rooms: tuple[Room, ...]) ->
         if length < 0.9:
             continue
         middle, normal = quad.mean(0), normal / length
-        outside = [
-            sign for sign in (1.0, -1.0)
-            if not any(a.contains(shapely.Point((middle + sign * 0.7 * normal)[[0, 2]])) for a in here)
-        ]  # fmt: skip
+        outside = [sign for sign in (1.0,
+            -1.0) if not any(a.contains(shapely.Point((middle + sign * 0.7 * normal)[[0,
+            2]])) for a in here)]
         if len(outside) != 1:
             continue
         out = outside[0] * normal

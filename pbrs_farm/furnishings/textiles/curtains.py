@@ -114,9 +114,13 @@ def _is_dressed(house: MutableHouse, space: HouseSpace, seen: WindowSide) -> boo
 
 
 def hang_curtains(
-    house: MutableHouse, space: HouseSpace, room: RoomSpace, seen: WindowSide, cloth: Cloth,
+    house: MutableHouse,
+    space: HouseSpace,
+    room: RoomSpace,
+    seen: WindowSide,
+    cloth: Cloth,
     rng: np.random.Generator,
-) -> bool:  # fmt: skip
+) -> bool:
     """A rod and two panels; False, with its reason counted, where they do not fit.
 
     Both panels or none. What is hung is added to the house; the space does not follow and must be
@@ -150,9 +154,15 @@ def hang_curtains(
 
 
 def _panel_place(
-    space: HouseSpace, room: RoomSpace, seen: WindowSide, sign: int,
-    spans: tuple[float, Sequence[float]], rod_y: float, out: float, house: MutableHouse,
-) -> tuple[float, float, float] | None:  # fmt: skip
+    space: HouseSpace,
+    room: RoomSpace,
+    seen: WindowSide,
+    sign: int,
+    spans: tuple[float, Sequence[float]],
+    rod_y: float,
+    out: float,
+    house: MutableHouse,
+) -> tuple[float, float, float] | None:
     """x0, x1 across and the lowest y of a panel at one end of the window; None = no room.
 
     spans: how much of the window it covers, and widths of wall beside it, tried in this order.
@@ -238,15 +248,23 @@ def room_cloth(
     family = "weave" if rng.random() < 0.6 else "twill"
     pattern = pattern_material(house, Pattern(family, int(rng.integers(4)), (_round_colour(tint),)))
     return Cloth(
-        house.materials[pattern.number], pattern.size_m[0], float(rng.uniform(0.12, 0.18)),
+        house.materials[pattern.number],
+        pattern.size_m[0],
+        float(rng.uniform(0.12, 0.18)),
         metal(style) if rng.random() < 0.6 else plain("rod", style.wood.mean, 0.4),
-    )  # fmt: skip
+    )
 
 
 def _curtain_set(
-    seen: WindowSide, panels: list[tuple[float, float, float]], bottom: float, rod_y: float,
-    rod_z: float, depth: float, cloth: Cloth, rng: np.random.Generator,
-) -> tuple[Piece, Shape, float]:  # fmt: skip
+    seen: WindowSide,
+    panels: list[tuple[float, float, float]],
+    bottom: float,
+    rod_y: float,
+    rod_z: float,
+    depth: float,
+    cloth: Cloth,
+    rng: np.random.Generator,
+) -> tuple[Piece, Shape, float]:
     """The panels with their rod; and where their middle is across the window."""
     height = rod_y - bottom
     x0, x1 = min(p[0] for p in panels), max(p[1] for p in panels)
@@ -268,9 +286,13 @@ def _curtain_set(
 
 
 def hang_blind(
-    house: MutableHouse, space: HouseSpace, room: RoomSpace, seen: WindowSide, style: Style,
+    house: MutableHouse,
+    space: HouseSpace,
+    room: RoomSpace,
+    seen: WindowSide,
+    style: Style,
     rng: np.random.Generator,
-) -> bool:  # fmt: skip
+) -> bool:
     """A roller blind or slats before the window, let down a little to half."""
     window = seen.window
     z = max(seen.sticks_out_m + 0.012, 0.012)
@@ -344,9 +366,14 @@ def _add_at_window(
     at[1] = y
     placed = replace(piece, place=Place.WALL)
     item = house.placed(
-        placed, shape, at, seen.turn_rad, item_id=next_id(house, PASS), room_id=room.room.id,
+        placed,
+        shape,
+        at,
+        seen.turn_rad,
+        item_id=next_id(house, PASS),
+        room_id=room.room.id,
         level_id=room.room.level_id,
-    )  # fmt: skip
+    )
     house.add(item, PASS, placed)
     return item
 

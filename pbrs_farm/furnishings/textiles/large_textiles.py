@@ -41,9 +41,13 @@ _FAR_M = 2.5  # greatest distance of a towel from the basin
 
 
 def hang_towels(
-    house: MutableHouse, catalogue: Catalogue, style: Style, room_id: str, rng: np.random.Generator,
+    house: MutableHouse,
+    catalogue: Catalogue,
+    style: Style,
+    room_id: str,
+    rng: np.random.Generator,
     share: float,
-) -> None:  # fmt: skip
+) -> None:
     """A towel or two in a bathroom that has none, on the free wall nearest to the basin."""
     space = house_space(house)
     room = space.room(room_id)
@@ -76,7 +80,11 @@ def towel_rail(house: MutableHouse, style: Style, rng: np.random.Generator) -> M
     """A rail with a towel over it."""
     width = float(rng.uniform(0.4, 0.6))
     towel, drop, z = width * float(rng.uniform(0.6, 0.85)), float(rng.uniform(0.45, 0.7)), 0.07
-    tint = mix(style.textiles[int(rng.integers(len(style.textiles)))], (0.93, 0.92, 0.9), float(rng.choice([0.0, 0.4, 0.85])))  # fmt: skip
+    tint = mix(
+        style.textiles[int(rng.integers(len(style.textiles)))],
+        (0.93, 0.92, 0.9),
+        float(rng.choice([0.0, 0.4, 0.85])),
+    )
     r, g, b = (round(c, 2) for c in tint)
     pattern = pattern_material(house, Pattern("loop carpet", int(rng.integers(3)), ((r, g, b),)))
     steel = metal(style)
@@ -91,9 +99,14 @@ def towel_rail(house: MutableHouse, style: Style, rng: np.random.Generator) -> M
 
 
 def _spot_near_basin(
-    hanging: Hanging, space: HouseSpace, room: RoomSpace, house: MutableHouse, width: float,
-    heights: tuple[float, float], depth: float,
-) -> tuple[int, float] | None:  # fmt: skip
+    hanging: Hanging,
+    space: HouseSpace,
+    room: RoomSpace,
+    house: MutableHouse,
+    width: float,
+    heights: tuple[float, float],
+    depth: float,
+) -> tuple[int, float] | None:
     """(face, s) of the free place nearest to a basin of the room, within reach; None = none."""
     basins = [space.bounds[n].mean(0) for n in room.items if house.items[n].nyu40 == SINK]
     best: tuple[float, int, float] | None = None

@@ -333,15 +333,21 @@ def _ribs(rng: np.random.Generator, size: Size, inks: Inks) -> F32:
     return np.asarray(picture, np.float32)
 
 
+# fmt: off
 RUGS: dict[str, Pattern] = {
     "bordered": _bordered, "striped": _striped, "lattice": _lattice, "diamonds": _diamonds,
     "shag": _shag, "plain": _plain_rug, "blocks": _blocks, "kilim": _kilim, "checks": _checks,
     "grid": _line_grid_rug, "faded": _faded, "sisal": _sisal, "arches": _arches, "curves": _curves,
     "rings": _ring_rug, "stars": _stars,
-}  # fmt: skip
+}
+# fmt: on
 BATH_MATS: dict[str, Pattern] = {
-    "shag": _shag, "bobbles": _bobbles, "waffle": _waffle, "towelling": _towelling, "striped": _striped,
-}  # fmt: skip
+    "shag": _shag,
+    "bobbles": _bobbles,
+    "waffle": _waffle,
+    "towelling": _towelling,
+    "striped": _striped,
+}
 DOOR_MATS: dict[str, Pattern] = {"coir": _coir, "ribs": _ribs, "plain": _plain_rug, "sisal": _sisal}
 PATTERNS: dict[str, Pattern] = RUGS | BATH_MATS | DOOR_MATS
 """Every pattern by its name; docs/dress.md shows the rugs."""

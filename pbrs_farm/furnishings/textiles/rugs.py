@@ -25,6 +25,8 @@ from pbrs_farm.furnishings.things.materials import plain
 from pbrs_farm.furnishings.things.outlines import oval, rect
 from pbrs_farm.home.room_use import RoomKind
 
+# fmt: off
+
 PASS = "textiles"
 RUG_TAG = "rug"
 _FROM_WALL_M = 0.3
@@ -36,10 +38,8 @@ _SIZES = ((1.6, 2.3), (1.7, 2.4), (2.0, 3.0), (2.0, 2.9), (1.4, 2.0), (1.2, 1.7)
 _LEAST_M, _MOST_M = 0.3, 6.0  # least and greatest side of a rug
 
 
-def rug(
-    rng: np.random.Generator, width: float, length: float, style: Style,
-    patterns: Sequence[str] = tuple(RUGS), forms: Sequence[str] = _RUG_FORMS,
-) -> Model:  # fmt: skip
+def rug(rng: np.random.Generator, width: float, length: float, style: Style,
+    patterns: Sequence[str] = tuple(RUGS), forms: Sequence[str] = _RUG_FORMS) -> Model:
     """A rug with its length along x, lying with its back at y = 0, of one of the patterns and forms.
 
     Forms: sharp or rounded corners, fringed ends, oval (half of an oval: half).
@@ -106,10 +106,9 @@ def lay_rugs(
     """The rugs and mats of one room."""
     space = house_space(house)
     room = space.room(room_id)
-    lay = {
-        RoomKind.LIVING: _by_sofa, RoomKind.BEDROOM: _by_bed, RoomKind.DINING: _by_table,
-        RoomKind.BATHROOM: _bath_mat, RoomKind.HALL: _runner, RoomKind.OTHER: _by_sofa,
-    }.get(room.kind)  # fmt: skip
+    lay = {RoomKind.LIVING: _by_sofa, RoomKind.BEDROOM: _by_bed, RoomKind.DINING: _by_table,
+        RoomKind.BATHROOM: _bath_mat, RoomKind.HALL: _runner,
+        RoomKind.OTHER: _by_sofa}.get(room.kind)
     likely = {RoomKind.DINING: 0.45, RoomKind.HALL: 0.6}.get(room.kind, 0.8)
     if lay is not None and rng.random() < likely * share:
         lay(house, space, room, style, rng)
@@ -129,11 +128,8 @@ def _by_sofa(
     front = box.axes[:, 2] * [1, 0, 1]
     # In front of the sofa, its feet on the rug; round the table that stands there.
     middle = box.centre + front * (float(box.half[2]) + 0.65)
-    tables = [
-        house.items[n].oriented_box.centre
-        for n in _furniture_of_class(house, room, TABLE)
-        if np.linalg.norm((house.items[n].oriented_box.centre - middle)[[0, 2]]) < 1.0
-    ]
+    tables = [house.items[n].oriented_box.centre for n in _furniture_of_class(house, room,
+        TABLE) if np.linalg.norm((house.items[n].oriented_box.centre - middle)[[0, 2]]) < 1.0]
     if tables:
         middle = np.mean([middle, *tables[:1]], axis=0)
     turn = float(np.arctan2(front[0], front[2]))
@@ -160,7 +156,8 @@ def _by_bed(
             return
     for sign in (1.0, -1.0):
         at = box.centre + right * sign * (float(half[0]) + 0.42)
-        if _lay_largest(house, space, room, style, rng, at, turn + np.pi / 2, [(0.7, 1.5), (0.6, 1.1)], from_wall=0.05):  # fmt: skip
+        if _lay_largest(house, space, room, style, rng, at, turn + np.pi / 2,
+            [(0.7, 1.5), (0.6, 1.1)], from_wall=0.05):
             return
     at = box.centre + front * (float(half[2]) + 0.45)
     _lay_largest(house, space, room, style, rng, at, turn, [(0.7, 1.4), (0.6, 1.0)], from_wall=0.1)
@@ -195,10 +192,9 @@ def _bath_mat(
                 out = box.axes[:, axis] * sign * [1, 0, 1]
                 at = box.centre + out * (float(box.half[axis]) + 0.3)
                 turn = float(np.arctan2(out[0], out[2]))
-                if _lay_largest(
-                    house, space, room, style, rng, at, turn, [(0.5, 0.8), (0.45, 0.65)],
-                    from_wall=0.02, patterns=BATH_MATS, forms=_MAT_FORMS, bare=True,
-                ):  # fmt: skip
+                if _lay_largest(house, space, room, style, rng, at, turn,
+                    [(0.5, 0.8), (0.45, 0.65)], from_wall=0.02, patterns=BATH_MATS,
+                    forms=_MAT_FORMS, bare=True):
                     return
 
 
@@ -224,21 +220,16 @@ def _doormats(
         at = door.face_point(side) + door.inward(side) * 0.38
         out = door.inward(side)
         turn = float(np.arctan2(out[0], out[2]))
-        _lay_largest(
-            house, house_space(house), room, style, rng, at, turn, [(0.45, 0.75), (0.4, 0.6)],
-            from_wall=0.05, patterns=DOOR_MATS, forms=("sharp", "sharp", "rounded", "half"),
-            bare=True, at_doors=True,
-        )  # fmt: skip
+        _lay_largest(house, house_space(house), room, style, rng, at, turn,
+            [(0.45, 0.75), (0.4, 0.6)], from_wall=0.05, patterns=DOOR_MATS,
+            forms=("sharp", "sharp", "rounded", "half"), bare=True, at_doors=True)
 
 
 def _furniture_of_class(house: MutableHouse, room: RoomSpace, nyu40: int) -> list[int]:
     # Toys of the class stand on tables; furniture stands on the floor.
     floor = room.room.floor_y
-    return [
-        n
-        for n in room.items
-        if house.items[n].nyu40 == nyu40 and house.items[n].bounds[0, 1] < floor + 0.3
-    ]
+    return [n for n in room.items if house.items[n].nyu40 == nyu40 and house.items[n].bounds[0,
+        1] < floor + 0.3]
 
 
 def _shuffled(rng: np.random.Generator) -> list[tuple[float, float]]:
@@ -247,12 +238,10 @@ def _shuffled(rng: np.random.Generator) -> list[tuple[float, float]]:
     return [_SIZES[first], *_SIZES[first + 1 :], _SIZES[1], *_SIZES[4:]]
 
 
-def _lay_largest(
-    house: MutableHouse, space: HouseSpace, room: RoomSpace, style: Style, rng: np.random.Generator,
-    middle: F64, turn: float, sizes: list[tuple[float, float]], *, from_wall: float = _FROM_WALL_M,
-    patterns: Iterable[str] = RUGS, forms: Sequence[str] = _RUG_FORMS, bare: bool = False,
-    at_doors: bool = False,
-) -> bool:  # fmt: skip
+def _lay_largest(house: MutableHouse, space: HouseSpace, room: RoomSpace, style: Style,
+    rng: np.random.Generator, middle: F64, turn: float, sizes: list[tuple[float, float]], *,
+    from_wall: float = _FROM_WALL_M, patterns: Iterable[str] = RUGS,
+    forms: Sequence[str] = _RUG_FORMS, bare: bool = False, at_doors: bool = False) -> bool:
     """Lay the first size (width, length) that fits near the place; length goes across `turn`'s front.
 
     bare: nothing may stand on it. at_doors: it may lie where a door swings.
@@ -263,15 +252,8 @@ def _lay_largest(
         swings = [d.swing(s) for d in room.doors if (s := d.side_of(room.room.id)) is not None]
         taken = shapely.union_all([taken, *swings])
     for width, length in sizes:
-        for shift in (
-            (0.0, 0.0),
-            (0.15, 0.0),
-            (-0.15, 0.0),
-            (0.3, 0.0),
-            (-0.3, 0.0),
-            (0.0, 0.15),
-            (0.0, -0.15),
-        ):
+        for shift in ((0.0, 0.0), (0.15, 0.0), (-0.15, 0.0), (0.3, 0.0), (-0.3, 0.0), (0.0, 0.15),
+            (0.0, -0.15)):
             at = middle + _offset(turn, shift)
             area = _rug_area(at, turn, width, length)
             if not shapely.contains(free, area) or shapely.intersects(taken, area):
@@ -280,10 +262,8 @@ def _lay_largest(
                 continue
             piece, shape = rug(rng, width, length, style, tuple(patterns), forms)
             where = np.array([at[0], room.room.floor_y + _GAP_M, at[2]])
-            item: Item = house.placed(
-                piece, shape, where, turn, item_id=next_id(house, PASS), room_id=room.room.id,
-                level_id=room.room.level_id, tags=(RUG_TAG,),
-            )  # fmt: skip
+            item: Item = house.placed(piece, shape, where, turn, item_id=next_id(house, PASS),
+                room_id=room.room.id, level_id=room.room.level_id, tags=(RUG_TAG,))
             house.add(item, PASS, piece)
             return True
     house.refused[f"{PASS}: no floor for a rug"] += 1
@@ -354,5 +334,7 @@ def _covered(
     for surface in item.surfaces:
         local = (surface.positions.astype(np.float64) - box.centre) @ box.axes
         uvs = local[:, [along, across]] / sides[[along, across]] + 0.5
-        surfaces.append(replace(surface, material=number, uvs=np.clip(uvs, 0.002, 0.998).astype(np.float32)))  # fmt: skip
+        surfaces.append(
+            replace(surface, material=number, uvs=np.clip(uvs, 0.002, 0.998).astype(np.float32))
+        )
     return replace(item, surfaces=tuple(surfaces))

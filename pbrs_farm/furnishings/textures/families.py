@@ -70,6 +70,7 @@ _TEXEL_M: Final = 0.0015  # greatest texel: what a camera of 640 pixels resolves
 _STEP_PX: Final = 128
 _COARSE = (512, 512)  # pixels of one repeat of what is finer by itself
 _FLOOR_M = (2.0, 2.0)
+# fmt: off
 _SIZE_M: Final = {
     "strip": _FLOOR_M, "planks": (2.4, 2.4), "laminate": (2.6, 1.92), "herringbone": _FLOOR_M,
     "chevron": _FLOOR_M, "marble": (2.4, 2.4), "terracotta": _FLOOR_M, "brick": _FLOOR_M,
@@ -79,7 +80,8 @@ _SIZE_M: Final = {
     "weave": (0.25, 0.25), "twill": (0.25, 0.25), "leather": (0.3, 0.3),
     "upright boards": (1.2, 1.2), "level boards": (1.2, 1.2), "wall planks": (1.6, 1.6),
     "slats": (1.2, 1.2),
-}  # fmt: skip
+}
+# fmt: on
 """Width and height of one repeat by family; tiles have that of their laying, panels their variant's."""
 
 
@@ -117,10 +119,12 @@ def pixels_of(size_m: tuple[float, float]) -> Shape2:
 
 
 # Families of one tint are painted in few lightnesses and tinted by their material's diffuse colour.
+# fmt: off
 _TINTED: Final = (
     "paint", "plaster", "smooth plaster", "concrete", "carpet", "loop carpet", "weave", "twill",
     "leather", "painted brick", "upright boards", "level boards", "panels",
-)  # fmt: skip
+)
+# fmt: on
 _LIGHTNESSES: Final = (0.4, 0.6, 0.75, 0.87, 0.97)
 
 _Painter = Callable[[np.random.Generator, Pattern], SurfaceMaps]
@@ -295,7 +299,9 @@ def _marble(rng: np.random.Generator, p: Pattern) -> SurfaceMaps:
     sheet = marble(rng, shape, p.tints[0], p.tints[-1])
     body = cut_from(rng, sheet, tile_grid(shape, size, laying))
     grout = p.tints[0]
-    return tile_maps(rng, shape, size, laying, Glaze((), "plain", 0.004, 0.008, 0.1, 0.5, 0.001, grout), body)  # fmt: skip
+    return tile_maps(
+        rng, shape, size, laying, Glaze((), "plain", 0.004, 0.008, 0.1, 0.5, 0.001, grout), body
+    )
 
 
 def _terracotta(rng: np.random.Generator, p: Pattern) -> SurfaceMaps:

@@ -38,9 +38,8 @@ class Laying:
 
 
 def tile_grid(
-    shape: Shape2, size_m: tuple[float, float], laying: Laying,
-    warp: tuple[F32, F32] | None = None,
-) -> TileGrid:  # fmt: skip
+    shape: Shape2, size_m: tuple[float, float], laying: Laying, warp: tuple[F32, F32] | None = None
+) -> TileGrid:
     """The tiles of one repeat; warp: metres by which edges wander along u and v."""
     rows, columns = shape
     tile_u, tile_v = size_m[0] / laying.columns, size_m[1] / laying.rows
@@ -60,9 +59,13 @@ def tile_grid(
     column = column_f.astype(np.int64) % laying.columns
     edge = np.minimum(edge_u, edge_v)
     return TileGrid(
-        row * laying.columns + column, row, column, np.asarray(edge, np.float32),
-        np.asarray(np.sqrt(np.maximum(edge_u * edge_v, 0)), np.float32), laying.rows * laying.columns,
-    )  # fmt: skip
+        row * laying.columns + column,
+        row,
+        column,
+        np.asarray(edge, np.float32),
+        np.asarray(np.sqrt(np.maximum(edge_u * edge_v, 0)), np.float32),
+        laying.rows * laying.columns,
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,9 +83,13 @@ class Glaze:
 
 
 def tile_maps(
-    rng: np.random.Generator, shape: Shape2, size_m: tuple[float, float], laying: Laying,
-    glaze: Glaze, body: F32 | None = None,
-) -> SurfaceMaps:  # fmt: skip
+    rng: np.random.Generator,
+    shape: Shape2,
+    size_m: tuple[float, float],
+    laying: Laying,
+    glaze: Glaze,
+    body: F32 | None = None,
+) -> SurfaceMaps:
     """Tiles of one or several colours. body: (H, W, 3) colour of a stone instead of a glaze."""
     grid = tile_grid(shape, size_m, laying)
     pixel_m = size_m[0] / shape[1]
@@ -153,9 +160,13 @@ def terracotta_maps(
 
 
 def brick_maps(
-    rng: np.random.Generator, shape: Shape2, size_m: tuple[float, float], tint: Rgb,
-    *, painted: bool,
-) -> SurfaceMaps:  # fmt: skip
+    rng: np.random.Generator,
+    shape: Shape2,
+    size_m: tuple[float, float],
+    tint: Rgb,
+    *,
+    painted: bool,
+) -> SurfaceMaps:
     """A wall of bricks of 24 x 7 cm in running bond; painted: all of one tint."""
     laying = Laying(round(size_m[1] / 0.0835), round(size_m[0] / 0.25), 0.5, 0.011)
     warp = tuple(
@@ -179,7 +190,11 @@ def brick_maps(
         # Fire bricks between orange, red and brown; some are nearly black.
         fired = np.clip(rng.normal(0, 0.10, n), -0.25, 0.2) - 0.22 * (rng.random(n) < 0.06)
         warm = rng.normal(0, 0.025, n)
-        tints = np.array(tint)[None] * (1 + fired[:, None]) * np.stack([1 + warm, 1 + 0 * warm, 1 - warm], -1)  # fmt: skip
+        tints = (
+            np.array(tint)[None]
+            * (1 + fired[:, None])
+            * np.stack([1 + warm, 1 + 0 * warm, 1 - warm], -1)
+        )
         colour = tints.astype(np.float32)[grid.tile] * (1 + 0.07 * clouds + 0.05 * grain)[..., None]
         mortar = np.array((0.67, 0.64, 0.59), np.float32) * (1 + 0.06 * grain)[..., None]
         colour = (mortar + brick[..., None] * (colour - mortar)) * (shade * 0.5 + 0.5)[..., None]

@@ -14,8 +14,11 @@ from pbrs_farm.furnishings.textures.noise import Shape2, noise, smoothstep
 from pbrs_farm.furnishings.textures.planks import BoardLayout, PlankLook, plank_maps, rows_of_planks
 
 PANELS_M: Final = {
-    "low": (0.62, 0.92), "middle": (0.7, 1.05), "high": (0.54, 1.35), "square": (0.5, 0.98),
-}  # fmt: skip
+    "low": (0.62, 0.92),
+    "middle": (0.7, 1.05),
+    "high": (0.54, 1.35),
+    "square": (0.5, 0.98),
+}
 """Width of a panel and height of the panelling, by variant."""
 _GROOVE_M, _GROOVE_DEEP_M = 0.0045, 0.0028  # half its width; how far it is cut
 _LATH_M, _GAP_M, _LATH_DEEP_M = 0.027, 0.013, 0.009  # of slats
@@ -24,9 +27,13 @@ _BEVEL_M, _SUNK_M = 0.028, 0.007  # the moulding round a panel
 
 
 def board_maps(
-    rng: np.random.Generator, shape: Shape2, size_m: tuple[float, float], tint: Rgb,
-    *, upright: bool,
-) -> SurfaceMaps:  # fmt: skip
+    rng: np.random.Generator,
+    shape: Shape2,
+    size_m: tuple[float, float],
+    tint: Rgb,
+    *,
+    upright: bool,
+) -> SurfaceMaps:
     """Painted boards with grooves between them: matchboard where upright, else like a ship's side."""
     along = size_m[0] if upright else size_m[1]
     n = int(rng.choice([9, 11, 13] if upright else [7, 8, 10]))
@@ -36,7 +43,9 @@ def board_maps(
     groove = smoothstep(_GROOVE_M, 0.0005, edge)
     if not upright:
         # The upper board laps over the lower one, which lies in its shade.
-        groove = np.maximum(groove, 0.25 * smoothstep(0.02, 0.0, (at % (along / n)).astype(np.float32)))  # fmt: skip
+        groove = np.maximum(
+            groove, 0.25 * smoothstep(0.02, 0.0, (at % (along / n)).astype(np.float32))
+        )
     light = 1.0 + np.clip(rng.normal(0, 0.008, n), -0.02, 0.02).astype(np.float32)[board]
     groove, light = (np.broadcast_to(v if upright else v[:, None], shape) for v in (groove, light))
     grain = noise(rng, shape, slope=1.2, stretch=(5.0, 1.0) if upright else (1.0, 5.0))
@@ -47,9 +56,14 @@ def board_maps(
 
 
 def wall_plank_maps(
-    rng: np.random.Generator, wood: Wood, shape: Shape2, size_m: tuple[float, float],
-    darkness: float, *, upright: bool,
-) -> SurfaceMaps:  # fmt: skip
+    rng: np.random.Generator,
+    wood: Wood,
+    shape: Shape2,
+    size_m: tuple[float, float],
+    darkness: float,
+    *,
+    upright: bool,
+) -> SurfaceMaps:
     """Planks of wood on a wall, each of another tone; upright or level. size_m, shape: square."""
     layout = rows_of_planks(rng, shape, size_m, int(rng.choice([13, 15, 18])), 1)
     look = PlankLook(joint_m=0.002, bevel_m=0.004, variation=0.07, roughness=0.55, gloss=0.3)
@@ -58,9 +72,12 @@ def wall_plank_maps(
 
 
 def slat_maps(
-    rng: np.random.Generator, wood: Wood, shape: Shape2, size_m: tuple[float, float],
+    rng: np.random.Generator,
+    wood: Wood,
+    shape: Shape2,
+    size_m: tuple[float, float],
     darkness: float,
-) -> SurfaceMaps:  # fmt: skip
+) -> SurfaceMaps:
     """Upright slats of wood before black felt. size_m, shape: square."""
     n = round(size_m[1] / (_LATH_M + _GAP_M))
     layout = rows_of_planks(rng, shape, size_m, n, 1)
@@ -72,10 +89,14 @@ def slat_maps(
     felt = np.array((0.05, 0.05, 0.052), np.float32) * 255
     colour = maps.colour.astype(np.float32) * (1.0 - 0.25 * edge)[..., None]
     colour += is_gap[..., None] * (felt - colour)
-    return _turned(replace(
-        maps, colour=colour.astype(np.uint8), roughness=0.55,
-        normal=normals_from_height(-_LATH_DEEP_M * edge, size_m),
-    ))  # fmt: skip
+    return _turned(
+        replace(
+            maps,
+            colour=colour.astype(np.uint8),
+            roughness=0.55,
+            normal=normals_from_height(-_LATH_DEEP_M * edge, size_m),
+        )
+    )
 
 
 def panel_maps(
@@ -92,7 +113,9 @@ def panel_maps(
     inside = np.minimum(across[None], up[:, None])
     slope = smoothstep(0.0, _BEVEL_M, inside)
     field = smoothstep(_BEVEL_M + 0.03, _BEVEL_M + 0.05, inside) * bool(rng.random() < 0.5)
-    line = smoothstep(0.0025, 0.0, np.abs(inside)) + 0.6 * smoothstep(0.0025, 0.0, np.abs(inside - _BEVEL_M))  # fmt: skip
+    line = smoothstep(0.0025, 0.0, np.abs(inside)) + 0.6 * smoothstep(
+        0.0025, 0.0, np.abs(inside - _BEVEL_M)
+    )
     # The cap stands out, with a shade below it and a light edge above.
     below = smoothstep(_CAP_M + 0.012, _CAP_M, height - y) * (height - y > _CAP_M)
     cap = smoothstep(_CAP_M + 0.005, _CAP_M - 0.003, height - y)
@@ -123,7 +146,9 @@ def _turned(maps: SurfaceMaps) -> SurfaceMaps:
         normal = np.stack([255 - turned[..., 1], turned[..., 0], turned[..., 2]], -1)
     rough = maps.roughness
     return replace(
-        maps, colour=np.ascontiguousarray(np.rot90(maps.colour)), normal=normal,
+        maps,
+        colour=np.ascontiguousarray(np.rot90(maps.colour)),
+        normal=normal,
         roughness=rough if isinstance(rough, float) else np.ascontiguousarray(np.rot90(rough)),
         size_m=(maps.size_m[1], maps.size_m[0]),
-    )  # fmt: skip
+    )

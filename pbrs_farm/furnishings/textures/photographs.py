@@ -26,6 +26,7 @@ class _Shown:
 
 
 _WOOD_FLOOR: Final = _Shown("planks", 0.4, 0.5)
+# fmt: off
 _SHOWN: Final = {
     "strip": _WOOD_FLOOR, "planks": _WOOD_FLOOR, "laminate": _WOOD_FLOOR,
     "herringbone": _WOOD_FLOOR, "chevron": _WOOD_FLOOR,
@@ -36,7 +37,8 @@ _SHOWN: Final = {
     "concrete": _Shown("concrete", 0.62, 0.15), "grain": _Shown("wood", 0.4, 0.5, 0.0),
     "weave": _Shown("cloth", 0.95, 0.0, 0.0), "twill": _Shown("cloth", 0.95, 0.0, 0.0),
     "leather": _Shown("leather", 0.46, 0.4, 0.0),
-}  # fmt: skip
+}
+# fmt: on
 _DRAWN: Final = 12  # pictures of which as many would be liked as much as drawn ones
 # Prefix in MutableHouse.kept, followed by the id of a picture's texture.
 _KEPT: Final = "photograph "
@@ -81,10 +83,12 @@ def photograph_material(
     picture, mean = kept
     shown = _SHOWN[family]
     material = Material(
-        name=f"{family} {picture.texture.name[:40]}", texture_id=texture_id,
-        specular=(shown.gloss,) * 3, roughness=shown.roughness,
+        name=f"{family} {picture.texture.name[:40]}",
+        texture_id=texture_id,
+        specular=(shown.gloss,) * 3,
+        roughness=shown.roughness,
         shininess=round(2.0 / max(shown.roughness, 0.1) ** 4 - 2.0, 1) if shown.gloss else 0.0,
-    )  # fmt: skip
+    )
     return house.material(material, (picture.texture,)), picture.size, mean
 
 

@@ -23,9 +23,13 @@ def paint_maps(
 
 
 def plaster_maps(
-    rng: np.random.Generator, shape: Shape2, size_m: tuple[float, float], tint: Rgb,
-    *, depth: float = 1.0,
-) -> SurfaceMaps:  # fmt: skip
+    rng: np.random.Generator,
+    shape: Shape2,
+    size_m: tuple[float, float],
+    tint: Rgb,
+    *,
+    depth: float = 1.0,
+) -> SurfaceMaps:
     """Plaster worked with a trowel: strokes that cross, hollows a little darker."""
     clouds = noise(rng, shape, slope=2.6, band=(1.0, 60.0))
     # Lay strokes of two directions over each other, each where the other is low.
@@ -77,9 +81,15 @@ def carpet_maps(
 
 
 def weave_maps(
-    rng: np.random.Generator, shape: Shape2, size_m: tuple[float, float], tint: Rgb,
-    *, threads_m: float = 500.0, second: Rgb | None = None, twill: bool = False,
-) -> SurfaceMaps:  # fmt: skip
+    rng: np.random.Generator,
+    shape: Shape2,
+    size_m: tuple[float, float],
+    tint: Rgb,
+    *,
+    threads_m: float = 500.0,
+    second: Rgb | None = None,
+    twill: bool = False,
+) -> SurfaceMaps:
     """Woven cloth: warp and weft over and under each other. second: colour of the weft.
 
     threads_m: threads a metre, as many as the picture can show.

@@ -52,7 +52,10 @@ def rows_of_planks(
         near = [offsets[r - 1]] if r else []
         near += [offsets[0]] if r == n_rows - 1 and r else []
         tries = rng.random(12) * step
-        gaps = [min(min(abs(t - o) % step, step - abs(t - o) % step) for o in near) if near else 0 for t in tries]  # fmt: skip
+        gaps = [
+            min(min(abs(t - o) % step, step - abs(t - o) % step) for o in near) if near else 0
+            for t in tries
+        ]
         offsets[r] = tries[int(np.argmax(np.array(gaps) > 0.2 * step))]
     offsets = np.rint(offsets)
     # Number planks along each row, through the seam.
@@ -134,9 +137,14 @@ class PlankLook:
 
 
 def plank_maps(
-    rng: np.random.Generator, wood: Wood, layout: BoardLayout, size_m: tuple[float, float],
-    look: PlankLook, darkness: float = 0.0, sheet: WoodSheet | None = None,
-) -> SurfaceMaps:  # fmt: skip
+    rng: np.random.Generator,
+    wood: Wood,
+    layout: BoardLayout,
+    size_m: tuple[float, float],
+    look: PlankLook,
+    darkness: float = 0.0,
+    sheet: WoodSheet | None = None,
+) -> SurfaceMaps:
     """Wood cut into the layout's planks. darkness: -1 bleached .. 1 stained."""
     shape = (layout.plank.shape[0], layout.plank.shape[1])
     pixel_m = size_m[0] / shape[1]
@@ -149,7 +157,9 @@ def plank_maps(
     # Give each plank a brightness and a warmth of its own.
     light, dark = _stained(wood, darkness)
     colour = ramp(tone, dark, light)
-    bright = 1.0 + np.clip(rng.normal(0, look.variation, n), -2 * look.variation, 2 * look.variation)  # fmt: skip
+    bright = 1.0 + np.clip(
+        rng.normal(0, look.variation, n), -2 * look.variation, 2 * look.variation
+    )
     warm = np.clip(rng.normal(0, 0.2 * look.variation, n), -0.03, 0.03)
     tint = np.stack([bright * (1 + warm), bright, bright * (1 - 1.3 * warm)], -1)
     colour *= tint.astype(np.float32)[layout.plank]
@@ -177,9 +187,12 @@ def _start_of_planks(
 
 
 def grain_maps(
-    rng: np.random.Generator, wood: Wood, size_m: float = 1.0, edge_px: int = 512,
+    rng: np.random.Generator,
+    wood: Wood,
+    size_m: float = 1.0,
+    edge_px: int = 512,
     roughness: float = 0.4,
-) -> SurfaceMaps:  # fmt: skip
+) -> SurfaceMaps:
     """Veneer without joints, the grain along u, for furniture."""
     shape = (edge_px, edge_px)
     sheet = wood_sheet(rng, wood, shape, size_m / edge_px)

@@ -18,13 +18,19 @@ PATTERNS = ("stripes", "damask", "geometric", "leaves")
 
 
 def wallpaper_maps(
-    rng: np.random.Generator, shape: Shape2, pattern: str, ground: Rgb, print_colour: Rgb,
+    rng: np.random.Generator,
+    shape: Shape2,
+    pattern: str,
+    ground: Rgb,
+    print_colour: Rgb,
     accent: Rgb,
-) -> SurfaceMaps:  # fmt: skip
+) -> SurfaceMaps:
     """One repeat of WIDTH_M square; ground and print as sRGB-encoded colours."""
     masks = _DRAWN[pattern](rng, shape)
     colour = np.broadcast_to(np.array(ground, np.float32), (*shape, 3)).copy()
-    for mask, ink in zip(masks, (print_colour, accent, mix(ground, print_colour, 0.5)), strict=False):  # fmt: skip
+    for mask, ink in zip(
+        masks, (print_colour, accent, mix(ground, print_colour, 0.5)), strict=False
+    ):
         colour += mask[..., None] * (np.array(ink, np.float32) - colour)
     # Show the paper's own fibres.
     paper = noise(rng, shape, slope=0.5)
@@ -36,9 +42,12 @@ def wallpaper_maps(
 
 
 def printed_carpet_maps(
-    rng: np.random.Generator, shape: Shape2, size_m: tuple[float, float], pattern: str,
+    rng: np.random.Generator,
+    shape: Shape2,
+    size_m: tuple[float, float],
+    pattern: str,
     tints: tuple[Rgb, Rgb, Rgb],
-) -> SurfaceMaps:  # fmt: skip
+) -> SurfaceMaps:
     """Cut pile in the colours of a wallpaper's pattern, as large as size_m: ground, print, accent."""
     masks = _DRAWN[pattern](rng, shape)
     pile = noise(rng, shape, slope=0.3, band=(size_m[0] * 40, 1e9))
@@ -105,7 +114,10 @@ def _geometric(rng: np.random.Generator, shape: Shape2) -> list[F32]:
         # Dots on a diagonal grid.
         a, b = (x * 2 * n) % 2.0 - 1.0, (y * 2 * n) % 2.0 - 1.0
         d = np.minimum(np.hypot(a, b), np.hypot(1 - np.abs(a), 1 - np.abs(b)))
-        return [_fill_inside((d - rng.uniform(0.18, 0.34)) / (2 * n), shape), np.zeros(shape, np.float32)]  # fmt: skip
+        return [
+            _fill_inside((d - rng.uniform(0.18, 0.34)) / (2 * n), shape),
+            np.zeros(shape, np.float32),
+        ]
     # Hexagons.
     return [_hexagons(x, y, n, width, shape), np.zeros(shape, np.float32)]
 
@@ -185,7 +197,9 @@ def _leaves(rng: np.random.Generator, shape: Shape2) -> list[F32]:
     fills, veins = np.zeros(shape, np.float32), np.zeros(shape, np.float32)
     length = float(rng.uniform(0.10, 0.135))
     # Set sprigs on a staggered grid, each a bent stem with leaves to both sides.
-    for k, at in enumerate(((0.18, 0.03), (0.52, 0.22), (0.84, 0.42), (0.20, 0.53), (0.52, 0.72), (0.84, 0.92))):  # fmt: skip
+    for k, at in enumerate(
+        ((0.18, 0.03), (0.52, 0.22), (0.84, 0.42), (0.20, 0.53), (0.52, 0.72), (0.84, 0.92))
+    ):
         angle = np.pi / 2 + float(rng.uniform(-0.45, 0.45)) + (0.25 if k % 2 else -0.25)
         curve, point = float(rng.uniform(-0.7, 0.7)) / 8, np.array(at)
         for step in range(8):
@@ -193,7 +207,13 @@ def _leaves(rng: np.random.Generator, shape: Shape2) -> list[F32]:
             size = length * (1.0 - 0.09 * step)
             for side in (1, -1) if step < 7 else (0,):
                 turn = angle + side * 0.85
-                _stamp_motif(fills, (point[0], point[1]), turn, size, partial(_leaf_distance, length=size, width=size * 0.17))  # fmt: skip
+                _stamp_motif(
+                    fills,
+                    (point[0], point[1]),
+                    turn,
+                    size,
+                    partial(_leaf_distance, length=size, width=size * 0.17),
+                )
                 _stamp_motif(veins, (point[0], point[1]), turn, size, _stem(0.8 * size, 0.0013))
             point = point + 0.06 * np.array([np.cos(angle), np.sin(angle)])
             angle += curve
