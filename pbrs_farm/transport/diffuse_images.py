@@ -27,7 +27,7 @@ ALBEDO: Final = (
     "diffuse_albedo"  # mean of kd, which counts as 0.002 at least (kernels/path_state.py)
 )
 IMAGE_OF_GROUP: Final = {Group.OUTDOOR: "diffuse_outdoor", Group.INDOOR: "diffuse_indoor"}
-_GUIDE_GREY: Final = 0.5  # albedo that is told to the denoiser of what has none
+_GUIDE_GREY: Final = 0.5  # guide albedo for pixels without one
 _MOST_HALF: Final = 65504.0  # of a half float
 
 

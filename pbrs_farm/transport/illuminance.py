@@ -37,16 +37,15 @@ DARK_LX: Final = 1.0  # a room with less by all light is dark: full moonlight is
 
 _SPP: Final = 32  # paths a point
 _ABOVE_FLOOR_M: Final = 0.05  # above carpets
-_MAX_ATTEMPTS: Final = 200  # at points in a polygon that is thin in its box
+_MAX_ATTEMPTS: Final = 200  # attempts to find a point in a polygon that is thin in its box
 
 
 def illuminance_record(
     house: House, lux: dict[str, dict[str, float]], *, is_day: bool = True
 ) -> dict[str, Any]:
-    """The record illuminance.json: a row for each room, with a warning for what is out of range.
+    """The record illuminance.json: a row per room, with a warning for implausible values.
 
-    lux: as LightScene.floor_lux gives it; rooms that it lacks are left out. is_day: as of
-    photometric_warnings.
+    lux: from LightScene.floor_lux; rooms without an entry are skipped. is_day: as of photometric_warnings.
     """
     rows = [
         {
@@ -85,10 +84,9 @@ def photometric_warnings(room: Room, lux: dict[str, float], *, is_day: bool = Tr
 
 
 def darkness_of_room(room: Room, lux: dict[str, float]) -> str:
-    """A line when all light together leaves the room's floor darker than DARK_LX, else "".
+    """Warning if all light together leaves the room's floor darker than DARK_LX, else "".
 
-    lux: group of light -> mean illuminance on the floor, lx. The line is made for warnings, as it
-    stands.
+    lux: light group -> mean illuminance on the floor, lx.
     """
     total = sum(lux.values())
     if total >= DARK_LX:
@@ -154,7 +152,7 @@ def radiosity(
     outdoor = np.full(n, ALL_EMITTERS if lamps is None else NO_EMITTERS)
     asked = EmitterFilter(*(device_array(mi.Int32, v.astype(np.int32)) for v in (indoor, outdoor)))
     context = PathContext(scene, emitters, device_fields(LightFields(), max_depth=max_depth), asked)
-    # Give each point a random stream of its own.
+    # Give each point a separate random stream.
     key = stream_key(dr.arange(mi.UInt32, n), dr.opaque(mi.UInt32, seed & 0xFFFFFFFF))
     p, normal = mi.Point3f(*_columns(points)), mi.Vector3f(*_columns(normals))
     sums = _radiosity(context, p, normal, key, dr.opaque(mi.UInt32, spp))

@@ -46,7 +46,7 @@ def indoor_from_lamps(
 ) -> RadianceImage:
     """Sum of the lamps' layers in the order of their numbers, each times its factor.
 
-    factors: number -> (3,) of R, G and B; 1 where there is none. shape: (H, W, 3).
+    factors: number -> (3,) of R, G and B; 1 if missing. shape: (H, W, 3).
     """
     total = np.zeros(shape, np.float32)
     for number in sorted(layers):
@@ -60,8 +60,8 @@ def relit_indoor(
 ) -> RadianceImage:
     """Denoised indoor light with each lamp times its factor.
 
-    indoor: (H, W, 3), the lamps' light denoised as a whole. layers: each lamp's, denoised by itself;
-    they say whose share of a pixel is whose. With every factor 1 it is indoor to the bit.
+    indoor: (H, W, 3), the lamps' light denoised together. layers: each lamp's, denoised separately; they
+    give each lamp's share of a pixel. With every factor 1 the result is indoor to the bit.
     """
     total = indoor_from_lamps(layers, {}, indoor.shape)
     scaled = indoor_from_lamps(layers, factors, indoor.shape)

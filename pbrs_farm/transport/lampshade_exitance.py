@@ -22,7 +22,7 @@ INTERIOR_REACH_M: Final = 0.6  # faces farther from a bulb are outside its lamp'
 # Of the lamp's flux, per m2: as much light as falls on a surface 40 cm from a bare bulb.
 MIN_EXITANCE: Final = 0.5
 
-# Of what a lamp's targets send out, inside the sphere that is called its interior.
+# Share of the flux of a lamp's targets inside the sphere called its interior.
 INTERIOR_SHARE: Final = 0.9
 
 _MAX_FACES: Final = 1024  # candidates per lamp
@@ -43,7 +43,7 @@ def guiding_targets(
     if not len(faces):
         return no_targets(len(tables.lamps))
 
-    # Keep the sides that are bright enough, ordered by lamp.
+    # Keep sufficiently bright sides, ordered by lamp.
     flux = np.array([lamp.flux_lm for lamp in tables.lamps])
     areas = face_areas(_corners_of_faces(tables, faces))
     lumens = _exitance(scene, emitters, tables, faces, lamps, seed) * LM_PER_W
@@ -82,7 +82,7 @@ def _lamp_interiors(tables: SceneTables, faces: I64, lamps: I64, probabilities: 
 
 
 class FacePdfs(NamedTuple):
-    """How often guided rays aim at each face, a row a face."""
+    """Pdfs of guided rays for each face, one row per face."""
 
     faces: NDArray[np.uint32]
     front: F32  # per m2

@@ -28,7 +28,7 @@ class LightResult:
 
     outdoor: RadianceImage  # W m-2 sr-1, finite, >= 0
     indoor: RadianceImage
-    albedo: RadianceImage  # 0..1, of the first surface that is neither mirror nor glass
+    albedo: RadianceImage  # 0..1, of the first surface other than mirror and glass
     normal: UnitVectors  # of the same surface, in the world frame
     noise: dict[str, float]  # relative error of each group and of their sum, from two half buffers
     spp: int  # samples per pixel of `path`; 0 of Metropolis, whose facts have its own numbers

@@ -41,7 +41,7 @@ _FLOOR_POINTS: Final = 256  # a room, for its mean illuminance
 def _moved(
     moving: MovingHouse, tables: SceneTables, time_s: float | None
 ) -> tuple[F32, NDArray[np.uint32], F32]:
-    """What DeviceScene.move takes: vertices at a time, the faces that move, their rows."""
+    """Arguments of DeviceScene.move: vertices at a time, the moving faces, their rows."""
     geometry = moving.geometry if time_s is None else moving.at(time_s)[1]
     faces = np.flatnonzero(moving.moving_faces[tables.kept])
     return geometry.positions, faces.astype(np.uint32), moved_rows(geometry, tables, faces)
@@ -53,7 +53,7 @@ class Pilot:
 
     camera: Camera
     seed: int  # of that view's light
-    time_s: float | None = None  # of that view, in a home in which things move
+    time_s: float | None = None  # of that view, in a home with motions
 
 
 class LightScene:
@@ -171,25 +171,25 @@ class LightScene:
         splits_diffuse: bool = False,
         shutter_s: float = 0.0,
     ) -> LightResult:
-        """The radiance of both light groups in a camera's view, by the integrator of fields.
+        """Render the radiance of both light groups in a camera's view, by the integrator of fields.
 
-        `path`: fields.spp samples per pixel, in passes until fields.noise is reached when it is
-        given, or as many as fit into fields.time_budget_s. `metropolis`: direct light by
-        fields.direct_spp samples, the rest by mutations, fewer where they reach fields.noise
-        before. With fields.groups "lamps" `path` also sums the light of each lamp by itself.
-        room_id names the view in errors. Equal arguments
-        give equal bits on one machine (Metropolis: equal to 1e-5, it splats in parallel); with a
-        time budget similar pictures. checkpoint: what an earlier render of equal arguments kept,
-        and where this one keeps what it has; the picture is the same as without.
-        pilot: of another view, whose choice of emitters this one takes over; None = its own.
-        anchors: frames whose pixels name the random numbers of this view's surfaces, so that noise
-        stays on them; None: each pixel has its own.
-        splits_diffuse: the result has the diffuse light of first surfaces, too (diffuse_images.py);
-        `path` alone.
-        shutter_s: for how long the shutter of a camera with blur is open; what moves meanwhile is
-        blurred, about the time to which the scene was moved.
-        Pixels without a ray are black. Raises MachineFailed for a lens, blur or split on a scalar
-        variant, RenderFailed for blur or split by Metropolis.
+        `path`: fields.spp samples per pixel, in passes until fields.noise is reached, if given, or as many as
+        fit into fields.time_budget_s. `metropolis`: direct light by fields.direct_spp samples, the rest by
+        mutations, fewer if they reach fields.noise earlier. With fields.groups "lamps" `path` also sums the
+        light of each lamp separately. Deterministic to the bit on one machine (Metropolis to 1e-5, since it
+        splats in parallel), except with a time budget.
+
+        room_id: names the view in errors.
+        checkpoint: stores progress, and resumes an earlier render with equal arguments; the picture is the same
+        with or without.
+        pilot: of another view, whose emitter weights are reused; None = its own.
+        anchors: frames whose pixels define the random numbers of this view's surfaces, so that noise is fixed
+        to them; None: by pixel.
+        splits_diffuse: also return the diffuse light of first surfaces (diffuse_images.py); `path` only.
+        shutter_s: exposure time of a camera with blur; moving items are blurred around the scene's time.
+
+        Pixels without a ray are black. Raises MachineFailed for a lens, blur or split on a scalar variant,
+        RenderFailed for blur or split by Metropolis.
         """
         # Emitters and their weights are those of the pilot's view; it is kept for the next one.
         own = pilot or Pilot(camera, seed, self._time_s)
@@ -239,7 +239,7 @@ class LightScene:
             sums, spp = path_sums(view, checkpoint)
             result = result_from_sums(sums, camera, spp, facts)
             return add_diffuse_images(result, sums, spp) if splits_diffuse else result
-        # Sum each lamp by itself, too, and split indoor light into layers.
+        # Sum each lamp separately too, and split indoor light into layers.
         n_lamps = self._n_lamps_that_fit(camera, room_id, seed)
         sums, spp = path_sums(view, checkpoint, n_lamps=n_lamps)
         result = result_from_sums(sums, camera, spp, facts)
@@ -247,7 +247,7 @@ class LightScene:
         return add_diffuse_images(result, sums, spp) if splits_diffuse else result
 
     def _mover(self, camera: Camera, shutter_s: float) -> Callable[[float], None] | None:
-        """What moves things to a share of the shutter's time; None where they stand still meanwhile."""
+        """Moves items to a share of the shutter's time; None if nothing moves."""
         middle_s = self._time_s
         if camera.blur is None or shutter_s <= 0 or self._moving is None or middle_s is None:
             return None
@@ -384,7 +384,7 @@ class LightScene:
             text = f"light by lamp needs LLVM or CUDA, this is {self.variant}"
             hint = "sudo apt-get install -y libllvm19, or --groups two"
             raise MachineFailed(text, hint=hint)
-        # Render two half buffers of each group, with seeds of their own, for the noise estimate.
+        # Render two half buffers of each group, with separate seeds, for the noise estimate.
         scene = ScalarScene(self.tables, self.sky, self.variant)
         half = fields.model_copy(update={"spp": max(fields.spp // 2, 1)})
         halves = {

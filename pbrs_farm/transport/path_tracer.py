@@ -41,7 +41,7 @@ from pbrs_farm.transport.kernels.path_step import advance
 from pbrs_farm.transport.kernels.sampler import SobolSampler, device_array, stream_key
 
 _NULLS_APART: Final = (
-    12  # random dimensions, in vertices, of what glass mirrors from what is behind it
+    12  # random dimensions, in vertices, between a reflection in glass and the path behind it
 )
 
 
@@ -53,12 +53,13 @@ class SampleSums:
     indoor: F32
     outdoor_even: F32  # of every second sample
     indoor_even: F32
-    albedo: F32  # of the first surface that is neither mirror nor glass
+    albedo: F32  # of the first surface other than mirror and glass
     normal: F32  # the same surface's
     n_bad: int  # paths that were not finite, left out
     lamps: F32 | None = None  # (N, L, 3) indoor light by lamp, if asked for
-    # If asked for, of a first surface that scatters: what it would send if it were matte, its coat or
-    # what lies behind it left out; and its diffuse colour alone.
+    # On request, of a first surface that scatters: its radiance if it were matte, without its coat
+    # or the
+    # view through it; and its diffuse colour alone.
     diffuse_outdoor: F32 | None = None
     diffuse_indoor: F32 | None = None
     diffuse_albedo: F32 | None = None
@@ -100,7 +101,7 @@ class Lanes:
     seed: int
     n_only_lamps: int = 0  # 0, or the lamps that the pilot asks for one by one
     n_only_outdoor: int = 0  # the same, outdoor techniques
-    n_lamps: int = 0  # 0, or the number of all lamps, to sum the light of each by itself
+    n_lamps: int = 0  # 0, or the number of all lamps, to sum the light of each separately
     is_trial: bool = False  # count the shadow rays that arrive, too
     streams: NDArray[np.uint32] | None = None  # (pixels,) of their random numbers; None: their own
     splits_diffuse: bool = False  # sum what first surfaces would send if they were matte, too
@@ -130,7 +131,7 @@ class _LampSums(NamedTuple):
 
 @dataclass
 class _MirroredPath:
-    """What the first glass on a sample's way mirrors: followed when the path through it has ended."""
+    """Reflection at a sample's first glass, followed after the path through it has ended."""
 
     o: mi.Point3f
     d: mi.Vector3f
@@ -163,7 +164,7 @@ class _MirroredPath:
         self.waits, self.met = self.waits | (first & ray.is_followed), self.met | first
 
     def path(self, behind: PathState) -> PathState:
-        """The path of the ray that was kept; behind: the one that has ended."""
+        """The path of the stored ray; behind: the ended one."""
         return PathState(
             o=self.o,
             d=self.d,
@@ -178,7 +179,7 @@ class _MirroredPath:
         )
 
     def turn(self, turns: Any) -> None:
-        """Go on with the ray that was kept."""
+        """Continue with the stored ray."""
         self.share = dr.select(turns, self.rest, self.share)
         self.waits = self.waits & ~turns
 
@@ -226,7 +227,7 @@ class _DiffuseSums:
         return emitted, direct
 
     def end(self, turns: Any) -> None:
-        """What glass has mirrored is no light of a surface."""
+        """Reflections in glass are not light of a surface."""
         self.onward = dr.select(turns, mi.Color3f(0), self.onward)
         self.looks = self.looks & ~turns
 
@@ -245,7 +246,7 @@ def _no_diffuse_sums() -> _DiffuseSums:
 
 
 class _Beside(NamedTuple):
-    """Where a lane adds what is not its pixel's sum."""
+    """Where a lane adds values other than its pixel's sum."""
 
     lamps: _LampSums | None
     counts: TechniqueCounts
@@ -299,8 +300,10 @@ def trace(
     camera's among them, instead of the recipe's: 2 is light that met one surface. Equal
     arguments give equal bits on one machine.
     """
-    # The pilot asks for one technique at a time: sunlit points are none of them. Trace them before
-    # anything of the kernel is there, or it is another kernel where there are some.
+    # The pilot samples one technique at a time, and sunlit points are not one of them. Trace them
+    # before
+    # any part of the kernel exists, or the kernel would differ between scenes with and without
+    # points.
     sunlit, n_samples = emitters.sunlit, lanes.n_lanes * lanes.n_samples
     seed = (lanes.seed + 0x9E3779B9 * lanes.first_sample) & 0xFFFFFFFF
     sunlit.trace(scene, emitters.sun, n_samples if lanes.n_only == 0 else 0, seed)
@@ -350,7 +353,7 @@ def trace(
 
 
 def _channels(colour: Any) -> F32:
-    """(N, 3), read channel by channel: of all three at once Dr.Jit makes a copy, by a kernel of its own."""
+    """(N, 3), read channel by channel: Dr.Jit would copy all three by a separate kernel."""
     return np.stack([c.numpy() for c in colour], axis=-1)
 
 

@@ -152,7 +152,7 @@ def trial_weights(
 
 def _pays(sums: SampleSums, shape: tuple[int, int, int]) -> bool:
     """Whether guided rays cut the noise of a trial by more than they cost. shape: plain and guided."""
-    # Judge noise against what is around a pixel: a firefly must not be its own measure.
+    # Judge noise by a pixel's surroundings: a firefly must not be its own reference.
     _plain, guided = _luminance(sums.outdoor + sums.indoor).reshape(shape)
     level = median_filter(guided, size=_NEIGHBOURS, mode="nearest")
     level += _DARK * max(float(level.mean()), 1e-12)

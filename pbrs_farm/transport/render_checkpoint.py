@@ -1,4 +1,4 @@
-"""What a long render keeps of itself, so that a killed one goes on from there; interfaces, no effects."""
+"""Checkpoints of a long render, so that a killed one resumes; interfaces, no effects."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ Arrays = Mapping[str, NDArray[Any]]
 
 
 class RenderCheckpoint(Protocol):
-    """Where a render says how far it is, and what it could go on from.
+    """Stores a render's progress, and the state from which it resumes.
 
-    A render has parts ("path"; "direct" and the chains of Metropolis), each with a state of
-    its own from which it goes on to the same picture. The render calls `kept` once when a
-    part begins and `keep` after each launch; the checkpoint decides how often the state is
-    really stored. States are arrays by name, as np.savez takes them.
+    A render has parts ("path"; "direct" and the chains of Metropolis), each with a state from which it
+    continues to the same picture. The render calls `kept` once when a part begins and `keep` after each
+    launch; the checkpoint decides how often the state is written. States are arrays by name, as for
+    np.savez.
     """
 
     @property
     def spent_s(self) -> float:
-        """Seconds that went into what was kept."""
+        """Seconds spent on the stored state."""
         ...
 
     def kept(self, part: str) -> Arrays:

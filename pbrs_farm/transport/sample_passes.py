@@ -22,9 +22,9 @@ from pbrs_farm.transport.render_checkpoint import Arrays, RenderCheckpoint
 from pbrs_farm.transport.time_budget import TimeBudget
 
 MOST_PARTS: Final = 16
-"""Instants at which things stand in a picture that they blur."""
+"""Number of instants in a motion-blurred picture."""
 _SAMPLES_PER_LAUNCH: Final = 1 << 26  # bounds how long one kernel runs
-_SPP: Final = "spp"  # in what is kept: samples of each pixel so far
+_SPP: Final = "spp"  # key in stored states: samples of each pixel so far
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,8 +51,8 @@ def path_sums(
 ) -> tuple[SampleSums, int]:
     """(sums, samples per pixel) in passes of fields.spp until fields.noise is reached.
 
-    With a time budget: launches that fit into what is left of it, one at least. n_lamps: 0,
-    or the number of all lamps, to sum the light of each by itself.
+    With a time budget: launches that fit into its remainder, at least one. n_lamps: 0, or the number of all
+    lamps, to sum the light of each separately.
     """
     # Size the launches: by memory, by the pace so far, and one pass each when noise decides.
     camera, fields = view.camera, view.fields
@@ -124,11 +124,11 @@ def _traced(
 
 
 def _parts_of_shutter(view: SampledView, first: int, n: int) -> Iterator[tuple[int, int, Camera]]:
-    """(first sample, number, camera) of launches in each of which nothing moves; moves things before each.
+    """(first sample, number, camera) of launches without motion inside; moves items before each.
 
-    Without things that move there is one. Else a pass of fields.spp samples is divided among the parts of the
-    shutter's time, each as long as it has samples; things stand where they are in its middle, the
-    camera moves on within it. A sample's part follows from its number alone.
+    Without motions there is one. Otherwise a pass of fields.spp samples is divided among parts of the
+    shutter's time, in proportion to samples; items are posed at the part's centre, the camera moves within
+    it. A sample's part follows from its number alone.
     """
     spp, blur = view.fields.spp, view.camera.blur
     if view.move is None or blur is None:
@@ -150,7 +150,7 @@ def _parts_of_shutter(view: SampledView, first: int, n: int) -> Iterator[tuple[i
 
 
 def shutter_part_spp(spp: int) -> int:
-    """Samples of a pass of spp that see things at one instant: two at least, of MOST_PARTS instants at most."""
+    """Samples per instant in a pass of spp: at least two, for at most MOST_PARTS instants."""
     return max(-(-spp // MOST_PARTS), min(2, spp))
 
 

@@ -104,7 +104,7 @@ def _is_mirrored(rows: F32) -> Bools:
 
 
 def _mitsuba_mesh(mi: Any, rows: F32, fields: dict[str, Any]) -> Any:
-    # Give every face corners of its own; a mesh takes its BSDF and emitter when it is made.
+    # Give every face separate corners; a mesh takes its BSDF and emitter at construction.
     n = len(rows)
     properties = mi.Properties()
     for name, plugin in fields.items():
@@ -200,7 +200,7 @@ def _bitmap(mi: Any, values: F64) -> dict[str, Any]:
 
 
 def _outdoor(mi: Any, sky: Sky) -> dict[str, Any]:
-    # Pass the dome as it is: Mitsuba's envmap has our axes, azimuth atan2(x, -z), row 0 up.
+    # Pass the dome unchanged: Mitsuba's envmap has our axes, azimuth atan2(x, -z), row 0 up.
     emitters: dict[str, Any] = {
         "dome": {"type": "envmap", "bitmap": mi.Bitmap(np.asarray(sky.dome, np.float32))}
     }

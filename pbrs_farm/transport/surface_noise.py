@@ -1,8 +1,8 @@
-"""Random streams that stay on surfaces while a camera moves, so that noise does not swim in a film; no effects.
+"""Random streams fixed to surfaces while a camera moves, so that noise does not swim in a film; no effects.
 
-Two frames of a film, the anchors, lend the numbers of their pixels: a surface point has the stream of the pixel that it
-lies in before an anchor's camera, seen there or not. Half-way between the two, half of the points have gone over to the
-later one, each once: noise changes a little with each frame, and never all at once.
+Two frames of a film, the anchors, provide the random numbers of their pixels: a surface point has the stream of the
+pixel at its projection into an anchor's camera, visible there or not. Between the anchors, points switch to the
+later one at different times, each once: noise changes gradually from frame to frame.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ Streams = NDArray[np.uint32]
 _OWN: Final = 1 << 62  # added to the number of a pixel whose point no anchor has before it
 _REACH_PX: Final = (
     1 << 24
-)  # from the corner of an anchor's picture as far as its pixels are told apart
+)  # maximum distance from the corner of an anchor's picture at which pixels are distinguished
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,11 +33,11 @@ class NoiseAnchors:
 
 
 def surface_streams(points: NDArray[np.floating], anchors: NoiseAnchors) -> Streams:
-    """(N,) a stream of random numbers for each pixel, whose surface points are given.
+    """(N,) a stream of random numbers for each pixel, from its surface point.
 
-    points: (N, 3) world, metres, in the pixels' order; not finite where a pixel shows none. Of
-    pixels whose points lie in one pixel of the anchor the first has its stream, the others have
-    streams of their own. Equal arguments give equal bits.
+    points: (N, 3) world, metres, in the pixels' order; not finite for pixels without one. If several points
+    project to one pixel of the anchor the first gets its stream, the others get separate ones.
+    Deterministic to the bit.
     """
     early, late = (
         _cells(points, camera, number)
@@ -51,7 +51,7 @@ def surface_streams(points: NDArray[np.floating], anchors: NoiseAnchors) -> Stre
 
 
 def _places_among_equals(values: NDArray[np.uint64]) -> NDArray[np.uint64]:
-    """(N,) how many equal values stand before each one."""
+    """(N,) number of equal values before each one."""
     order = np.argsort(values, kind="stable")
     held = values[order]
     place = np.arange(len(held))
@@ -62,7 +62,7 @@ def _places_among_equals(values: NDArray[np.uint64]) -> NDArray[np.uint64]:
 
 
 def _cells(points: NDArray[np.floating], camera: Camera, number: int) -> NDArray[np.uint64]:
-    """(N,) 64 bits of the pixel of an anchor in which each point lies: points of one have the same."""
+    """(N,) 64-bit identifier of the anchor's pixel that each point projects to."""
     cell = _OWN + np.arange(len(points))
     finite = np.flatnonzero(np.isfinite(points).all(1))
     # Turn axis by axis: a product with a 3 x 3 matrix takes four times the CPU.

@@ -33,14 +33,14 @@ class TimeBudget:
 
     @property
     def share(self) -> float:
-        """Of the budget that is spent; 0 without a limit."""
+        """Spent share of the budget; 0 without a limit."""
         if not self.is_limited:
             return 0.0
         return 1 - max(self._end - time.monotonic(), 0.0) / self._budget_s
 
     @property
     def left_s(self) -> float:
-        """Seconds that are left; infinite without a limit."""
+        """Remaining seconds; infinite without a limit."""
         return self._end - time.monotonic() if self.is_limited else math.inf
 
     def n_that_fit(self, most: int) -> int:

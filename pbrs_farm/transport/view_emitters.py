@@ -1,15 +1,15 @@
 """The emitters of a scene, prepared for one view after another. Effects: holds and fills device buffers.
 
-They are built once for a scene; then each view sets the portals near it and how often each emitter is
-sampled. Each step needs those before it, so their order is written here alone:
+They are built once per scene; then each view sets its portals and the probabilities of its emitters. Each step
+depends on the previous ones, so their order is defined only here:
 
-    build   1. lamps and sky, every lamp weighted alike
-            2. the light that lampshades send out, measured with these
-            3. what guided rays aim at, from 2.: with the scene's faces, then with the emitters
-            4. what lies before the windows, and the light that comes from there
-    view    5. the portals near it, all emitters weighted alike
-            6. the weights that a pilot of the view measures, and the cells of the sun's plane by its paths
-            7. with lamps and `path`: the weights that a trial of the view settles, guided rays or not
+    build   1. lamps and sky, with equal weights
+            2. the light emitted by lampshades, measured with these
+            3. targets of guided rays, from 2.: with the scene's faces, then with the emitters
+            4. the outdoor surroundings and their light
+    view    5. the portals near it, all emitters with equal weights
+            6. the weights measured by a pilot of the view, and the cells of the sun's plane by its paths
+            7. with lamps and `path`: the weights measured by a trial of the view, guided rays or not
 """
 
 from __future__ import annotations
@@ -40,11 +40,11 @@ _TRIAL_SEED: Final = 0x7A1A1  # and that of the trial of guided rays
 
 
 class ViewEmitters:
-    """The emitters of one scene, which every method gives to a view or a place.
+    """The emitters of one scene, which every method configures for a view or a position.
 
-    There is one `Emitters`: what an earlier call returned has the weights of the last call.
+    There is one `Emitters`: results of earlier calls have the weights of the last call.
 
-    portals: (P, 3, 3) of the whole house. outside: what lies before its windows, with its tables.
+    portals: (P, 3, 3) of the whole house. outside: surroundings of its windows, with their tables.
     """
 
     def __init__(
@@ -62,7 +62,7 @@ class ViewEmitters:
 
     @property
     def is_built(self) -> bool:
-        """Whether steps 1 to 4 are done: of a house in which things move they are done at rest."""
+        """Whether steps 1 to 4 are done: for a house with motions they are done at rest."""
         return self._built is not None
 
     def build(self, place: F64) -> None:
@@ -125,7 +125,7 @@ class ViewEmitters:
         return self._built
 
     def _build(self, portals: F64) -> Emitters:
-        """Steps 1 to 4. portals: of the first view, which change nothing of what is measured."""
+        """Steps 1 to 4. portals: of the first view, which do not affect the measurements."""
         uniform = uniform_weights(len(self._tables.lamps), len(portals))
         emitters = Emitters(self._tables, self._sky, portals, uniform)
         # Measure with rays that are not guided yet and every lamp alike: whichever view or room is

@@ -38,14 +38,14 @@ _OTHER_KERNEL: Final = (
 
 @dataclass(frozen=True, slots=True)
 class Exposure:
-    """What a camera chose: the shutter and the speed, and the factor they make of radiance."""
+    """Exposure settings of a camera: shutter time, ISO speed, and the resulting factor on radiance."""
 
     shutter_s: float
     iso: float
     factor: float  # radiance times this is 1 at the tone curve's white
 
     def facts(self) -> dict[str, Any]:
-        """What view.json says."""
+        """Entries for view.json."""
         return {"shutter_s": self.shutter_s, "iso": round(self.iso, 1), "exposure": self.factor}
 
 
@@ -58,7 +58,7 @@ def choose_exposure(wanted: float, fields: SensorFields) -> Exposure:
     (shutter_s > 0) leaves ISO alone to follow.
     """
     goal = wanted * 2**fields.compensation_ev
-    # What one second at ISO 1 makes of radiance.
+    # Factor on radiance of one second at ISO 1.
     unit = LM_PER_W * math.pi / 4 / fields.f_number**2 / _SATURATION_LX_S * fields.headroom
     product = goal / unit
     if fields.shutter_s > 0:
@@ -94,11 +94,10 @@ class SensorShot:
     times_s: tuple[float, ...] = ()  # of those frames; this one's is 0
 
     def exposure(self, mode: str, wanted: float) -> Exposure:
-        """What it takes a mode's picture with, whose own wanted factor is given.
+        """Exposure of a mode's picture, from the mode's own target factor.
 
-        wanted: the factor that the mode's picture would be tone mapped with. Frames before it pull
-        it along by `fields.lag_s`, as an automatic exposure lags; KeyError for a mode that the
-        frames before do not have.
+        wanted: the factor that tone mapping would use for the picture. Previous frames pull it along by
+        `fields.lag_s`, since automatic exposure lags; KeyError for a mode that the previous frames lack.
         """
         path = [frame[mode] for frame in self.before]
         lagged = lag_exposure([*path, wanted], [*self.times_s, 0.0], self.fields.lag_s)
@@ -122,7 +121,7 @@ def take_by_sensor(
     rng = np.random.default_rng(seed)
     # Saturation is white in all channels after the gains: scale them to 1 at least.
     scaled = gains.astype(np.float64) / float(gains.min())
-    # The veil is the lens's: it stands before noise and saturation.
+    # Veiling glare is from the lens, so it precedes noise and saturation.
     light = apply_lens(add_veil(radiance.astype(np.float64) * exposure.factor, fields), sensor)
     light = light * float(gains.min())
     raw = _electrons_read(mosaic(light) if sensor.mosaic else light, exposure.iso, sensor, rng)
@@ -160,10 +159,10 @@ def apply_lens(light: F64, sensor: SensorFields) -> F64:
 
 
 def mosaic(rgb: F64) -> F64:
-    """(H, W) what the pixels of a Bayer mosaic see: rows RGRG and GBGB.
+    """(H, W) values of a Bayer mosaic with rows RGRG and GBGB.
 
-    rgb: (H, W, 3) linear; the first pixel is red. Odd sizes are fine. Values are taken as they are,
-    without noise: `demosaic` is its inverse but for detail finer than the mosaic.
+    rgb: (H, W, 3) linear; the first pixel is red. Odd sizes are allowed. No noise is added; `demosaic` is
+    its inverse except for detail finer than the mosaic.
     """
     raw = rgb[..., 1].copy()
     raw[0::2, 0::2] = rgb[0::2, 0::2, 0]
@@ -200,16 +199,16 @@ def demosaic(raw: F64) -> F64:
 
 
 def _electrons_read(light: F64, iso: float, sensor: SensorFields, rng: np.random.Generator) -> F64:
-    """Light (1 = the tone's white) as it is read: shot noise, read noise, saturation, whole steps.
+    """Sensor values of light (1 = the tone's white): shot noise, read noise, saturation, quantization.
 
-    What noise makes of darkness may be negative.
+    Noise may make dark values negative.
     """
     # The amplifier reaches its end with fewer electrons as ISO rises.
     well = sensor.full_well_e * sensor.iso_min / iso
     electrons = rng.poisson(np.clip(light / sensor.headroom * well, 0, 1e9)).astype(np.float64)
     electrons += rng.normal(0.0, sensor.read_noise_e, light.shape)
     steps = 2**sensor.bits - 1
-    # No light stands at the black level, so that noise below it is not cut off: the mean is right.
+    # Zero light is at the black level, so that noise below it is not clipped and the mean is right.
     black = round(sensor.black_level * steps) / steps
     read = np.rint(np.clip(black + electrons / well * (1 - black), 0, 1) * steps) / steps
     return np.asarray((read - black) / (1 - black) * sensor.headroom)

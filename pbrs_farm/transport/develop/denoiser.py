@@ -22,10 +22,10 @@ from pbrs_farm.transport.light_result import LightResult
 
 
 def denoise(result: LightResult) -> LightResult:
-    """The same view with each group denoised by itself, so that modes stay exact sums.
+    """Denoise each light group separately, so that modes stay exact sums.
 
-    Albedo and normal guide both. The light of single lamps (`lamps`) stays as rendered;
-    `lamp_shares` takes it to divide the denoised indoor light.
+    Guided by albedo and normal. The light of single lamps (`lamps`) is not denoised; `lamp_shares` uses it
+    to divide the denoised indoor light.
     """
     return replace(
         result,
@@ -37,9 +37,9 @@ def denoise(result: LightResult) -> LightResult:
 def denoise_radiance(
     radiance: RadianceImage, albedo: RadianceImage, normal: UnitVectors
 ) -> RadianceImage:
-    """(H, W, 3) float32 radiance with its noise removed, guided by noise-free albedo and normals.
+    """(H, W, 3) float32 denoised radiance, guided by noise-free albedo and normals.
 
-    A black picture comes back as it is. Raises MachineFailed when pyoidn is not installed.
+    A black picture is returned unchanged. Raises MachineFailed if pyoidn is not installed.
     """
     if not np.any(radiance > 0):
         return radiance
@@ -54,7 +54,7 @@ def denoise_radiance(
 def _pyoidn() -> Any:
     """The binding of the denoiser; MachineFailed when it cannot be imported."""
     try:
-        # It would import torch for tensors that are never passed here: a second and 200 MB.
+        # pyoidn would import torch for tensors that are never passed here: a second and 200 MB.
         with _hidden("torch"):
             import pyoidn
     except ImportError as error:

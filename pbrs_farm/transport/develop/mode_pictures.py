@@ -45,7 +45,7 @@ class ToneMappedImage:
     taken: Exposure | None = None  # by a sensor
 
     def facts(self) -> dict[str, Any]:
-        """What view.json says of the image."""
+        """Entries for view.json."""
         facts = {"gains": [round(float(g), 6) for g in self.gains], "exposure": self.exposure}
         return facts | (self.taken.facts() if self.taken else {})
 
@@ -60,11 +60,11 @@ def develop(
     shot: SensorShot | None = None,
     wraps: bool = False,
 ) -> dict[str, ToneMappedImage]:
-    """Mode name -> image of every mode that is a sum of light groups.
+    """Mode name -> image, for every mode that is a sum of light groups.
 
-    Each group is denoised by itself, so that the modes stay sums. indoor, outdoor: factors of
-    all, or of R, G and B; they scale what is denoised, so that every picture is linear in them.
-    shot: the sensor that takes the pictures, None for a perfect one. wraps: see denoise_aovs.
+    Each group is denoised separately, so that the modes stay sums. indoor, outdoor: factors, one or for R,
+    G and B, applied after denoising, so that every picture is linear in them. shot: the sensor, None for
+    an ideal one. wraps: see denoise_aovs.
     """
     clean = denoise_aovs(aovs, wraps=wraps) if denoise else aovs
     groups = {
@@ -102,12 +102,12 @@ def wanted_exposures(
 
 
 def denoise_aovs(aovs: LinearAovs, *, wraps: bool = False) -> LinearAovs:
-    """The same view with each light group denoised by itself; what hits nothing stays black.
+    """Denoise each light group separately; pixels without a hit stay black.
 
     wraps: the left edge adjoins the right one, as in a panorama, and must show no seam.
     """
     if wraps:
-        # Let the denoiser see beyond both edges what lies there.
+        # Extend the picture by the other edge on both sides.
         n = min(_WRAPPED_PX, aovs.outdoor.shape[1])
         wide = {
             f.name: np.pad(getattr(aovs, f.name), ((0, 0), (n, n), (0, 0)), mode="wrap")

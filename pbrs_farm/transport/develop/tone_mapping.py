@@ -25,7 +25,7 @@ _LOG_FLOOR: Final = 1e-3  # added before the logarithm, as Mitsuba's tone mapper
 _METERED: Final = (
     1 / 32,
     4.0,
-)  # of the median luminance: what is darker or brighter counts as these
+)  # of the median luminance; pixels outside this range are clamped to it
 _SHOULDER: Final = 0.6  # of photo: the curve is straight below
 _LEAST_STOPS: Final = 1e-3  # from 1 to a white of 1
 _HALVINGS: Final = 60  # that find a knee to the last bit
@@ -52,7 +52,7 @@ def tone(
 
 
 def _finite_light(radiance: RadianceImage) -> F64:
-    """Radiance as float64; what is negative or not finite counts as 0."""
+    """Radiance as float64; negative and non-finite values become 0."""
     rgb = np.asarray(radiance, np.float64)
     # Nothing is to be done to nearly every picture: two sums tell.
     if rgb.min(initial=0.0) >= 0 and np.isfinite(rgb.sum()):
@@ -110,10 +110,10 @@ def exposure_of(radiance: RadianceImage, fields: ToneFields) -> float:
 
 
 def add_veil(light: F64, fields: ToneFields) -> F64:
-    """Exposed light (H, W, 3) with the share of its mean that a lens strays over the whole picture.
+    """Add veiling glare: the share of the mean of light (H, W, 3) that a lens scatters over the picture.
 
-    What is brighter than the white counts as the white, since a camera's flare is of what it sees as
-    a whole, and one bulb's pixel would otherwise veil a room.
+    Values above the white count as the white, since flare depends on the whole view; otherwise one bulb's
+    pixel would veil a room.
     """
     if fields.flare == 0:
         return light
@@ -167,7 +167,7 @@ def roll_off(rgb: F64, white: float) -> F64:
     It maps the largest component and keeps the hue; from a luminance of 1 on colours pale, and at white they are
     white, as a sensor's channels saturate one after the other.
     """
-    # Leave what lies on the straight part as it is: most of a picture.
+    # Skip pixels on the linear part of the curve, which are most of a picture.
     top = np.maximum(np.maximum(rgb[..., 0], rgb[..., 1]), rgb[..., 2])
     is_soft = top > _SHOULDER
     out = np.array(rgb)

@@ -22,17 +22,16 @@ _WARMTH: Final = (-0.7, 1.6)
 
 
 def white_balance(radiance: RadianceImage, albedo: RadianceImage, fields: ToneFields) -> F32:
-    """(3,) gains that turn the illuminant's colour towards white, as a camera's do; luminance 1.
+    """(3,) gains that shift the illuminant's colour towards white, as cameras do; luminance 1.
 
-    The illuminant is radiance over albedo, which is known here: the median of its logarithm over
-    the better lit half of the pixels, since what lies in shade has the colour of walls and floors
-    that light was reflected by, and correcting that would turn a garden blue. Ones, but for the
-    fields' errors, when fewer than 16 pixels are usable. Where one colour fills the view, the light
-    that its walls reflect at each other has that colour, and no camera would take it for a lamp's:
-    the illuminant is then clamped to colours that lamps and skies have.
+    The illuminant is radiance over albedo, both known: the median of its logarithm over the better lit half
+    of the pixels, since shaded pixels have the colour of the walls and floors that reflect light to them;
+    correcting that would turn a garden blue. Returns ones, except for the fields' errors, if fewer than 16
+    pixels are usable. In a view filled by one colour, interreflections have that colour, which no camera
+    would take for a lamp's: the illuminant is then clamped to colours of lamps and skies.
 
-    fields: white_balance, 0 leaves the colour, 1 makes it neutral; warmth_ev and tint_ev are the
-    camera's errors.
+    fields: white_balance, 0 keeps the colour, 1 makes it neutral; warmth_ev and tint_ev are the camera's
+    errors.
     """
     light = _illuminant(radiance, albedo) if fields.white_balance > 0 else None
     gains: NDArray[np.floating] = np.ones(3)

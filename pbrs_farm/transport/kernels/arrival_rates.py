@@ -1,9 +1,9 @@
-"""How many shadow rays arrive, by where they begin and where they go; kernels.
+"""Arrival rates of shadow rays, by origin and target; kernels.
 
-What a shadow ray would bring if nothing stood in its way is known before it is cast, whether
-something stands there is not. So the trial of a view (pilot.py) counts in voxels of the home
-the shadow rays of each kind and those that arrived. A kind is an outdoor technique, one of the
-strongest lamps of the view, any other lamp, or a group of sunlit points (sunlit_points.py).
+The unoccluded contribution of a shadow ray is known before it is cast; its visibility is not. So the
+trial of a view (pilot.py) counts cast and unoccluded shadow rays of each kind in voxels of the home. A
+kind is an outdoor technique, one of the strongest lamps of the view, any other lamp, or a group of
+sunlit points (sunlit_points.py).
 Effects: holds buffers on the device.
 """
 
@@ -32,15 +32,15 @@ _MIN_RATE: Final = 0.02
 
 
 class ArrivalCounts(NamedTuple):
-    """Of shadow rays that were cast, by voxel and kind."""
+    """Counts of cast and of unoccluded shadow rays, by voxel and kind."""
 
     cast: Any  # UInt32, (voxels * N_KINDS,)
     arrived: Any  # those that met nothing on their way
 
     def numpy(self) -> NDArray[np.uint32]:
-        """(2, voxels, N_KINDS).
+        """(2, voxels, N_KINDS) uint32; row 0 counts cast rays, row 1 unoccluded ones.
 
-        uint32; row 0 is what was cast, row 1 what arrived. Waits for the kernel that counts.
+        Waits for the counting kernel.
         """
         return np.stack([x.numpy().reshape(-1, N_KINDS) for x in self])
 

@@ -88,7 +88,7 @@ def diffuse_reflection(bsdf: Bsdf, cos_o: Any) -> Any:
 
 
 def diffuse_response(has_coat: Any, cos_i: Any) -> Any:
-    """What diffuse reflection towards wi is less under a coat.
+    """Factor on diffuse reflection towards wi under a coat.
 
     has_coat: Bool; cos_i: cosine of the incoming direction, >= 0. 1 for plain matte surfaces.
     """
@@ -165,10 +165,10 @@ def thin_glass_reflectance(cos_i: Any) -> Any:
 
 
 def thin_glass_transmittance(tau: Any, cos_i: Any) -> Any:
-    """Color3f of the light that glass leaves of what it does not reflect.
+    """Color3f transmittance of glass for light that is not reflected.
 
-    tau: Color3f, what it leaves at right angles; cos_i: either sign. Light that is not bent goes 1 / cos
-    as far through a wall, so that a jar is darkest at its outline (Beer and Lambert's law).
+    tau: Color3f, transmittance at normal incidence; cos_i: either sign. Unrefracted light travels 1 / cos as
+    far through a wall, so that a jar is darkest at its outline (Beer and Lambert's law).
     """
     return dr.power(tau, dr.rcp(dr.maximum(dr.abs(cos_i), _LEAST_WALL_COS)))
 

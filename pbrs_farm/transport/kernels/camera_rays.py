@@ -42,14 +42,14 @@ class LensCamera(NamedTuple):
     table: Any  # (pixels * 12,) as ray_table
     width: Any  # UInt32, px
     aperture: Any  # radius of the pupil, m; 0 = a point
-    focus: Any  # depth that is sharp, m
+    focus: Any  # depth of focus, m
     velocity: Any  # Vector3f, m that the eye moves while the picture is taken
     turn_axis: Any  # Vector3f, unit
     turn: Any  # rad about it while the picture is taken
     exposure: Any  # share of that time for which a row is open
     rolling: Any  # share of it from the first row's light to the last one's
     row: Any  # share of it from a row's light to the next one's
-    middle: Any  # share of it from mid-shutter to the middle of the part that is looked at
+    middle: Any  # offset from mid-shutter to the centre of the current part, as a share of the shutter time
 
 
 def device_camera(camera: Camera) -> DeviceCamera | LensCamera:
@@ -134,7 +134,7 @@ def camera_ray(
     # Rows are lit one after another, the middle one at mid-shutter.
     time = (corner.y + offset.y) * camera.row - 0.5 * camera.rolling + camera.middle
     if sampler is not None:
-        # Start anywhere in the pupil and aim at the point that is sharp.
+        # Start anywhere in the pupil and aim at the point in focus.
         pupil = mi.warp.square_to_uniform_disk_concentric(sampler.get_2d(mi.UInt32(_LENS_DIM)))
         start = mi.Vector3f(pupil.x * camera.aperture, pupil.y * camera.aperture, 0)
         local = local * camera.focus - start
@@ -155,7 +155,7 @@ def _turn_camera_vector(camera: LensCamera, v: Any, angle: Any) -> Any:
 
 
 def first_points(scene: Any, camera: Camera) -> F32:
-    """(H * W, 3) the surface point at each pixel's centre, row by row; infinite where there is none."""
+    """(H * W, 3) surface point at each pixel's centre, row by row; infinite without a hit."""
     width = dr.opaque(mi.UInt32, camera.intrinsics.width_px)
     pixel = dr.arange(mi.UInt32, camera.intrinsics.width_px * camera.intrinsics.height_px)
     corner = mi.Point2f(mi.Float(pixel % width), mi.Float(pixel // width))

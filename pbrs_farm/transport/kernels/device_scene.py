@@ -1,6 +1,6 @@
-"""What a ray meets: the point, its frame and its material, gathered from the tables; kernels.
+"""Ray intersections: the hit point, its frame and its material, gathered from the tables; kernels.
 
-No effects beyond the buffers a DeviceScene holds on the device.
+No effects beyond the buffers of a DeviceScene on the device.
 """
 
 from __future__ import annotations
@@ -127,9 +127,9 @@ class DeviceScene:
         self._max_albedo = dr.opaque(mi.Float, tables.max_albedo)
 
     def move(self, positions: F32, faces: NDArray[np.uint32], rows: F32) -> None:
-        """Put vertices elsewhere: all positions (V, 3), and the new rows (N, FACE_FLOATS) of faces (N,) that move.
+        """Move vertices: all positions (V, 3), and the new rows (N, FACE_FLOATS) of the moving faces (N,).
 
-        What guiding has written into the rows stays. Trees are built anew. What moves must not emit.
+        Guiding's entries in the rows are kept. Acceleration structures are rebuilt. Emitters must not move.
         """
         flat = np.ascontiguousarray(positions, np.float32).ravel()
         scenes = {id(s): s for s in (self._all, self._fast, self._opaque, self._transparent)}
@@ -147,10 +147,10 @@ class DeviceScene:
         dr.eval(self._rows)
 
     def intersect(self, o: Any, d: Any, active: Any) -> SurfaceInteraction:
-        """The first surface along a ray, by the faster test where there is a tree for it.
+        """The first surface along a ray, by the faster of the available intersection tests.
 
-        It takes one ray of two million through an edge to the face behind (docs/light_methods.md).
-        Glass that lies on an opaque face is left out: behind it a ray would start below that face.
+        It takes one ray of two million through an edge to the face behind (docs/light_methods.md). Glass in
+        contact with an opaque face is skipped: a ray behind it would start below that face.
         """
         ray = _ray(o, d, dr.inf)
         first = self._all if self._fast is None else self._fast
@@ -166,9 +166,9 @@ class DeviceScene:
 
     @dr.syntax
     def _below_glass(self, o: Any, d: Any, face: Any, bary: Any, valid: Any) -> tuple[Any, Any]:
-        """(face, its barycentric coordinates) that a ray meets, less glass that touches what is behind it.
+        """(face, its barycentric coordinates) of a hit, skipping glass that touches the face behind it.
 
-        As a glass's foot and a table do. Nearer than a ray's step off its surface counts as touching.
+        As for a drinking glass on a table. Touching means closer than a ray's offset from its surface.
         """
         tag = dr.gather(mi.UInt32, self._tags, face, valid) & 0xFFFF
         kind = dr.gather(mi.Float, self._materials, tag * MATERIAL_FLOATS + KIND, valid)
@@ -192,9 +192,9 @@ class DeviceScene:
 
     @dr.syntax
     def intersect_past_holes(self, o: Any, d: Any, active: Any) -> SurfaceInteraction:
-        """The first surface along a ray that is not cut out; behind MAX_SHEETS it is what comes.
+        """The first surface along a ray that is not cut out; after MAX_SHEETS any surface counts.
 
-        For rays that need one answer: paths go on behind a hole by themselves.
+        For rays that need one answer: paths continue behind holes themselves.
         """
         here = mi.Point3f(o)
         if dr.hint(self._has_holes, mode="scalar"):
@@ -256,7 +256,7 @@ class DeviceScene:
             n += 1
             brightest: Any = dr.max(left)
             go_on = met & (brightest > 0) & (reach > 0) & (n < MAX_TRANSPARENT)
-        # Treat what is behind more sheets than anyone hangs in a row as opaque.
+        # Treat anything behind more sheets than occur in practice as occluded.
         return dr.select(n >= MAX_TRANSPARENT, 0, left)
 
     def sample_face(self, face: Any, u: Any, active: Any) -> tuple[Any, Any]:
@@ -272,10 +272,10 @@ class DeviceScene:
         return p, dr.normalize(dr.cross(a, b))
 
     def set_guiding_targets(self, faces: Any, front: Any, back: Any, lamps: Any) -> None:
-        """Keep with each of faces (K,) the target_pdf of both its sides and the target_emitter.
+        """Store the target_pdf of both sides and the target_emitter for each of faces (K,).
 
-        front, back: (K,) pdf per area of each side; lamps: (K,) emitter of which the face sends
-        light. Faces that were set before and are not named keep theirs. Runs a kernel at once.
+        front, back: (K,) pdf per area of each side; lamps: (K,) emitter whose light the face sends. Faces
+        that were set before and are not listed keep theirs. Runs a kernel immediately.
         """
         if not len(faces):
             return
@@ -401,7 +401,7 @@ class Panes:
 
     @dr.syntax
     def _nearer(self, valid: Any, at: Any, o: Any, d: Any, looks: Any) -> tuple[Any, Any, Any]:
-        """(Bool: a pane stands before the point at, where a ray meets it, its normal)."""
+        """(Bool: a pane is in front of the point at, the hit on it, its normal)."""
         is_pane, p, n = mi.Bool(False), mi.Point3f(0), mi.Vector3f(0, 1, 0)
         # Branch: packets of lanes whose rays were all scattered pass by.
         if looks:

@@ -43,7 +43,7 @@ class Strategy(NamedTuple):
 
 
 class DirectLight(NamedTuple):
-    """What the shadow rays of a vertex bring."""
+    """Contributions of the shadow rays of a vertex."""
 
     outdoor: DirectLightSample  # straight from the sky
     indoor: DirectLightSample
@@ -103,9 +103,9 @@ def _direct_light(
     roulette: ShadowRoulette | None,
     path: PathState | None = None,
 ) -> DirectLightSample:
-    """What one shadow ray brings; nothing where its roulette casts none.
+    """Contribution of one shadow ray; zero if its roulette casts none.
 
-    path: the one that has come to the vertex, if a part of the sun is left to sunlit points.
+    path: the path up to the vertex, if sunlit points take over a part of the sun.
     """
     if sample is None:
         none = mi.Color3f(0)
@@ -149,7 +149,7 @@ def _direct_light(
         and isinstance(sample, DirectionSample)
         and sample.emitter is None
     ):
-        # The dome has the light of what stands before it: the sun alone is hidden.
+        # The dome includes outdoor occlusion; only the sun is occluded here.
         to_sun = contributes & (sample.kind == SUN) & (dr.max(clear) > 0)
         clear *= context.emitters.sun.past_outside(begin, d, to_sun)
     incident = dr.select(contributes, sample.radiance * clear * weight, 0)
@@ -171,7 +171,7 @@ def _taken_by_sunlit(
     value: Any,
     active: Any,
 ) -> Any:
-    """Color3f of the light of a sample that sunlit points bring instead; None where there are none."""
+    """Color3f part of a sample's light that sunlit points contribute instead; None without them."""
     if context.sunlit is None or path is None:
         return None
     by_sun = active & (sample.kind == SUN)

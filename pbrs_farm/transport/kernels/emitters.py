@@ -1,8 +1,8 @@
 """Sampling and evaluating emitters: lamps, the sun, the sky's dome, portals; kernels.
 
 Outdoor directions are drawn by one of several techniques: 0 the sun's disc, 1 the dome by its
-brightness, 2 and on the window openings as portals (Bitterli et al. 2015). How often each lamp and
-each technique is chosen belongs to a view (pilot.py); any positive weights are unbiased.
+brightness, 2 and above the window openings as portals (Bitterli et al. 2015). The probabilities of
+lamps and techniques are per view (pilot.py); any positive weights are unbiased.
 Effects: holds buffers on the device.
 """
 
@@ -49,9 +49,9 @@ if TYPE_CHECKING:
 from pbrs_farm.transport.kernels.lamp_points import LampPointSampler, padded
 
 SUN, DOME, FIRST_PORTAL = 0, 1, 2  # outdoor techniques; those from FIRST_PORTAL on are portals
-# Of the shadow rays to lamps, those that go by where the lamps are; the others go by the weights
-# of the view alone (walls hide lamps). Where it is known which rays arrive it is more, as far as the
-# nearby lamps have the weight of the view.
+# Share of lamp shadow rays chosen by position; the others are chosen by the view's weights alone
+# (walls hide lamps). Where arrival rates are known the share is larger, in proportion to the nearby
+# lamps' part of the view's weight.
 NEARBY_SHARE, MAX_NEARBY_SHARE = 0.5, 0.9
 _SEEN_SHARE, _ROOM_SHARE, _LAMPS_LX = 0.25, 0.02, 100.0  # of pane_odds
 _PORTAL_PACKETS = 3  # corner, first edge, second edge
@@ -59,7 +59,7 @@ _PORTAL_PACKETS = 3  # corner, first edge, second edge
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EmitterWeights:
-    """How often each lamp and each outdoor technique is chosen; each sums to 1 (or is empty)."""
+    """Probabilities of lamps and of outdoor techniques; each sums to 1 (or is empty)."""
 
     lamps: F64  # (L,)
     outdoor: F64  # (2 + number of portals,)
@@ -94,7 +94,7 @@ class Emitters:
     def __init__(
         self, tables: SceneTables, sky: Sky, portals: F64, weights: EmitterWeights
     ) -> None:
-        self.outside: Outside | None = None  # what lies before the windows, set where there is any
+        self.outside: Outside | None = None  # outdoor surroundings, if any
         self.nearby = NearbyLampSampler(tables)
         grid = VoxelGrid(tables.positions)
         level = (sky.sky_lx + sky.sun_lx) / LM_PER_W / math.pi
@@ -120,11 +120,10 @@ class Emitters:
         return self._has_group[group]
 
     def set_outside(self, outside: Outside, dome: F32) -> None:
-        """Set what lies before the windows, and the light of it.
+        """Set the outdoor surroundings and their light.
 
-        dome: as `Outside.light_dome` gives it. Rays that a surface has scattered, and shadow rays, meet
-        it in place of the sky's, and the sun where nothing outside stands before it; others see what is
-        there.
+        dome: from `Outside.light_dome`. Scattered rays and shadow rays use it instead of the sky's, with the
+        sun where no outdoor object occludes it; other rays see the surroundings themselves.
         """
         self.outside = outside
         self.sun.outside = outside
@@ -160,10 +159,9 @@ class Emitters:
         self.nearby.set_targets(targets)
 
     def near_lamps(self, p: Any, n: Any, counted: Any, active: Any) -> NearbyLamps:
-        """The strongest lamps from p on a surface of normal n.
+        """The strongest lamps at p on a surface with normal n.
 
-        p: Point3f; n: unit Vector3f. counted: number of the one technique that is asked for, -1 for
-        all.
+        p: Point3f; n: unit Vector3f. counted: the only technique to count, -1 for all.
         """
         rates = self.arrival.of_near_lamps(p, active)
         rates[0] = dr.select(counted >= 0, 1, rates[0])
@@ -172,11 +170,11 @@ class Emitters:
     def sample_lamp(
         self, scene: DeviceScene, near: NearbyLamps, u: Any, uv: Any, counted: Any, active: Any
     ) -> DirectionSample:
-        """A point on a lamp: one of those nearby by the chance of _nearby_share, else by weight alone.
+        """A point on a lamp: of a nearby one with probability _nearby_share, else by weight alone.
 
-        u: Float, uv: Point2f in [0, 1). counted: a lamp's number where only that one is asked for,
-        else -1. The radiance does not say whether anything stands between: cast a shadow ray. valid
-        is False where the point is turned away from p or touches it.
+        u: Float, uv: Point2f in [0, 1). counted: a lamp's number to sample only that one, else -1. The
+        radiance ignores occlusion: cast a shadow ray. valid is False if the point faces away from p or
+        coincides with it.
         """
         # Choose a lamp both ways, and take one.
         active = active & self._has_lamps
@@ -251,11 +249,10 @@ class Emitters:
         return dr.select(counts, colour(row), 0), pdf
 
     def sample_outdoor(self, p: Any, u: Any, uv: Any, counted: Any, active: Any) -> DirectionSample:
-        """A direction in which outdoor light may come to p.
+        """A direction of possible outdoor light at p.
 
-        The sun, the dome or a portal, by the chances of p's voxel. The distance is infinite;
-        whether anything stands between is not known here. The pdf is over the techniques that can
-        give the direction.
+        The sun, the dome or a portal, by the probabilities of p's voxel. The distance is infinite; occlusion
+        is not tested. The pdf is over all techniques that can produce the direction.
         """
         active = active & self.has_sky
         chances = self.outdoor_choice.chances(p, active)
@@ -268,7 +265,7 @@ class Emitters:
         to_dome = self._texel_direction(texel, uv)
         to_portal = self._portal_direction(p, technique, uv, active)
         d = dr.select(is_sun, to_sun, dr.select(technique == DOME, to_dome, to_portal))
-        # The sun and the dome are two emitters, each with a pdf of its own.
+        # The sun and the dome are two emitters with separate pdfs.
         sun, sun_pdf = self.eval_sun(chances, d, counted)
         dome, dome_pdf = self.eval_dome(chances, p, d, counted, active)
         radiance, pdf = dr.select(is_sun, sun, dome), dr.select(is_sun, sun_pdf, dome_pdf)
@@ -283,9 +280,9 @@ class Emitters:
     def eval_dome(
         self, chances: list[Any], p: Any, d: Any, counted: Any, active: Any, is_seen: Any = False
     ) -> tuple[Any, Any]:
-        """(radiance of the dome in direction d, pdf of sampling d from p, sun not counted).
+        """(radiance of the dome in direction d, pdf of sampling d from p, excluding the sun).
 
-        is_seen: Bool, the ray shows the sky itself, not the light of all that lies outside.
+        is_seen: Bool, the ray sees the sky itself, not the light of all surroundings.
         """
         first = 0 if is_seen is False else dr.select(is_seen, self._first_seen, 0)
         radiance, texel_pdf = self._dome_row(d, active, first)
@@ -403,7 +400,7 @@ class Emitters:
     def _set_dome(self, dome: F32, seen: F32 | None) -> None:
         height, width = dome.shape[:2]
         probability = dome_probabilities(dome)
-        # Behind the dome that lights comes the one that is seen, where that is another.
+        # The lighting dome, then the visible one if it differs.
         rows = np.empty((1 if seen is None else 2, height, width, 4), np.float32)  # r g b pdf
         rows[..., :3] = dome if seen is None else np.stack([dome, seen])
         rows[..., 3] = probability / solid_angles(height, width)[:, None]
@@ -417,10 +414,10 @@ class Emitters:
 
 
 def pane_odds(level: float) -> float:
-    """How much brighter than a room in a pane what lies behind it is, about.
+    """Approximate ratio of the radiance seen through a pane to that reflected in it.
 
-    level: luminance over LM_PER_W of white ground under the open sky. A room has that of 100 lx of
-    lamps and a little of the sky's. Says how often rays are reflected, never what pictures converge to.
+    level: luminance over LM_PER_W of white ground under the open sky. A room is assumed to have 100 lx of
+    lamps and some skylight. Only affects how often rays are reflected, never the converged picture.
     """
     outside = _SEEN_SHARE * level
     return outside / (_LAMPS_LX / LM_PER_W / math.pi * _SEEN_SHARE + _ROOM_SHARE * outside)

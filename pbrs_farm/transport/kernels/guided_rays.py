@@ -46,7 +46,7 @@ CONE_SHARE: Final = 0.3  # of the guided rays, into cones
 
 MAX_REFLECTED: Final = 0.5  # of the scattered rays that meet thin glass near a lamp
 
-# How much longer paths live: 5 where the one lamp that matters is 1 m off, 100 within 22 cm.
+# Factor on path survival: 5 if the only relevant lamp is 1 m away, 100 within 22 cm.
 _MAX_BOOST, _BOOST_M2 = 100.0, 5.0
 
 # Guiding has its full share where lamps send a quarter of their light out by their interiors.
@@ -79,7 +79,7 @@ def guiding_at(near: NearbyLamps, bsdf: Bsdf, beta: Any, may_aim: Any) -> Guidin
     way of their interiors.
     """
     albedo = dr.minimum(bsdf.kd + bsdf.f0 + bsdf.tau, 1)
-    # Within a lamp the surface finds the light by itself.
+    # Inside a lamp the BSDF finds the light without guiding.
     reference = near.reference
     least = MIN_SHARE * near.cones.total / dr.maximum(reference.guided_total, 1e-30)
     spare = dr.clip(1 - 0.95 * survival_boost(near) * dr.max(beta * albedo), least, MAX_SHARE)
@@ -91,16 +91,16 @@ def guiding_at(near: NearbyLamps, bsdf: Bsdf, beta: Any, may_aim: Any) -> Guidin
 
 
 def survival_boost(near: NearbyLamps) -> Any:
-    """How much less often roulette ends a path here: more than 1 near lamps, where it is bright.
+    """Factor by which roulette ends fewer paths here: above 1 near lamps, where it is bright.
 
-    1 in views that are not guided.
+    1 in views without guiding.
     """
     boost = dr.clip(_BOOST_M2 * near.closeness, 1, _MAX_BOOST)
     return dr.select(near.is_guided, boost, 1)
 
 
 def reflection_probability(reflectance: Any, boost: Any) -> Any:
-    """How often a scattered ray is reflected by thin glass: often near lamps, by their covers."""
+    """Probability that thin glass reflects a scattered ray: high near lamps, for their covers."""
     return dr.clip(boost * reflectance, reflectance, dr.maximum(reflectance, MAX_REFLECTED))
 
 
@@ -112,13 +112,12 @@ def sample_guided(
     u: Any,
     uv: Any,
 ) -> GuidedSample:
-    """A direction by the second or third technique, where u says so.
+    """A direction by the second or third technique, if u selects one of them.
 
-    u: in [0, 1) chooses the technique; `u_bsdf` of the answer is what is left of it for the BSDF
-    where none of the two was chosen. A target's direction may meet another face first: compare
-    `face` with what the ray hits.
+    u: in [0, 1) selects the technique; `u_bsdf` of the result is its remainder for the BSDF if neither was
+    selected. A target's direction may hit another face first: compare `face` with the hit.
     """
-    # Choose the technique; use what is left of u for the surface, or for the lamp.
+    # Select the technique; use the remainder of u for the surface, or for the lamp.
     share, cone_share = guiding.share, guiding.cone_share
     is_guided = u < share
     u_bsdf = dr.select(is_guided, 0, (u - share) / (1 - share))
@@ -158,9 +157,9 @@ def guided_mis_weight(
     reflected: Any,
     rough: Any,
 ) -> Any:
-    """What remains of a path's throughput where its ray ends; 1 where it passes on.
+    """Factor on a path's throughput at the end of its ray; 1 where it passes through.
 
-    reflected: the ray ends, but not on a face that it may have been aimed at.
+    reflected: the ray ends on a face that it cannot have been aimed at.
     """
     # Compute the pdf with which the third technique would have aimed here.
     ref, d = path.reference, path.d
@@ -171,7 +170,7 @@ def guided_mis_weight(
     begin = offset_ray_origin(ref.p, dr.select(dr.dot(ref.n, d) > 0, ref.n, -ref.n))
     pdf = guided * si.target_pdf * dr.squared_norm(si.p - begin) / cos
     balanced = dr.select(rough, dr.rcp(1 + path.guiding_odds * pdf), 1)
-    # Drop the ray that was aimed at one face and met another.
+    # Drop rays aimed at one face that hit another.
     is_aimed = path.target_face != NO_FACE
     missed = is_aimed & (reflected | (rough & (path.target_face != si.face)))
     return dr.select(missed, 0, balanced)

@@ -54,10 +54,10 @@ class TargetSampler:
     def sample(
         self, scene: DeviceScene, p: Any, ng: Any, lamp: Any, u: Any, uv: Any, active: Any
     ) -> TargetSample:
-        """The direction from p, on a face of normal ng, to a point on a target of a lamp.
+        """The direction from p, on a face with normal ng, to a point on a target of a lamp.
 
-        lamp: UInt32; valid is False for a lamp without targets and for a side that is turned away
-        from p. Aims from the point where the ray is going to start, a little off the surface.
+        lamp: UInt32; valid is False for a lamp without targets and for a side facing away from p. Aims from
+        the offset origin of the ray, slightly off the surface.
         """
         # Choose a target of the lamp, then a point on its face.
         first = dr.gather(mi.UInt32, self._first, lamp, active)
@@ -67,7 +67,7 @@ class TargetSampler:
         side = dr.gather(mi.UInt32, self._sides, first + k, active)
         face = side & (BACK_SIDE - 1)
         q, n = scene.sample_face(face, uv, active)
-        # Aim from where the ray will start, or it would miss what is small and near.
+        # Aim from the ray's offset origin, or it would miss small near targets.
         origin = offset_ray_origin(p, dr.select(dr.dot(ng, q - p) > 0, ng, -ng))
         d = dr.normalize(q - origin)
         n = dr.select(side >= BACK_SIDE, -n, n)
@@ -75,10 +75,7 @@ class TargetSampler:
 
 
 def no_targets(n_lamps: int) -> GuidingTargets:
-    """The targets of lamps that have none.
-
-    For scenes without shades and for views that are not guided.
-    """
+    """Empty targets, for scenes without lampshades and for views without guiding."""
     none, first = np.zeros(0), np.zeros(n_lamps + 1, np.int64)
     interiors = np.zeros((n_lamps, 4))
     return GuidingTargets(none.astype(np.uint32), none, none, first, np.zeros(n_lamps), interiors)

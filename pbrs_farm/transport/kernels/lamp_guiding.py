@@ -1,9 +1,9 @@
 """Importances of the lamps near a vertex, for shadow rays and guided rays; kernels, no effects.
 
-A home has a dozen lamps. The pilot's weights (pilot.py) say which of them matter to a view, not
-where in the view. Here the strongest few are weighted again at every vertex: by distance, by
-whether they stand in front of the surface and, in views with a trial, by flux and by how often rays
-to them arrive (outdoor_choice.py). Inside a shade its own bulb is nearly always taken.
+A home has a dozen lamps. The pilot's weights (pilot.py) tell their importance for a view, not for a
+position in it. Here the strongest few are weighted again at every vertex: by distance, by orientation
+and, in views with a trial, by flux and arrival rate (outdoor_choice.py). Inside a shade its own bulb is
+nearly always chosen.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from pbrs_farm.transport.kernels.packets import point
 from pbrs_farm.transport.kernels.sampler import device_array
 from pbrs_farm.transport.scene_tables.scene_tables import SceneTables, bounding_spheres
 
-MAX_NEAR: Final = 8  # lamps that are weighted by where they are
+MAX_NEAR: Final = 8  # lamps weighted by position
 _MIN_RADIUS_M: Final = 0.03
 _MAX_SIN2: Final = 0.98  # of half a cone's opening; wider, the vertex counts as inside
 _CONE_EDGE: Final = 5e-4  # tolerance of a cone's height, against float32 at its edge
@@ -69,7 +69,7 @@ class _Slot(NamedTuple):
 
 
 class _LampRows(NamedTuple):
-    """What is known of a lamp: packets of four floats."""
+    """Data of a lamp, in packets of four floats."""
 
     sphere: Any
     strength: Any  # weight, guided share, slot or MAX_NEAR, flux over weight
@@ -105,7 +105,7 @@ class NearbyLampSampler:
         self._is_guided = dr.opaque(mi.Bool, is_guided)
 
     def set_targets(self, targets: GuidingTargets) -> None:
-        """Set what of each lamp's light guided rays can find."""
+        """Set the surfaces of each lamp's light that guided rays aim at."""
         self._shares = targets.shares
         self._host_interiors = _pad_slots(targets.interiors)
         self._interiors = device_array(mi.Float, self._host_interiors.ravel())
@@ -159,10 +159,10 @@ class NearbyLampSampler:
         return NearbyLamps(reference, lamps, closeness, chances, guided, cones, self._is_guided)
 
     def importance(self, lamp: Any, p: Any, n: Any, counted: Any, active: Any) -> tuple[Any, Any]:
-        """(importance, guided importance) of one lamp as in NearbyLamps; 0 for those that are not among the strongest.
+        """(importance, guided importance) of one lamp as in NearbyLamps; 0 for lamps outside the strongest.
 
-        lamp: UInt32; p, n: of the vertex, as for `Emitters.near_lamps`; counted: the one technique
-        that is asked for, -1 for all.
+        lamp: UInt32; p, n: of the vertex, as for `Emitters.near_lamps`; counted: the only technique to
+        count, -1 for all.
         """
         sphere = dr.gather(mi.Vector4f, self._spheres, lamp, active)
         strength = dr.gather(mi.Vector4f, self._strengths, lamp, active)
@@ -170,15 +170,15 @@ class NearbyLampSampler:
         return _importance(rows, lamp, p, n, counted, active)
 
     def slot(self, lamp: Any, active: Any) -> tuple[Any, Any]:
-        """(place of a lamp among the strongest or MAX_NEAR, what its importance is times for a chance).
+        """(slot of a lamp among the strongest or MAX_NEAR, factor from its importance to a probability).
 
-        MAX_NEAR stands for all that are not among the strongest.
+        MAX_NEAR stands for all lamps outside the strongest.
         """
         row = dr.gather(mi.Vector4f, self._strengths, lamp, active)
         return mi.UInt32(row[2]), row[3]
 
     def _slot(self, k: int, counted: Any, active: Any) -> _Slot:
-        """A slot; for the lamp that is asked for alone the first one, where the others count nothing."""
+        """A slot; if only one lamp counts, the first slot is that lamp and the others are empty."""
         slot, is_asked = self._slots[k], counted >= 0
         if k > 0:
             return slot._replace(counts=dr.select(is_asked, 0.0, slot.counts))
@@ -227,11 +227,10 @@ def no_reference(p: Any) -> ReferencePoint:
 
 
 def sample_discrete(values: list[Any], weights: list[Any], total: Any, u: Any) -> tuple[Any, Any]:
-    """(one of values in proportion to its weight, u made uniform again).
+    """(one of values in proportion to its weight, u stretched to be uniform again).
 
-    values, weights: lists of equal length, weights >= 0, total their sum. u in [0, 1); what is made
-    of it may be used for the next choice. Rounding may leave no candidate: then the first one is
-    given.
+    values, weights: lists of equal length, weights >= 0, total their sum. u in [0, 1); its remainder may
+    be used for the next choice. If rounding leaves no candidate, returns the first one.
     """
     x = u * total
     value, again, below = values[0], mi.Float(0), mi.Float(0)
@@ -258,13 +257,13 @@ def sample_cones(cones: Cones, u: Any, uv: Any) -> Any:
 
 
 def cone_pdf(cones: Cones, d: Any) -> Any:
-    """Pdf of sample_cones() per solid angle; 0 where there are none.
+    """Pdf of sample_cones() per solid angle; 0 without cones.
 
-    d: unit. A hair wider than the cones, so that a direction drawn at the edge never has pdf 0.
+    d: unit. Slightly wider than the cones, so that a direction drawn at the edge never has pdf 0.
     """
     pdf = mi.Float(0)
     for importance, axis, height in zip(cones.importances, cones.axes, cones.heights, strict=True):
-        # |d - axis|^2 is twice the height; what was drawn at the edge must count as inside.
+        # |d - axis|^2 is twice the height; directions drawn at the edge must count as inside.
         inside = dr.squared_norm(d - axis) <= (2 + _CONE_EDGE) * height
         solid_angle = 2 * math.pi * dr.maximum(height, 1e-9)
         pdf += dr.select(inside & (importance > 0), importance / solid_angle, 0)

@@ -35,10 +35,10 @@ class LampPointSampler:
     def sample(
         self, scene: DeviceScene, lamp: Any, p: Any, u: Any, uv: Any, active: Any
     ) -> tuple[Any, Any, Any]:
-        """(point on a lamp, unit normal there, whether p can see it), uniform over area_share of it.
+        """(point on a lamp, unit normal there, whether it faces p), uniform over area_share of it.
 
-        p: from where it is to be seen. The pdf per area is 1 over the lamp's area times
-        `area_share`; a lamp that is its own mirror image is sampled on the half that looks at p.
+        p: the receiver. The pdf per area is 1 over the lamp's area times `area_share`; a lamp that is its own
+        mirror image is sampled on the half facing p.
         """
         # Choose a triangle by area, and a point on that.
         first = dr.gather(mi.UInt32, self._first, lamp, active)
@@ -58,7 +58,7 @@ class LampPointSampler:
         return dr.select(side != 0, mi.Float(0.5), 1)
 
     def _symmetry(self, lamp: Any, p: Any, active: Any) -> tuple[Any, Any]:
-        """(centre, signed radius of a symmetric lamp around which p lies, or 0)."""
+        """(centre, signed radius of a symmetric lamp around p, or 0)."""
         row = dr.gather(mi.Vector4f, self._symmetries, lamp, active)
         is_outside = dr.squared_norm(p - point(row)) > dr.square(row[3])
         return point(row), dr.select(is_outside, row[3], 0)

@@ -1,9 +1,9 @@
-"""How often each outdoor technique is chosen, by where a vertex lies; kernels.
+"""Probabilities of the outdoor techniques by a vertex's position; kernels.
 
-The weights of a view hold for all of it. But a window of the next room is worth no shadow ray, and of
-the sun only few vertices see anything. So the pilot, which asks for one technique at a time, counts
-in voxels of the home its paths' vertices and what light a technique brought the paths there, and each
-voxel gets weights of its own (a map of visibility as of Guo et al. 2020, to techniques, not to voxels).
+The view's weights apply to all of it, but a window of the next room deserves no shadow ray, and only few
+vertices see the sun. So the pilot, which samples one technique at a time, counts its paths' vertices and
+each technique's contribution in voxels of the home, and each voxel gets separate weights (a visibility
+map as of Guo et al. 2020, to techniques instead of voxels).
 Effects: holds buffers on the device.
 """
 
@@ -27,8 +27,8 @@ MAX_TECHNIQUES: Final = 8  # floats of a row: two packets
 # lit as the view's are; and so much of its weights is the view's, for what no vertex has found.
 PRIOR_VERTICES: Final = 4.0
 _VIEW_SHARE: Final = 0.2
-# What a technique brings counts by its luminance over that of white ground: whole steps of the root, up
-# to that of _MOST.
+# A technique's contribution is counted as luminance over that of white ground: integer steps of the
+# root, up to that of _MOST.
 _STEPS: Final = 1024.0
 _MOST: Final = 100.0
 
@@ -54,7 +54,7 @@ class OutdoorChoice:
     """The weights of all outdoor techniques in every voxel of a home, for one view."""
 
     def __init__(self, grid: VoxelGrid, level: float) -> None:
-        """level: luminance of white ground under the open sky, > 0, that what is counted goes by."""
+        """level: luminance of white ground under the open sky, > 0, the unit of contributions."""
         self._grid, self._scale = grid, dr.opaque(mi.Float, 1 / level)
         self.set_weights(np.ones(1))
 
@@ -82,14 +82,15 @@ class OutdoorChoice:
     def count(
         self, counts: TechniqueCounts, p: Any, technique: Any, active: Any, brought: Any
     ) -> None:
-        """Count vertices at p, and the luminance brought to the path there.
+        """Count vertices at p, and the luminance contributed to the path there.
 
-        technique: the one that is asked for alone, or less than 0.
+        technique: the only one sampled, or negative.
         """
         counted = active & (technique >= 0)
         place = self._grid.voxel(p) * MAX_TECHNIQUES + mi.UInt32(dr.maximum(technique, 0))
-        # Add in place: a copy for each thread would put the number of voxels into the kernel, and
-        # every home would compile one of its own.
+        # Add in place: a copy per thread would put the number of voxels into the kernel, and every
+        # home
+        # would compile a new one.
         one, mode = mi.UInt32(1), dr.ReduceMode.Direct
         dr.scatter_add(counts.vertices, one, place, counted, mode=mode)
         # The root, so that a few bright vertices do not say all; whole numbers, so that their order
@@ -118,7 +119,7 @@ def weights_by_place(weights: F64, counts: NDArray[np.uint32], grid: VoxelGrid) 
     everywhere = (brought.sum(0) + 0.5 * _STEPS) / (vertices.sum(0) + 1)
     near = (near_brought + PRIOR_VERTICES * everywhere) / (near_vertices + PRIOR_VERTICES)
     here = (brought + PRIOR_VERTICES * near) / (vertices + PRIOR_VERTICES)
-    # Keep a part of the view's own weights: what is seen from a voxel is known by few vertices.
+    # Mix in the view's weights: the visibility from a voxel is estimated from few vertices.
     rows = weights * here / everywhere
     rows /= rows.sum(1, keepdims=True)
     rows = (1 - _VIEW_SHARE) * rows + _VIEW_SHARE * weights

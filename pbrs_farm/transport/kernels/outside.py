@@ -1,11 +1,11 @@
-"""What lies before the windows, as light sees it: matte or glossy surfaces under the sky, kernels.
+"""Outdoor surroundings as light sees them: matte or glossy surfaces under the sky, kernels.
 
-A ray that leaves the home straight from the camera, by mirrors and glass, meets them; for one that a rough
-surface has scattered, and for shadow rays, their light is in a dome that is made of what the windows see
-(`Outside.light_dome`), and they stand before the sun. Their radiance is that of one bounce: the whole sky
-by the cosine (order 2 of spherical harmonics: Ramamoorthi and Hanrahan 2001), the sun where nothing shades
-it, and street lamps; a coat mirrors the sky without its sun; windows of lit rooms shine by themselves. Air
-lightens what is far: everything stands within 60 m, so that haze grows with the square of the distance.
+Rays that leave the home straight from the camera, by mirrors and glass, hit them. For rays scattered by a
+rough surface, and for shadow rays, their light is part of a dome averaged over the windows
+(`Outside.light_dome`), and they occlude the sun. Their radiance is one bounce: the whole sky by the cosine
+(order 2 of spherical harmonics: Ramamoorthi and Hanrahan 2001), the unoccluded sun, and street lamps; a
+coat mirrors the sky without its sun; windows of lit rooms are emissive. Air lightens distant objects:
+everything is within 60 m, so that haze grows with the square of the distance.
 Effects: holds a Mitsuba scene and numbers on the device.
 """
 
@@ -28,16 +28,16 @@ from pbrs_farm.transport.scene_tables.scene_tables import NO_LAMP, SceneTables
 from pbrs_farm.transport.scene_tables.sky import Sky, directions, solid_angles
 
 GLOW_CD_M2: Final = 45.0
-"""Luminance of what shines by itself, times its hue: a room seen through its window at night."""
+"""Luminance of emissive surfaces, times their hue: a room seen through its window at night."""
 GLOW_ALBEDO: Final = 0.2
 """Reflectance at which it does so; less shines less."""
 
 STREET_LX: Final = 2.5
-"""Of street lamps on whatever lies outside, at any hour: by day it cannot be seen."""
+"""Illuminance by street lamps on all outdoor surfaces, at any hour: negligible by day."""
 STREET_RGB: Final = (1.0, 0.72, 0.42)  # linear, its largest 1
 
 HAZE_M: Final = 105.0
-"""Distance at which 1 - 1/e of what is seen is air: hills at the horizon's ring stand for far ones."""
+"""Distance at which 1 - 1/e of the radiance is from air: hills at the horizon's ring represent far ones."""
 
 _LOW_SHAPE: Final = (32, 64)  # texels of the sky that coats mirror and that haze has the colour of
 _HAZE_UP: Final = 0.12  # sine of the elevation at which haze has the sky's colour
@@ -45,7 +45,7 @@ _OPEN_UP: Final = (
     0.02,
     0.45,
 )  # sines of the elevations between which a street gives way to the sky
-_STREET_SHARE: Final = 0.3  # of the sky's light that what stands there in its place has
+_STREET_SHARE: Final = 0.3  # share of the sky's light reflected by occluders in its place
 _LIGHT_SHAPE: Final = (48, 96)  # directions in which windows look
 _MAX_WINDOWS: Final = 24
 _LEAST_WEIGHT: Final = 1e-4  # of a direction in which no window sees anything but its own home
@@ -55,7 +55,7 @@ _COSINE: Final = np.array([np.pi, *[2 * np.pi / 3] * 3, *[np.pi / 4] * 5])
 
 
 class Seen(NamedTuple):
-    """What a ray shows of the outside."""
+    """Radiance and hit data of a ray into the surroundings."""
 
     valid: Any  # Bool
     radiance: Any  # Color3f
@@ -86,10 +86,10 @@ class Outside:
 
     @dr.syntax
     def seen(self, home: DeviceScene, o: Any, d: Any, active: Any) -> Seen:
-        """What rays show that have left the home.
+        """Radiance of rays that have left the home.
 
-        o: Point3f, d: unit Vector3f of rays that met nothing at home. valid is False where a ray
-        meets nothing outside, and for lanes that are not active.
+        o: Point3f, d: unit Vector3f of rays without a hit at home. valid is False for rays without a hit
+        outside, and for inactive lanes.
         """
         valid, radiance, albedo = mi.Bool(False), mi.Color3f(0), mi.Color3f(0)
         # Branch: packets of lanes whose rays are all at home pass by.
@@ -109,12 +109,12 @@ class Outside:
         return clear
 
     def light_dome(self, home: DeviceScene, portals: F64) -> F32:
-        """(H, W, 3) float32 radiance that comes from each direction, the sun apart, to the windows.
+        """(H, W, 3) float32 radiance from each direction at the windows, without the sun.
 
-        A texel is the mean of what the windows see there, sky or something outside, each by the area
-        that it turns to it and as far as the home itself leaves it free: so the flux through all of
-        them together is that of what is seen through them. portals: (K, 4, 3) rectangles of windows,
-        metres; without any the sky's own dome. Runs a kernel at once.
+        A texel is the mean of the windows' view in that direction, of sky or surroundings, weighted by their
+        projected area and limited by the home's own occlusion: so the total flux equals that of the real view.
+        portals: (K, 4, 3) rectangles of windows, metres; without any, the sky's own dome. Runs a kernel
+        immediately.
         """
         dome = np.asarray(self.sky.dome, np.float32)
         if not len(portals):
@@ -139,7 +139,7 @@ class Outside:
         valid, radiance, _albedo = self._shown(home, places, ways, mi.Bool(True))
         free = dr.max(free)
         dr.eval(valid, radiance, free)
-        # Weigh them, and put what is seen before the sky.
+        # Weight the views, and put the surroundings in front of the sky.
         turned = area[:, None, None] * np.abs((normal * d).sum(-1))
         weight = turned * (free.numpy().reshape(turned.shape) + _LEAST_WEIGHT)
         share = weight / weight.sum(0)
@@ -153,7 +153,7 @@ class Outside:
 
     def _shown(self, home: DeviceScene, o: Any, d: Any, active: Any) -> tuple[Any, Any, Any]:
         si = self._scene.intersect_past_holes(o, d, active)
-        # The sun, unless the home or the outside stands before it.
+        # The sun, unless the home or the surroundings occlude it.
         cos = dr.dot(si.n, self._sun)
         lit = si.valid & self._shines & (cos > 0) & (dr.dot(si.ng, self._sun) > 0)
         begin = offset_ray_origin(si.p, si.ng)
@@ -168,7 +168,7 @@ class Outside:
         mirrored = d - 2 * dr.dot(si.n, d) * si.n
         radiance = (1 - coat) * si.bsdf.kd * irradiance * (1 / np.pi)
         radiance += coat * self._mirrored_sky(mirrored, si.valid)
-        # Glass that a lit room stands behind is dark by day: GLOW_ALBEDO shines with all of it at night.
+        # Windows of lit rooms are dark by day: an albedo of GLOW_ALBEDO emits fully at night.
         hue = dr.minimum(si.bsdf.kd * (1 / GLOW_ALBEDO), 1)
         radiance += dr.select(si.emitter != NO_LAMP, hue * self._glow, 0)
         # Air before it has the sky's colour over the horizon there.
@@ -179,7 +179,7 @@ class Outside:
         return si.valid, dr.select(si.valid, radiance, 0), si.bsdf.kd
 
     def _mirrored_sky(self, d: Any, active: Any) -> Any:
-        """Color3f that a coat mirrors in direction d: the sky, low down what stands before it."""
+        """Color3f mirrored by a coat in direction d: the sky, near the horizon its occluders."""
         low, high = _OPEN_UP
         t = dr.clip((d.y - low) * (1 / (high - low)), 0, 1)
         open_share = dr.lerp(_STREET_SHARE, 1.0, t * t * (3 - 2 * t))

@@ -11,8 +11,8 @@ import mitsuba as mi
 def gather_packets(rows: Any, index: Any, n: int, active: Any = True) -> list[Any]:
     """The n packets of each lane's row, by its index.
 
-    rows: Float, n packets of four floats for each row; index: UInt32. Four floats at once, since a
-    gather costs by the access, not by the byte.
+    rows: Float, n packets of four floats for each row; index: UInt32. Four floats per access, since the cost
+    of a gather is per access, not per byte.
     """
     return [dr.gather(mi.Vector4f, rows, index * n + k, active) for k in range(n)]
 

@@ -25,7 +25,7 @@ from pbrs_farm.transport.scene_tables.scene_tables import NO_LAMP
 
 ALL_EMITTERS, NO_EMITTERS = -1, -2
 _LEAST_DIFFUSE = 0.1
-LEAST_KD = 0.002  # of surfaces where white is split off: what reflects nothing tells nothing
+LEAST_KD = 0.002  # minimum diffuse albedo for splitting off white light: black surfaces carry no information
 
 
 class DeviceFields(NamedTuple):
@@ -47,7 +47,7 @@ class EmitterFilter(NamedTuple):
 
 
 class PathContext(NamedTuple):
-    """What all paths of a launch share: scene, emitters, limits and which emitters count."""
+    """Shared by all paths of a launch: scene, emitters, limits and which emitters count."""
 
     scene: DeviceScene
     emitters: Emitters
@@ -55,7 +55,7 @@ class PathContext(NamedTuple):
     emitter_filter: EmitterFilter
     sunlit: SunlitPoints | None = None  # where shadow rays go to sunlit points, too
     may_guide: Any = None  # Bool: lanes whose rays are guided where the view's are; None = all
-    splits_glass: bool = False  # rays at glass go through, and the caller follows what it mirrors
+    splits_glass: bool = False  # rays pass through glass, and the caller follows the reflection
     splits_white: bool = False  # tell what a white matte surface at each vertex would bring, too
 
     @property
@@ -66,7 +66,7 @@ class PathContext(NamedTuple):
 
 @dataclass
 class PathState:
-    """A path under way: its ray, and how that was drawn."""
+    """A path in progress: its ray, and how that was sampled."""
 
     o: mi.Point3f
     d: mi.Vector3f
@@ -92,7 +92,7 @@ class Vertex(NamedTuple):
     depth: Any  # vertices of the path, this one counted
     dim: Any  # its first random dimension
     near: NearbyLamps | None  # None: lamps do not count
-    is_pane: Any = None  # Bool: glass of a window; None: the scene has none
+    is_pane: Any = None  # Bool: glass of a window; None for scenes without any
     splits: Any = None  # Bool: glass at which rays go through and the caller follows the others
     is_behind: Any = None  # Bool: glass behind such, which neither mirrors nor dims
 
@@ -112,7 +112,7 @@ class ScatteredRay(NamedTuple):
 
 
 class DirectLightSample(NamedTuple):
-    """What one shadow ray brings to a vertex."""
+    """Contribution of one shadow ray to a vertex."""
 
     light: Any  # Color3f scattered back along the path, before its throughput
     d: Any  # unit direction to the emitter
@@ -120,7 +120,7 @@ class DirectLightSample(NamedTuple):
     emitter: Any = None  # number of the lamp, None for the sky
     kind: Any = None  # of the shadow ray (arrival_rates.py)
     is_cast: Any = False  # Bool
-    arrives: Any = False  # Bool: nothing stands in its way
+    arrives: Any = False  # Bool: unoccluded
     white: Any = None  # Color3f that a white matte surface would scatter; None = not asked for
 
 
@@ -146,7 +146,7 @@ class MirroredRay(NamedTuple):
 
 
 class WhiteSplit(NamedTuple):
-    """What a vertex would bring if it were white and matte; throughput included."""
+    """Contribution of a vertex if it were white and matte, including throughput."""
 
     outdoor: Any  # by shadow rays
     indoor: Any
@@ -154,7 +154,7 @@ class WhiteSplit(NamedTuple):
 
 
 class StepResult(NamedTuple):
-    """What one step of a path brings, throughput included."""
+    """Contribution of one step of a path, including throughput."""
 
     # From an emitter that the ray meets, by one segment more than the depth before the step.
     emitted_outdoor: Any
@@ -170,7 +170,7 @@ class StepResult(NamedTuple):
     scattered_d: Any  # direction drawn at the vertex
     pdfs: DirectionPdfs  # of drawing it
     guided_weight: Any  # of the ray that met the vertex; `path` has it in its throughput
-    pass_probability: Any  # of going straight through what was met, 1 if that is no glass
+    pass_probability: Any  # of passing straight through the surface, 1 unless it is glass
     outdoor_sample: DirectLightSample
     indoor_sample: DirectLightSample
     sunlit_sample: DirectLightSample

@@ -54,11 +54,11 @@ from pbrs_farm.transport.scene_tables.material_rows import GLASS, MIRROR
 from pbrs_farm.transport.scene_tables.scene_tables import NO_LAMP
 
 MAX_NULLS = 32
-_MAX_COUNT = 64  # vertices with random dimensions of their own
+_MAX_COUNT = 64  # vertices with separate random dimensions
 _MAX_SURVIVAL = 0.95
 # Chance that `path` follows what a pane mirrors, by its share of the light that comes from there.
 _LEAST_FOLLOWED, _FOLLOWED = 0.05, 8.0
-_MAX_PANE = 0.5  # of the rays at a pane, those that are reflected, where it reflects less itself
+_MAX_PANE = 0.5  # maximum probability of reflecting a ray at a pane with a lower reflectance
 
 # Random dimensions of a vertex, one or two numbers each; direct_light.py has the others.
 _LOBE, _SCATTER, _ROULETTE = 0, 1, 3
@@ -149,7 +149,7 @@ def advance(
 
 
 def _next_vertex(context: PathContext, path: PathState, active: Any) -> Vertex:
-    """What the path's ray meets."""
+    """Hit of the path's ray."""
     si, is_pane = context.scene.intersect(path.o, path.d, active), None
     if context.scene.panes is not None:
         looks = active & (path.bsdf_pdf <= 0)
@@ -160,8 +160,8 @@ def _next_vertex(context: PathContext, path: PathState, active: Any) -> Vertex:
     is_glass, is_mirror = is_solid & (si.bsdf.kind == GLASS), is_solid & (si.bsdf.kind == MIRROR)
     depth = path.depth + dr.select(is_solid & ~is_glass, mi.UInt32(1), 0)
 
-    # Give each vertex, pane and cut-out random dimensions of its own. (What is counted must depend
-    # on the surface: Dr.Jit 1.5 reads local memory at the wrong place by an index that began as a
+    # Give each vertex, pane and cut-out separate random dimensions. (The count must depend on the
+    # surface: Dr.Jit 1.5 reads local memory at the wrong place by an index that began as a
     # literal.)
     count = depth + path.n_nulls + dr.select(is_solid & ~is_glass, mi.UInt32(0), 1)
     dim = CAMERA_DIMS + VERTEX_DIMS * dr.minimum(count - 1, _MAX_COUNT)
@@ -179,7 +179,8 @@ def _next_vertex(context: PathContext, path: PathState, active: Any) -> Vertex:
     is_rough = is_solid & ~is_glass & ~is_mirror
     splits, is_behind = None, None
     if context.splits_glass and is_pane is not None:
-        # Of things the first face mirrors, for both of their wall: to draw at each would be speckle.
+        # For solid glass the first face reflects for both walls: random choices at each would be
+        # noisy.
         straight = is_glass & (path.bsdf_pdf <= 0)
         splits = is_pane | (straight & ~path.met_glass)
         is_behind = straight & ~splits
@@ -209,7 +210,7 @@ def _choose_lobe(emitters: Emitters, vertex: Vertex, path: PathState, u: Any) ->
 
 
 def _mirrored_share(emitters: Emitters, reflectance: Any) -> Any:
-    """How many of the rays at a pane are reflected: as many as bring light, about, half at most."""
+    """Share of rays reflected at a pane: about in proportion to the light, at most half."""
     wanted = reflectance / (reflectance + (1 - reflectance) * emitters.pane_odds)
     return dr.minimum(wanted, dr.maximum(reflectance, _MAX_PANE))
 
@@ -217,7 +218,7 @@ def _mirrored_share(emitters: Emitters, reflectance: Any) -> Any:
 def _mirrored_ray(
     emitters: Emitters, vertex: Vertex, path: PathState, u: Any, active: Any
 ) -> MirroredRay:
-    """What glass sends back of a path that goes through it: of a pane by chance where that is faint."""
+    """Reflection of a path that passes through glass: of a pane by chance if it is faint."""
     si, reflectance = vertex.si, thin_glass_reflectance(vertex.wi.z)
     d = path.d - 2 * dr.dot(si.n, path.d) * si.n
     is_pane, of_pane = vertex.is_pane, _mirrored_share(emitters, reflectance)
@@ -270,7 +271,7 @@ def _emitted_light(
         sun, sun_pdf = emitters.eval_sun(chances, path.d, asked)
         is_seen = False if emitters.outside is None else ~by_scatter
         dome, dome_pdf = emitters.eval_dome(chances, here, path.d, asked, missed, is_seen)
-        # Where a portal is asked for, count only what is drawn through it.
+        # If only a portal counts, add only directions drawn through it.
         is_asked = (asked > NO_EMITTERS) & (asked < FIRST_PORTAL)
         sees_sky = missed & counts & emitters.has_sky & is_asked
         if emitters.outside is not None:
@@ -278,7 +279,7 @@ def _emitted_light(
             sun *= emitters.sun.past_outside(path.o, path.d, meets_sun)
         sky = sun * balanced(sun_pdf) + dome * balanced(dome_pdf)
         if emitters.outside is not None:
-            # Rays that nothing scattered see what lies outside; for others its light is in the dome.
+            # Unscattered rays see the surroundings; for others their light is in the dome.
             beyond = emitters.outside.seen(context.scene, path.o, path.d, missed & ~by_scatter)
             sky = dr.select(beyond.valid, beyond.radiance, sky)
             sees_sky |= beyond.valid & counts & is_asked
@@ -337,7 +338,7 @@ def _follow(step: _Step, scattered: ScatteredRay) -> tuple[PathState, DirectionP
         odds = target_technique_share(guiding) / (ratio * scattered.pdf)
     beta = dr.select(bounced, beta / ratio, beta)
 
-    # Keep how the direction was drawn, for the weight of what it meets.
+    # Keep the sampling pdf of the direction, for the weight of its hit.
     pdf, is_independent = scattered.pdf * strategy.bsdf_share, strategy.is_view_independent
     if is_independent is not False:
         independent = view_independent_pdf(si.bsdf, si.ng, scattered.d)

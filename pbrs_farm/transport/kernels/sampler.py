@@ -24,9 +24,8 @@ VERTEX_DIMS = 10  # of each vertex (path_step.py)
 class Sampler(Protocol):
     """Uniform numbers of one path in [0, 1), each a pure function of stream, sample and dimension.
 
-    Dimensions are given out by hand: each decision of a vertex has one of its own
-    (direct_light.py, path_step.py), and dim may differ from lane to lane. Asking twice gives
-    the same number.
+    Dimensions are assigned by hand: each decision of a vertex has its own (direct_light.py,
+    path_step.py), and dim may differ between lanes. Repeated calls return the same number.
     """
 
     def get_1d(self, dim: Any) -> Any:
@@ -70,7 +69,7 @@ class SobolSampler:
 
     def get_2d(self, dim: Any) -> Any:
         """Point2f of dimensions dim and dim + 1."""
-        # Shuffle the index once for the pair, scramble each dimension by itself.
+        # Shuffle the index once for the pair, scramble each dimension separately.
         seed = hash32(self._key ^ hash32(mi.UInt32(dim) + 0x85EBCA6B))
         index = dr.brev(_laine_karras(self._reversed, seed))
         x = dr.brev(_laine_karras(index, hash32(seed + 0x68BC21EB)))
@@ -88,7 +87,7 @@ def device_array(kind: Any, values: Any) -> Any:
     copy = dr.empty(kind, len(wrapped))
     dr.scatter(copy, wrapped, dr.arange(mi.UInt32, len(wrapped)))
     dr.eval(copy)
-    dr.sync_thread()  # before NumPy frees what is copied
+    dr.sync_thread()  # before NumPy frees the copied arrays
     return copy
 
 
@@ -165,7 +164,7 @@ def sample_alias_table(alias: Any, first: Any, count: Any, u: Any, active: Any) 
     row = dr.gather(mi.Vector2f, alias, first + i, active)
     other = dr.reinterpret_array(mi.UInt32, row[1])
     stay = f < row[0]
-    # Stretch what is left of u to [0, 1).
+    # Stretch the remainder of u to [0, 1).
     again = dr.select(stay, f / row[0], (f - row[0]) / (1 - row[0]))
     return dr.select(stay, i, other), dr.clip(again, 0, 1 - 1e-7)
 

@@ -1,12 +1,11 @@
-"""Russian roulette of shadow rays: one that can bring little is cast by chance; kernels, no effects.
+"""Russian roulette of shadow rays: rays with a small possible contribution are cast by chance; kernels, no effects.
 
-A shadow ray costs the same whatever it can bring. What it would bring if nothing stood in its
-way is known before it is cast, and how often one like it arrives is, too (arrival_rates.py).
-Where the product of both lies below a threshold it is cast with a chance in proportion to that,
-and what it brings is divided by the chance, so that the mean stays (Arvo and Kirk 1990). The
-chance has a least value: without it dark corners of a bright view had spots as bright as the
-threshold. What a ray cast by chance brings is at most the threshold over the share of such rays
-that arrives (0.02 at least), and at most ten times what it would bring if all were cast.
+A shadow ray costs the same whatever its contribution. Its unoccluded contribution is known before it is
+cast, and so is its arrival rate (arrival_rates.py). If their product is below a threshold, the ray is cast
+with a probability in proportion to it, and its contribution is divided by the probability, which keeps
+the mean (Arvo and Kirk 1990). The probability has a lower bound: without one, dark corners of a bright
+view had spots as bright as the threshold. The contribution of a ray cast by chance is at most the
+threshold over its arrival rate (at least 0.02), and at most ten times its unweighted one.
 """
 
 from __future__ import annotations
@@ -33,9 +32,9 @@ class ShadowRoulette(NamedTuple):
     u: Any  # random number
 
     def cast_by_chance(self, unshadowed: Any, rate: Any) -> tuple[Any, Any]:
-        """(Bool: the ray is cast, chance of that) by what it would bring, before the throughput.
+        """(Bool: the ray is cast, its probability), from its unoccluded contribution before throughput.
 
-        rate: share of such rays that arrive.
+        rate: arrival rate of such rays.
         """
         expected = luminance(self.beta * unshadowed) * rate
         chance = dr.maximum(expected / self.threshold, LEAST_CHANCE)

@@ -28,7 +28,7 @@ class SunDisc:
     """The sun of a sky on the device."""
 
     def __init__(self, sky: Sky) -> None:
-        self.outside: Outside | None = None  # what may stand before it, set where there is any
+        self.outside: Outside | None = None  # surroundings that may occlude it, if any
         cos_max = math.cos(sky.sun_half_angle_rad)
         # The disc's radiance gives its irradiance: integral of the cosine over the cone.
         projected = math.pi * math.sin(sky.sun_half_angle_rad) ** 2
@@ -45,9 +45,9 @@ class SunDisc:
         return self._rgb / self.pdf
 
     def past_outside(self, o: Any, d: Any, active: Any) -> Any:
-        """Color3f of its light that what lies outside lets through to o; 1 where there is none.
+        """Color3f transmittance of the surroundings towards the sun at o; 1 without surroundings.
 
-        o: Point3f; d: unit Vector3f to the sun. Lanes that are not active mean nothing.
+        o: Point3f; d: unit Vector3f to the sun. Undefined for inactive lanes.
         """
         return mi.Color3f(1) if self.outside is None else self.outside.lets_through(o, d, active)
 

@@ -79,7 +79,7 @@ def trace_lit_points(
     lit = rays.lit & inside & (at == cell)
     pdf = dr.gather(mi.Float, pdfs, at, lit)
     si, f0 = rays.si, rgb(rays.si.bsdf.f0)
-    # Write each point's row, and keep those that are lit.
+    # Write each point's row, and keep the lit ones.
     normals = *xyz(si.ng), pdf, *xyz(si.n_interpolated), si.bsdf.alpha
     light = *rgb(rays.light), f0[0], *xyz(rays.d), f0[1], *rgb(rays.irradiance), f0[2]
     columns = [*xyz(si.p), rays.cos_sun, *normals, *light]
@@ -95,10 +95,10 @@ def trace_lit_points(
 def value_cells(
     scene: DeviceScene, sun: SunDisc, plane: SunPlane, grid: VoxelGrid, wanted: Any, seed: int
 ) -> tuple[F32, F32]:
-    """(places (C, 3) that a ray through each cell lights, worth (C,) of that light).
+    """(points (C, 3) lit by a ray through each cell, value (C,) of that light).
 
-    wanted: (voxels,) how much light in each of them matters. A point's worth is what it reflects,
-    times that of the voxels where it falls.
+    wanted: (voxels,) importance of light in each. A point's value is its reflected light times the
+    importance of the voxels that receive it.
     """
     key = stream_key(dr.opaque(mi.UInt32, _CELLS), dr.opaque(mi.UInt32, seed & 0xFFFFFFFF))
     cell = dr.arange(mi.UInt32, plane.n_cells)

@@ -82,10 +82,10 @@ class SunlitPoints:
             self._used = find_used_cells(scene, sun, self._grid, vertices)
 
     def trace(self, scene: DeviceScene, sun: SunDisc, n_samples: int, seed: int) -> None:
-        """Trace rays from the sun for a launch of n_samples, other ones for each seed; 0 = no points.
+        """Trace rays from the sun for a launch of n_samples, different ones for each seed; 0 = no points.
 
-        Does nothing where view, n_samples and seed are those of the last call. Call it before the
-        launch that uses the points: it runs kernels of its own.
+        Does nothing if view, n_samples and seed equal those of the last call. Call it before the launch that
+        uses the points: it runs separate kernels.
         """
         vertices = self._vertices if n_samples > 0 and sun.shines else None
         before, self._traced = self._traced, (vertices, n_samples, seed)
@@ -98,7 +98,7 @@ class SunlitPoints:
             self._set_points(trace_points(scene, sun, self._used, n_samples, seed))
 
     def chances(self, p: Any, active: Any) -> list[Any]:
-        """The chance of each group at p, a list entry each; all 0 where there are none."""
+        """The probability of each group at p, one list entry each; all 0 without points."""
         rates = self._arrival.of_sunlit(p, active)
         weights, total = [], mi.Float(0)
         for group, rate in zip(self._groups, rates, strict=True):
@@ -108,10 +108,10 @@ class SunlitPoints:
         return [weight / dr.maximum(total, 1e-30) for weight in weights]
 
     def sample(self, p: Any, u: Any, active: Any) -> SunlitSample:
-        """One of the points, as it is seen from p.
+        """One of the points, as seen from p.
 
-        p: Point3f; u: Float in [0, 1). The radiance is what the point reflects towards p, but a
-        wall between is not known: cast a shadow ray. Not valid where there are no points.
+        p: Point3f; u: Float in [0, 1). The radiance is reflected towards p, ignoring occlusion: cast a shadow
+        ray. Not valid without points.
         """
         # Choose a group, then one of its points; both in order, so that u's strata are places.
         chances = self.chances(p, active)
@@ -125,7 +125,7 @@ class SunlitPoints:
         at = first + dr.minimum(mi.UInt32(rest * mi.Float(count)), count - 1)
         rows = gather_packets(self._rows, at, POINT_FLOATS // 4, active)
 
-        # Turn what it reflects to p.
+        # Evaluate its reflection towards p.
         to = point(rows[0]) - p
         distance = dr.norm(to)
         d = to / distance
@@ -144,10 +144,10 @@ class SunlitPoints:
     def share_of_sun(
         self, ray: tuple[Any, Any], si: SurfaceInteraction, d: Any, active: Any
     ) -> Any:
-        """What share sample() takes over of what si reflects of the sun.
+        """Share of the sun's light reflected by si that sample() takes over.
 
-        ray: that has met si: where it was drawn, and the pdf per solid angle of the surface there, 0 =
-        a mirror or the camera. d: unit direction to the sun.
+        ray: to si: its origin, and the pdf per solid angle of the surface there, 0 = a mirror or the camera.
+        d: unit direction to the sun.
         """
         p, p_bsdf = ray
         at, inside = self._plane.cell(si.p, d)
@@ -182,6 +182,6 @@ class SunlitPoints:
 def _pdf(y: _Point, w: Any, distance: Any) -> Any:
     """Pdf of y per solid angle at a vertex in direction w from it, by its group; 0 = not drawn so."""
     cos = dr.dot(y.ng, w)
-    # Leave out where the shading normal would be bent, by what it is seen from.
+    # Skip points whose shading normal would be bent, depending on the viewer.
     drawn = (cos > 1e-4) & (dr.dot(y.n, w) > LEAST_COS) & (y.cos_sun > 0)
     return dr.select(drawn, y.plane_pdf * y.cos_sun * dr.square(distance) / cos, 0)

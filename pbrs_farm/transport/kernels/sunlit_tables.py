@@ -1,9 +1,8 @@
-"""The cells of the sun's plane that matter to a view, and tables of the points that their light falls on; kernels.
+"""Cells of the sun's plane that matter to a view, and tables of the points that they light; kernels.
 
-A ray from the sun through each cell of a plane that faces it (sun.py) estimates what the cell's light is
-worth to a view: what it brings, by a few rays more, to the voxels that the pilot's paths have been to.
-Cells get rays in proportion to their worth. The places that they light are put into groups, near ones
-together.
+A ray from the sun through each cell of a plane facing it (sun.py) estimates the value of the cell's light
+for a view: its contribution, by a few more rays, to the voxels visited by the pilot's paths. Cells get rays
+in proportion to their value. The lit points are grouped by proximity.
 """
 
 from __future__ import annotations
@@ -37,7 +36,7 @@ from pbrs_farm.transport.kernels.voxel_grid import VoxelGrid
 
 _MIN_RAYS, _MAX_RAYS = 1 << 13, 1 << 16  # of a launch
 _SAMPLES_A_RAY: Final = 16
-_LEAST_LIT: Final = 32  # points of a group, or it has none
+_LEAST_LIT: Final = 32  # minimum points of a group
 _CELL_SEED: Final = 0x5CE11  # parts the rays that value the cells from those of points
 _SMOOTH: Final = 3  # cells, edge of the window over which a cell's worth is averaged
 _ROUNDS: Final = 8  # of grouping
@@ -75,8 +74,8 @@ def no_points() -> SunlitTables:
 def find_used_cells(scene: DeviceScene, sun: SunDisc, grid: VoxelGrid, vertices: I64) -> UsedCells:
     """The cells whose light matters. vertices: (voxels,) of a view's paths, not all 0.
 
-    vertices: counts of a first pass. Deterministic: its rays have a seed of their own. Where no ray
-    of the sun lights anything all shares are 0.
+    vertices: counts of a first pass. Deterministic: its rays have a separate seed. If no ray of the sun
+    lights anything, all shares are 0.
     """
     # Cover the voxels that paths have been to, as the sun sees them.
     centres = grid.centres()[vertices > 0]
@@ -142,7 +141,7 @@ def trace_points(
 def _tables_of_points(plane: SunPlane, rows: F32, groups: I64, cells: F32) -> SunlitTables:
     counts = np.bincount(groups, minlength=MAX_SUNLIT)
     first = np.concatenate([[0], np.cumsum(counts)])
-    # Flux of a point: what it reflects, over how often it is drawn.
+    # Flux of a point: its reflected light over its sampling density.
     often = np.maximum(rows[:, PLANE_PDF] * rows[:, COS_SUN], 1e-12).astype(np.float64)
     by_coat = rows[:, IRRADIANCE] * rows[:, F0] * rows[:, [COS_SUN]] / np.pi
     by_coat *= rows[:, [ALPHA]] > 0

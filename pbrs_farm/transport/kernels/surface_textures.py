@@ -14,7 +14,7 @@ _MIN_UV_AREA = 1e-6  # of a triangle's uvs, over the squares of their edges: les
 
 
 class Triangle(NamedTuple):
-    """What the tangent frame of a face depends on."""
+    """Inputs of a face's tangent frame."""
 
     e1: Any  # Vector3f, edges from its first corner
     e2: Any
@@ -23,7 +23,7 @@ class Triangle(NamedTuple):
 
 
 class ShadedSurface(NamedTuple):
-    """What maps change of a surface, seen from its front."""
+    """Surface properties after maps, seen from the front."""
 
     normal: Any  # unit shading normal
     alpha: Any  # GGX roughness, 0 = no coat
@@ -97,7 +97,7 @@ def _perturbed_normal(n: Any, triangle: Triangle, x: Any, y: Any) -> Any:
     area = a.x * b.y - a.y * b.x
     side = dr.select(area < 0, mi.Float(-1), 1)
     t = side * (b.y * e1 - a.y * e2)
-    # Make the tangent stand upright on the shading normal.
+    # Make the tangent perpendicular to the shading normal.
     t -= n * dr.dot(n, t)
     length2 = dr.squared_norm(t)
     t *= dr.rsqrt(length2)

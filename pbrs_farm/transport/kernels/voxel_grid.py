@@ -42,10 +42,9 @@ class VoxelGrid:
         return np.asarray(self._host_low + (at + 0.5) * self.edge_m)
 
     def with_neighbours(self, rows: NDArray[np.unsignedinteger]) -> NDArray[np.unsignedinteger]:
-        """(voxels, K) sums of rows over each voxel and the 26 around it, as far as there are any.
+        """(voxels, K) sums of rows over each voxel and its (up to 26) neighbours.
 
-        rows: (voxels, K) unsigned; sums keep the type, and wrap as it does. Borders have fewer
-        neighbours.
+        rows: (voxels, K) unsigned; sums keep the type, and may wrap around.
         """
         sums = rows.reshape(*self._host_shape, -1)
         for axis in range(3):

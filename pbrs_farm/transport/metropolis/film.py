@@ -1,4 +1,4 @@
-"""What Metropolis's chains share: states, target function, and the film; kernels, no effects."""
+"""Shared by Metropolis's chains: states, target function, and the film; kernels, no effects."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Film(NamedTuple):
 
 
 class ChainContext(NamedTuple):
-    """What all chains share."""
+    """Inputs shared by all chains."""
 
     paths: PathContext
     camera: DeviceCamera | LensCamera
@@ -36,21 +36,21 @@ class ChainContext(NamedTuple):
 
 
 class Chains(NamedTuple):
-    """Where N chains stand."""
+    """Current states of N chains."""
 
     samples: Any  # (STORED_DIMS * N,) numbers in the unit cube, dimension by dimension
     light: Any  # Color3f
     target: Any  # target function of the light
     pixel: Any  # UInt32
-    shared: Any  # share of the light that is shown to other pixels, 0 = all its own pixel's
+    shared: Any  # share of the light reconnected to other pixels, 0 = all stays with its own pixel
     suffixes: Any  # (SUFFIX_FLOATS * N,), column by column (suffixes.py)
 
 
 def sample_film(film: Film, u: Any, is_tent: Any) -> tuple[Any, Any, Any]:
-    """(pixel index, its corner in pixels, offset spread by the filter) of two numbers.
+    """(pixel index, its corner in pixels, offset spread by the filter) from two numbers.
 
-    u: Point2f in [0, 1)^2, over the whole picture; a mutation of it moves smoothly from pixel to
-    pixel. `sample_pixel` is for a pixel that is given.
+    u: Point2f in [0, 1)^2, over the whole picture; a mutation of it moves smoothly from pixel to pixel.
+    `sample_pixel` is for a given pixel.
     """
     x, y = u.x * mi.Float(film.width), u.y * mi.Float(film.height)
     column = dr.minimum(mi.UInt32(x), film.width - 1)
@@ -67,10 +67,10 @@ def sample_pixel(film: Film, pixel: Any, u: Any, is_tent: Any) -> tuple[Any, Any
 
 
 def target_function(film: Film, pixel: Any, light: Any, active: Any = True) -> Any:
-    """What chains are distributed by: the luminance of light at a pixel times its importance.
+    """Target density of the chains: the luminance of light at a pixel times its importance.
 
-    light: Color3f of a path; pixel: UInt32. A scalar, >= 0: Metropolis light transport needs no
-    colour to decide by.
+    light: Color3f of a path; pixel: UInt32. A scalar, >= 0: Metropolis light transport decides without
+    colour.
     """
     return luminance(light) * dr.gather(mi.Float, film.importance, pixel, active)
 

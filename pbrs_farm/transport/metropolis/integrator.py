@@ -10,12 +10,12 @@ function, the luminance of F times the importance of its pixel, each of many cha
 
 so that the film converges to F, times I / b, with b the mean of I, known from the bootstrap and
 from all large steps (markov_chains.py). Chains start at bootstrap paths drawn in proportion to I.
-The importance is about 1 / the light expected at a pixel, from paths of its own (Veach's two
-stages, 1997): dark corners get their share.
+The importance is about 1 / the light expected at a pixel, from separate paths (Veach's two stages,
+1997): dark corners get their share.
 
-Instead of 3., a path whose first two vertices are rough and see each other is shown, every few
-steps, to a thousand other pixels that see its second vertex too (reconnection.py); what two close
-vertices send each other stays mostly with 3.
+Instead of 3., a path whose first two vertices are rough and mutually visible is reconnected, every few
+steps, to a thousand other pixels that see its second vertex too (reconnection.py); light between two
+close vertices mostly stays with 3.
 """
 
 from __future__ import annotations
@@ -165,7 +165,7 @@ class ChainRun:
         return Estimate(halves, mean, totals.n_accepted / n_mutations, n_mutations, totals.n_bad)
 
     def state(self) -> Arrays:
-        """What chain_run goes on from: film, importance, chains and sums."""
+        """State from which chain_run resumes: film, importance, chains and sums."""
         film, t = self._context.film, self._totals
         sums = np.array([t.target, t.n_paths, t.n_accepted, t.n_bad, t.n_steps], np.float64)
         chains = {name: getattr(self._chains, name).numpy() for name in Chains._fields}

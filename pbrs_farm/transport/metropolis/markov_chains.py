@@ -82,7 +82,7 @@ class MutatedSampler:
 
 @dataclass
 class _State:
-    """A path as a chain stands at it (x in the loop) or proposes it (y)."""
+    """The current path of a chain (x in the loop) or its proposal (y)."""
 
     light: Any
     target: Any
@@ -121,12 +121,12 @@ class Mutations(NamedTuple):
 
 @dr.syntax
 def mutate(context: ChainContext, chains: Chains, how: Mutations) -> tuple[Chains, ChainSums]:
-    """Make the steps of every chain; splat the paths that are their own pixel's alone."""
+    """Advance every chain; splat paths that only concern their own pixel."""
     film, lane = context.film, dr.arange(mi.UInt32, dr.width(chains.target))
     x_samples = _load(chains.samples, STORED_DIMS, lane)
     x_suffix = _load(chains.suffixes, SUFFIX_FLOATS, lane)
     y_suffix = dr.alloc_local(mi.Float, SUFFIX_FLOATS)
-    # Bootstrap paths have a share for other pixels even where there are none to share with.
+    # Bootstrap paths have a shared part even if there are no pixels to share it with.
     shared = dr.select(how.reconnects, chains.shared, 0)
     x = _State(chains.light, chains.target, chains.pixel, mi.Float(shared), mi.Float(0))
     corner = mi.Point2f(mi.Float(0) * mi.Float(lane), 0)
@@ -154,7 +154,7 @@ def mutate(context: ChainContext, chains: Chains, how: Mutations) -> tuple[Chain
         accept = done & (unit_float(hash32(key ^ 0x2545F491)) < a)
         sums.add(proposed.target, done & is_large, accept, done & ~good)
 
-        # 3. Splat the path that is left behind; move on, or stay.
+        # 3. Splat the replaced or rejected path; move, or stay.
         keeps_suffix = accept & (proposed.shared > 0)
         finish_suffix(y_suffix, proposed.light, y, keeps_suffix)
         x = _move(film, lane, x, proposed, a, accept, done)
@@ -176,7 +176,7 @@ def mutate(context: ChainContext, chains: Chains, how: Mutations) -> tuple[Chain
 
 @dr.syntax
 def draw_paths(context: ChainContext, sampler: HashedSampler, n: int) -> Chains:
-    """n independent paths, a lane each, as chains stand at them; their numbers are not kept."""
+    """n independent paths, one per lane, as chain states; their random numbers are not kept."""
     film = context.film
     is_tent = context.paths.fields.is_tent
     pixel, corner, at = sample_film(film, sampler.get_2d(mi.UInt32(0)), is_tent)
@@ -227,7 +227,7 @@ def _extend(
     following.beta *= weight
     alive &= result.guided_weight > 0
 
-    # Count the light of paths that are long enough.
+    # Count the light of sufficiently long paths.
     emitted = result.emitted_outdoor + result.emitted_indoor
     direct = result.direct_outdoor + result.direct_indoor
     emitted = dr.select(before + 1 >= least, emitted * weight, 0)
@@ -278,10 +278,10 @@ def _proposed_state(film: Film, y: SplitPath, pixel: Any, reconnects: Any) -> tu
 def _move(
     film: Film, chain: Any, x: _State, proposed: _State, a: Any, accept: Any, done: Any
 ) -> _State:
-    """Where a chain stands after a step that is accepted with probability a.
+    """State of a chain after a step that is accepted with probability a.
 
-    Splats what is left behind: the old path with all the weight it has gathered, or the rejected
-    one. The share that is for other pixels, too, waits for the round's end (reconnection.py).
+    Splats the replaced path with its accumulated weight, or the rejected one. The shared part waits for the
+    end of the round (reconnection.py).
     """
     x.weight += dr.select(done, 1 - a, 0)
     proposed.weight = a
@@ -291,7 +291,7 @@ def _move(
 
 
 def _splat_state(film: Film, chain: Any, state: _State, active: Any) -> None:
-    """Splat what is a state's own pixel's alone, brought from its target function to its weight."""
+    """Splat the unshared part of a state to its own pixel, scaled from its target function to its weight."""
     active = active & (state.target > 0) & (state.weight > 0) & (state.shared < 1)
     scale = state.weight * (1 - state.shared) / dr.select(state.target > 0, state.target, 1)
     splat(film, chain, state.pixel, state.light * scale, active)
@@ -333,7 +333,7 @@ def _copy(source: Any, target: Any, n: int, active: Any) -> Any:
 
 @dr.syntax
 def _record_round(how: Mutations, chain: Any, step: Any, x: _State, suffix: Any, done: Any) -> None:
-    """Leave what a chain stands at for reconnection, where its last step was a round's last one.
+    """Record a chain's state for reconnection after the last step of a round.
 
     step: the next one; done: whether a step has just ended.
     """

@@ -33,10 +33,10 @@ Runs = Mapping[Group, ChainRun]
 def render_groups(
     view: SampledView, checkpoint: RenderCheckpoint
 ) -> tuple[LightResult, dict[Group, Estimate]]:
-    """(direct light with the denoiser's guides, what the chains of each group found beyond it).
+    """(direct light with the denoiser's guides, each group's estimate of the remaining light by chains).
 
-    Without direct samples the chains find all light, and the first has none. Ends after
-    fields.mutations_per_pixel, earlier when fields.noise is reached, or with fields.time_budget_s.
+    Without direct samples the chains estimate all light. Ends after fields.mutations_per_pixel, earlier if
+    fields.noise is reached, or with fields.time_budget_s.
     """
     fields = view.fields
     budget = TimeBudget(fields.time_budget_s, checkpoint.spent_s)
@@ -79,7 +79,7 @@ def _chain_runs(view: SampledView, kept: Arrays) -> dict[Group, ChainRun]:
 
 
 def _rounds_per_launch(view: SampledView, runs: Runs) -> int:
-    """Rounds of the chains that are one launch; the picture is the same to 1e-5 whatever it is."""
+    """Rounds of the chains per launch; the picture is the same to 1e-5 for any number."""
     if view.fields.noise > 0 or view.fields.time_budget_s > 0:
         return 1  # either may end the chains after any round
     i = view.camera.intrinsics
@@ -88,7 +88,7 @@ def _rounds_per_launch(view: SampledView, runs: Runs) -> int:
 
 
 def rounds_of_a_launch(n_chains: int, n_pixels: int, chain_rounds: int) -> int:
-    """Rounds that are one launch: no more than chain_rounds of all chains, and groups of their own."""
+    """Rounds per launch: at most chain_rounds of all chains, each with its own groups."""
     return max(min(chain_rounds // n_chains, _PIXEL_ROUNDS // n_pixels), 1)
 
 
@@ -114,7 +114,7 @@ def _noise_left(view: SampledView, direct: LightResult, runs: Runs, n_steps: int
 
 
 def _estimate(view: SampledView, runs: Runs, group: Group) -> Estimate:
-    """What a group's chains have found; black where it has none."""
+    """Estimate of a group's chains; black without any."""
     if group in runs:
         return runs[group].estimate()
     i = view.camera.intrinsics

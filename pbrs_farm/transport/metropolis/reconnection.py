@@ -1,34 +1,34 @@
-"""Reconnection: one path's suffix seen from many pixels, for `metropolis`; kernels, no effects.
+"""Reconnection: one path's suffix connected to many pixels, for `metropolis`; kernels, no effects.
 
 A path is a prefix, from the eye to its first vertex x1, and a suffix, from its second vertex x2 on.
-Where both are rough and see each other, any other prefix x1' that sees x2 makes another path with
+If both are rough and mutually visible, any other prefix x1' that sees x2 makes another path with
 the same suffix. In the measure of (film, area at x2, direction out of x2) its contribution is
 
     K(x1') = B f1(x1' -> x2) cos1' cos2' / |x1' - x2|^2
              V(x1', x2) [ f2(-> lamp) S p2(-> x3) + f2(-> x3) T ]
 
-with B what reaches the eye from x1', V what thin glass between lets through (0 behind a wall), S
-the shadow ray's radiance over its pdf, T the light that arrives from x3, p2 the pdf of going
-there: the PSSMLT integrand times the pdfs of what the prefix no longer draws. The pixels are parted
-into random groups; a chain that stands at a path in proportion to its target function I stands as
-well at all prefixes j of its pixel's group, each with weight I_j, the target of K_j, over the
-group's sum (a Gibbs step over the prefix, every outcome counted at once: it keeps the distribution
-of the chain). So one suffix, hard to find, lights as many pixels as the group has, for one shadow
-ray each: the lens mutations of Veach and Guibas 1997, all outcomes at once.
+with B the throughput from x1' to the eye, V the transmittance of thin glass between (0 behind a
+wall), S the shadow ray's radiance over its pdf, T the radiance from x3, p2 the pdf of sampling x3:
+the PSSMLT integrand times the pdfs that the prefix no longer samples. The pixels are partitioned
+into random groups; a chain at a path, distributed by its target function I, is equally at all
+prefixes j of its pixel's group, each with weight I_j, the target of K_j, over the group's sum (a
+Gibbs step over the prefix with all outcomes counted, which preserves the chain's distribution). So
+one suffix, hard to find, lights all pixels of the group, for one shadow ray each: the lens mutations
+of Veach and Guibas 1997, with all outcomes.
 
-K has no bound where x1' and x2 are close. So a path's light is parted in two: the share
+K is unbounded for close x1' and x2. So a path's light is split: the share
 
     s(x1', x2) = min(1, MAX_SHARED_PDF / p),   p = p1(x1' -> x2) cos2' / |x1' - x2|^2,
 
-p the pdf by which x1' draws x2 per area, is reconnected, s_j K_j at every prefix j of the group,
+p the pdf by which x1' samples x2 per area, is reconnected, s_j K_j at every prefix j of the group,
 times s of the chain's own; the rest, 1 - s, stays with the path's own pixel. Each share keeps its
-mean, so no distance is left out, and s K is bounded (Keller's instant radiosity and its bounded
+mean, so no distance is omitted, and s K is bounded (Keller's instant radiosity and its bounded
 geometry terms, Kollig and Keller 2006, with the rest by paths of the chain).
 
 Rays are guided (guided_rays.py): p2 is the pdf by all techniques, of which only the surface's own
-depends on the prefix. A ray that was aimed at a face and met another keeps p2 = 1 and has no T.
-Thin glass and cut-outs between x1 and x2 let a suffix through, with the share of the light they let
-through. A mirror at x1 or a reflection between the two leave a path to its own pixel.
+depends on the prefix. A ray aimed at one face that hit another has p2 = 1 and no T. Thin glass and
+cut-outs between x1 and x2 transmit a suffix with their transmittance. With a mirror at x1 or a
+reflection between the two, a path stays with its own pixel.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ class Rounds(NamedTuple):
 
 
 class _Launch(NamedTuple):
-    """What the lanes of a launch share."""
+    """Inputs shared by the lanes of a launch."""
 
     scene: DeviceScene
     film: Film
@@ -129,7 +129,7 @@ def _lane_of(
     n_pixels = launch.film.width * launch.film.height
     number, chain = record // records.n_chains, record % records.n_chains
     own_pixel = dr.gather(mi.UInt32, records.pixel, record)
-    # Find the pixels of its own pixel's group in that round.
+    # Find the pixels of its own group in that round.
     slot = dr.gather(mi.UInt32, slot_of_pixel, number * n_pixels + own_pixel)
     first_slot = number * n_slots + slot - slot % launch.n
     # Let neighbouring chains take different sets: they are even in number, so that the film's
@@ -161,7 +161,7 @@ def _light_of_pixels(launch: _Launch, lane: _Lane, max_n: int) -> tuple[Any, Any
         x1 = gather_packets(launch.prefix_rows, row, PREFIX_PACKETS, is_pixel)
         others = _shared_light(launch.scene, x1, lane.x2, is_pixel & ~is_own)
         value = dr.select(is_own, colour(lane.x2[8]) * lane.shared, others)
-        # Leave out what is not finite.
+        # Skip non-finite values.
         target = target_function(launch.film, pixel, value, is_pixel)
         good = (target > 0) & dr.isfinite(target)
         total += dr.select(good, target, 0)
@@ -217,7 +217,7 @@ def _shared_light(scene: DeviceScene, x1: list[Any], x2: list[Any], active: Any)
 
 
 def _scattered_suffix(x2: list[Any], ng: Any, d: Any) -> tuple[Any, Any]:
-    """(light that a suffix scatters back along d, pdf of its own direction at x2)."""
+    """(light scattered back by a suffix along d, pdf of its own direction at x2)."""
     bsdf, frame = _bsdf(x2), mi.Frame3f(bend_normal(vector(x2[1]), d))
     wi = frame.to_local(-d)
     wi.z = dr.maximum(wi.z, 1e-4)

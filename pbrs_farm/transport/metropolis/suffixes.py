@@ -20,7 +20,7 @@ SUFFIX_FLOATS: Final = 36
 SUFFIX_PACKETS: Final = SUFFIX_FLOATS // 4
 MAX_SHARED_PDF: Final = 4.0  # 1 / m2; by a matte surface, 0.28 m straight before it
 # Columns of a suffix that are written one by one; record_suffix lists the others.
-# At the end _PDFS holds the share of p2 that the surface draws, _GUIDED_PDF the rest of p2.
+# At the end _PDFS holds the share of p2 drawn by the surface, _GUIDED_PDF the rest of p2.
 _PDFS, _ARRIVING, _EMITTER_Z, _OWN_LIGHT, _GUIDED_PDF = 3, 28, 31, 32, 35
 
 
@@ -50,7 +50,7 @@ class SuffixRecords(NamedTuple):
 
     rows: Any  # (records * SUFFIX_FLOATS,)
     pixel: Any  # UInt32
-    shared: Any  # share of the light that is shown to other pixels
+    shared: Any  # share of the light reconnected to other pixels
     is_shared: Any  # Bool: any of it
     n_chains: Any  # UInt32, opaque
 
@@ -106,12 +106,12 @@ def record_suffix(
 
 
 def shared_share(area_pdf: Any) -> Any:
-    """Share of the light between two vertices that is reconnected: little where they are close."""
+    """Share of the light between two vertices to reconnect: small if they are close."""
     return MAX_SHARED_PDF / dr.maximum(area_pdf, MAX_SHARED_PDF)
 
 
 def finish_suffix(suffix: Any, light: Any, split: SplitPath, active: Any) -> None:
-    """Add what is known at a path's end: its light, what arrived at x2 from x3 (T), p2's parts."""
+    """Add the data known at a path's end: its light, the light at x2 from x3 (T), p2's parts."""
     # Find the pdf of leaving x2: share * bsdf + guided; of a ray that missed its target, 1.
     second, weight = split.second, split.suffix_weight
     is_known = weight > 0

@@ -76,7 +76,7 @@ def area_emitters_of_house(
 
 
 def _faces_by_surface(geometry: Geometry, keep: Bools) -> dict[int, I64]:
-    """Number of a surface -> its faces that are kept; a surface's faces follow one another."""
+    """Number of a surface -> its kept faces; a surface's faces are consecutive."""
     numbers, starts = np.unique(geometry.face_surface, return_index=True)
     runs = np.split(np.arange(len(geometry.face_surface)), starts[1:])
     found = {int(n): faces[keep[faces]] for n, faces in zip(numbers, runs, strict=True)}

@@ -15,7 +15,9 @@ from pbrs_farm.core.arrays import F32, F64
 from pbrs_farm.core.mesh import face_areas, unit_normals
 
 _TOLERANCE_M: Final = 1e-5  # what float32 leaves of equal places far from the origin
-_MAX_FACES: Final = 4096  # of a lamp that is looked at: every face is held against every corner
+_MAX_FACES: Final = (
+    4096  # maximum faces of a lamp to test: every face is compared with every corner
+)
 
 
 def symmetry_row(corners: F64) -> F32:
@@ -29,7 +31,7 @@ def symmetry_row(corners: F64) -> F32:
     row[:3] = centre
     if len(corners) > _MAX_FACES:
         return row
-    # Ask whether every corner has its opposite, and no corner lies beyond a face's plane.
+    # Test that every corner has its opposite, and no corner is outside a face's plane.
     places = np.unique((corners - centre).reshape(-1, 3), axis=0)
     if np.asarray(cKDTree(places).query(-places)[0]).max() > _TOLERANCE_M:
         return row

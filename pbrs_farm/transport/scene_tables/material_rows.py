@@ -45,7 +45,7 @@ def material_rows(house: House, packed: TextureAtlas, recipe: Recipe) -> tuple[F
 
 
 def max_albedo(recipe: Recipe) -> float:
-    """What Kd times its texture is held to, in each of R, G and B, under a recipe."""
+    """Upper bound on Kd times its texture, in each of R, G and B, under a recipe."""
     return MAX_ALBEDO if recipe.materials.preset == "physical" else 1.0
 
 
@@ -78,7 +78,7 @@ def _physical(material: Material, recipe: Recipe) -> tuple[F32, bool]:
         row[F0], row[KIND] = mirror_reflectance(material), MIRROR
         return row, False
     if material.kind is MaterialKind.GLASS:
-        # Tint by the glass's own colour as much as it is opaque.
+        # Tint by the glass's own colour in proportion to its opacity.
         row[TAU], row[KIND] = 1 - material.opacity * (1 - kd), GLASS
         return row, False
     if material.kind is MaterialKind.SHADE:

@@ -32,7 +32,7 @@ def portals_of_house(house: House) -> F64:
 
 
 def panes_of_house(house: House) -> House | None:
-    """The house's window panes alone, as clear thin glass; None where it has none."""
+    """The house's window panes alone, as clear thin glass; None without panes."""
     is_pane = [m.kind is MaterialKind.PANE for m in house.materials]
     items = [
         replace(i, surfaces=tuple(s for s in i.surfaces if is_pane[s.material]), lights=())

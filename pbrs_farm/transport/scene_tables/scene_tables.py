@@ -60,7 +60,9 @@ class SceneTables:
     lamp_faces: NDArray[np.uint32]  # (T,) face
     lamp_areas: F32  # (T,) running sum of areas over the lamp's area
     lamp_symmetries: F32  # (L, 4) as symmetry_row; no side where light may pass its faces
-    kept: Bools  # (G,) of the geometry's faces without panes: those that are here, in their order
+    kept: (
+        Bools  # (G,) mask of the geometry's faces that are in the tables (all but panes), in order
+    )
     notes: tuple[str, ...]  # what had to be changed or left out
 
 
@@ -123,9 +125,9 @@ def tables_from_house(
 
 
 def moved_rows(geometry: Geometry, tables: SceneTables, faces: I64) -> F32:
-    """(N, FACE_FLOATS) rows of faces (N,) of tables, whose vertices lie as a geometry has them now.
+    """(N, FACE_FLOATS) rows of faces (N,) of tables, with the vertices of a geometry.
 
-    geometry: of the same house, with vertices elsewhere. What guiding fills is 0 in them.
+    geometry: of the same house, with moved vertices. Guiding's entries are 0.
     """
     return _face_rows(geometry, tables.faces[faces])
 
@@ -158,7 +160,7 @@ def _fill_rows(rows: F32, geometry: Geometry, faces: I32) -> None:
     e1, e2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     flat = unit_normals(corners)
 
-    # Take the face's own normal where a vertex has none or one that is not of unit length.
+    # Use the face's own normal where a vertex normal is missing or not of unit length.
     normals = geometry.normals[faces].astype(np.float64)
     of_face = np.broadcast_to(flat[:, None], normals.shape)
     with np.errstate(invalid="ignore", divide="ignore"):

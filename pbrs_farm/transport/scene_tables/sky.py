@@ -81,7 +81,7 @@ class Sky:
         return LM_PER_W * float(self.sun_irradiance @ LUMINANCE) * up
 
     def facts(self) -> dict[str, Any]:
-        """What view.json says of the sky."""
+        """Entries for view.json."""
         x, y, z = (float(v) for v in self.sun_direction)
         return {
             "name": self.name,
@@ -193,9 +193,9 @@ def sun_of_hour(hour: float, latitude_deg: float, day_of_year: int) -> tuple[flo
 
 
 def clear_sky_lx(elevation_rad: float) -> float:
-    """Illuminance of open level ground by a clear sky without its sun, which stands so high.
+    """Illuminance of open horizontal ground by a clear sky without its sun, by the sun's elevation.
 
-    No moon and no town: 14,000 lx with the sun at the zenith, 600 at the horizon, 3.4 at 6 degrees
+    Without moon or city light: 14,000 lx with the sun at the zenith, 600 at the horizon, 3.4 at 6 degrees
     below, 0.0006 by night.
 
         >>> round(clear_sky_lx(0.0))

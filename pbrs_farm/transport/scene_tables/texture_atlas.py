@@ -26,12 +26,12 @@ MapKey = tuple[str | None, str | None, float]  # roughness map, normal map, its 
 NORMAL_ZERO: Final = 1024  # of eleven bits: a normal's component is (bits - 1024) / 1023
 
 _MAX_TEXTURE_PX: Final = 2048
-_ROWS_AT_ONCE: Final = 64  # of a picture that is made smaller, against memory
+_ROWS_AT_ONCE: Final = 64  # of a downscaled picture, to bound memory
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TextureAtlas:
-    """All textures in one list of texels; texel 0 is none of them."""
+    """All textures in one list of texels; texel 0 belongs to none."""
 
     texels: NDArray[np.uint32]
     slots: dict[str, Slot]  # of colours, by texture id
@@ -68,7 +68,7 @@ def texture_atlas(
         slots[name] = added(_packed_colours(known[name]))
         if name in cutting:
             added(_alpha_texels(known[name]))
-    # Pair the maps; what has neither needs no texels.
+    # Pair the maps; materials without maps need no texels.
     map_slots: dict[MapKey, Slot] = {}
     for key in dict.fromkeys(map_key(m) for m in house.materials):
         roughness = known.get(key[0] or "") if with_roughness else None
@@ -124,7 +124,7 @@ def _packed_maps(
     roughness: Picture | None, normal: Picture | None, scale: float
 ) -> NDArray[np.uint32]:
     """(H, W) uint32 texels of a roughness map and a normal map, of the larger one's size."""
-    # Average vectors and roughness as they are: neither is an sRGB colour.
+    # Average vectors and roughness linearly: neither is an sRGB colour.
     plain = np.arange(256, dtype=np.float32)
     rough = np.full((1, 1, 1), 255, np.float32)
     if roughness is not None:

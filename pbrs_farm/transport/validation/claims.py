@@ -45,7 +45,7 @@ _CHAINS: Final = LightFields(
 )
 # Half of the mutations, for the rooms in which every path is lit.
 _FEW_CHAINS: Final = _CHAINS.model_copy(update={"mutations_per_pixel": 64})
-_SKY_OF_ONE: Final = (1.0, 1.0, 1.0)  # radiance of a sky that is white and even
+_SKY_OF_ONE: Final = (1.0, 1.0, 1.0)  # radiance of a uniform white sky
 
 
 def blocks(picture: F32, n: int = 4) -> F64:
@@ -78,7 +78,7 @@ def z_scores(a: Sequence[F64], b: Sequence[F64]) -> F64:
 
 @dataclass(frozen=True, slots=True)
 class LightClaim:
-    """A statement about light, what was measured, and whether it holds."""
+    """A statement about light, its measurement, and whether it holds."""
 
     text: str
     measured: str
@@ -149,7 +149,7 @@ def _floor_claim(variant: str) -> LightClaim:
 
 def _open_ground(variant: str) -> LightClaim:
     ground = rooms.quad([(-9, 0, -9), (-9, 0, 9), (9, 0, 9), (9, 0, -9)], 0)
-    # Nothing stands on the ground: every direction of the upper half sees the sky.
+    # The ground is empty: every direction of the upper hemisphere sees the sky.
     house = rooms.house([ground], [rooms.matte("ground", 0.2)], size=(2.0, 2.5, 2.0))
     sky = sunsky(Recipe(), elevation_rad=math.radians(40), azimuth_rad=0.5)
     lux = LightScene.load(house, {}, Recipe(), sky, variant=variant).floor_lux(house)["0_0"]

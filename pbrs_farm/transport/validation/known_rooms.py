@@ -81,7 +81,7 @@ def sphere(centre: Triple, radius: float, material: int, *, n: int = 24) -> Surf
 def panel(
     low: Triple, high: Triple, opening: tuple[float, float, float, float], material: int
 ) -> list[Surface]:
-    """A box that is thin along z with a rectangular opening (x0, y0, x1, y1)."""
+    """A box, thin along z, with a rectangular opening (x0, y0, x1, y1)."""
     # Leave four boxes around the opening: left, right, below, above.
     x0, y0, x1, y1 = opening
     z0, z1 = low[2], high[2]
@@ -177,7 +177,7 @@ def window_room(
     surfaces += panel((0, 0, -0.1), (4.0, 2.5, 0.0), opening, 0)
     surfaces.append(box((1.5, 0.6, 2.2), (2.5, 0.65, 2.9), 0, "table"))
     x0, y0, x1, y1 = opening
-    # Its rectangle stands halfway through the wall, as a portal and as the pane.
+    # Its rectangle is in the centre of the wall, as portal and as pane.
     corners = [(x0, y0, -0.05), (x1, y0, -0.05), (x1, y1, -0.05), (x0, y1, -0.05)]
     rectangle = np.array(corners, np.float64)
     if pane:
@@ -206,9 +206,9 @@ def furnace(albedo: float) -> tuple[House, Camera]:
 
 
 def door_ajar(gap: float = 0.06) -> tuple[House, Camera]:
-    """Two rooms, a lamp in the far one, and a door between them that stands ajar by gap metres.
+    """Two rooms, a lamp in the far one, and a door between them ajar by gap metres.
 
-    The lamp does not light the near room directly: all light comes off the far walls, by the gap.
+    The lamp does not light the near room directly: all light is reflected by the far walls through the gap.
     """
     size = (4.0, 2.5, 8.2)
     surfaces = shell(size, 0)
