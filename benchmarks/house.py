@@ -36,6 +36,7 @@ KINDS = (
     "camera-source",
     "repair-step",
     "recipe-group",
+    "check",
 )
 """What comes in kinds, as tests name it: @pytest.mark.kinds("format") adds one in a file."""
 SHARED_BY = 3  # files that define a function of one name, and it counts as shared
@@ -50,7 +51,7 @@ UNITS = {
     "house.code_lines": "lines of .py, .toml, .lua, .js and .glsl of pbrs_farm and workers, those of others apart",
     "house.shared_names": "share of module functions whose name three or more files define",
     "house.glued": "headings of chapters inside files: comments that stand alone between blank lines, below the first ten lines",
-    "house.kinds": "1: each of KINDS is added in one file, a recipe group in two (tests marked kinds)",
+    "house.kinds": "1: each of KINDS is added in one file, a recipe group and a check of verify in two (tests marked kinds)",
     "house.docstrings": "share of public functions and methods whose docstring has more than one line",
     "house.lines": "lines of .py of pbrs_farm and workers",
     "house.lines_of_statements": "of these, neither blank, comment, docstring nor import",

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from pbrs_farm.check.embree_caster import Rays
-from pbrs_farm.check.motion_checks import SEEN, follow_points, other_view
+from pbrs_farm.check.followed_points import SEEN, OtherView, follow_points
 from pbrs_farm.check.stored_mesh import triangles_from_glb
 from pbrs_farm.check.stored_view import StoredView
 from pbrs_farm.core.arrays import F32
@@ -87,9 +87,9 @@ def _compared(view: StoredView, rays: Rays) -> dict[str, Any]:
         ("next", "flow_forward", "occlusion_forward"),
         ("stereo", "disparity", "occlusion_stereo"),
     ):
-        other = other_view(view, relation)
+        other = OtherView.of(view, relation)
         assert other is not None
-        point = follow_points(view, other, rows, columns, z, rays)
+        point = follow_points(view, other, (rows, columns), z, rays)
         stored, state = layer(view, name)[rows, columns], layer(view, occlusion)[rows, columns]
         n_wrong, n = n_wrong + int((state != point.state).sum()), n + len(state)
         seen = (state == SEEN) & (point.state == SEEN)

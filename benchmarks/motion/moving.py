@@ -22,7 +22,8 @@ from benchmarks.figures import write_report
 from benchmarks.motion.between_views import layer
 from pbrs_farm.check import verify
 from pbrs_farm.check.embree_caster import Rays
-from pbrs_farm.check.motion_checks import SEEN, follow_points, half_step, other_view
+from pbrs_farm.check.followed_points import SEEN, OtherView, follow_points
+from pbrs_farm.check.motion_checks import half_step
 from pbrs_farm.check.moved_house import MovedHouse, house_at
 from pbrs_farm.check.stored_house import StoredHouse
 from pbrs_farm.check.stored_mesh import triangles_from_glb
@@ -125,7 +126,7 @@ def _flow_errors(view: StoredView, now: MovedHouse, then: MovedHouse) -> tuple[A
     """(N,) steps by which flow is off, and of how many pixels it is that of another face at the same depth."""
     moves = (np.abs(layer(view, "scene_flow")) > 0).any(-1) & (layer(view, "depth_z") > 0)
     rows, columns = np.nonzero(moves)
-    other = other_view(view, "next")
+    other = OtherView.of(view, "next")
     assert other is not None
     origin, directions = view.rays(rows, columns)
     rays = Rays(now.triangles)
@@ -141,7 +142,7 @@ def _flow_errors(view: StoredView, now: MovedHouse, then: MovedHouse) -> tuple[A
         """How far pixels are off, of points on faces, and whether both frames see them."""
         at = rows[of], columns[of]
         found = follow_points(
-            view, other, *at, z[of], there, lambda points: then.carried(now, points, faces)
+            view, other, at, z[of], there, lambda points: then.carried(now, points, faces)
         )
         off = np.abs(flow[at] - found.motion).max(axis=1, initial=0.0)
         # A step as that of the larger of both components, where it is more than what 32-bit floats lose.

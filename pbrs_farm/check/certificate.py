@@ -2,10 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+
+from pbrs_farm.core.arrays import Bools
 from pbrs_farm.core.record import Record
 from pbrs_farm.core.shown_text import MAX_MESSAGE, MAX_PLACE, shown
 
-MAX_LISTED = 20  # failures of one check that are listed by place; all are counted
+MAX_LISTED = 20  # failures of a check that are listed by place; all are counted
+
+Expect = Callable[[bool | np.bool_, str], bool]
+"""Counts a fact, reports a failure with the text unless it holds, and returns whether it holds."""
 
 
 class Count(Record):
@@ -130,15 +139,35 @@ class Tally:
         """Something is odd, but no failure."""
         self.notes.append(shown(text, MAX_MESSAGE))
 
-    def expect(self, check: str, place: str, holds: bool, what: str) -> bool:
-        """One thing was looked at; it fails with what unless it holds.
+    def expect(self, check: str, place: str, holds: bool | np.bool_, fault: str) -> bool:
+        """Count a fact, which fails with a text unless it holds.
 
-        Gives back holds, so that a check can return where nothing else makes sense.
+        Returns holds, so that a check can stop where nothing else makes sense.
         """
         self.add(check, 1)
         if not holds:
-            self.fail(check, place, what)
-        return holds
+            self.fail(check, place, fault)
+        return bool(holds)
+
+    def at(self, check: str, place: str) -> Expect:
+        """`expect` of a check at a place."""
+        return partial(self.expect, check, place)
+
+    def pixels(self, check: str, place: str, right: Bools) -> None:
+        """Count the pixels (H, W) of a picture; the first wrong one is listed for all."""
+        self.add(check, right.size)
+        if not right.all():
+            row, column = np.argwhere(~right)[0]
+            self.fail(check, place, f"row {row}, column {column}", int((~right).sum()))
+
+    def tolerate(
+        self, check: str, place: str, n: int, n_wrong: int, most: float, fault: str
+    ) -> None:
+        """Count n things, of which a few wrong ones are ties and more are failures."""
+        is_few = n_wrong <= most
+        self.add(check, n, ties=n_wrong if is_few else 0)
+        if not is_few:
+            self.fail(check, place, fault, n_wrong)
 
     @property
     def n_failed(self) -> int:

@@ -1,49 +1,54 @@
-"""ATTRIBUTION.txt against what the dressed homes of a root owe. Effects: reads files."""
+"""ATTRIBUTION.txt against the credits that the homes of a root require. Effects: reads files."""
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
-from pbrs_farm.check.certificate import Tally
+from pbrs_farm.check.cases import RootCase
+from pbrs_farm.check.checks import Check
 from pbrs_farm.check.stored_house import StoredHouse
 from pbrs_farm.core import keys
 
 
-def check_credits(root: Path, houses: list[StoredHouse], tally: Tally) -> None:
-    """ATTRIBUTION.txt names each work that a dress.json of the root says must be credited.
+def check_credits(case: RootCase) -> None:
+    """ATTRIBUTION.txt names each work of a dress.json that requires a credit, with its licence.
 
-    With the licence that is told there; a root whose homes owe nothing needs no such file.
+    A root whose homes require none needs no such file.
     """
     lines: dict[str, str] = {}
-    owed = [h.house.get("source", {}).get("attribution", "") for h in houses]
+    houses = [StoredHouse(folder) for folder in case.houses]
     for house in houses:
         for credit in _credits(house):
             by = f", by {credit['creator']}" if credit.get("creator") else ""
             lines[f"- {credit['name']}{by}"] = credit.get("licence") or "no licence named"
-    file = root / keys.ATTRIBUTION
-    if not any(_is_owed(licence) for licence in lines.values()):
+    file = case.root / keys.ATTRIBUTION
+    if not any(_requires_credit(licence) for licence in lines.values()):
         return
     try:
         text = file.read_text(encoding="utf-8", errors="replace") if file.is_file() else ""
     except OSError:
         text = ""
-    what = "is missing, and works must be credited"
-    if not tally.expect("credits", keys.ATTRIBUTION, bool(text), what):
+    expect = case.tally.at("credits", keys.ATTRIBUTION)
+    if not expect(bool(text), "is missing, and works must be credited"):
         return
     stored = text.splitlines()
     for begin, licence in lines.items():
-        same = any(line.startswith(begin) and line.endswith(licence) for line in stored)
-        tally.expect("credits", keys.ATTRIBUTION, same, f"does not name {begin[2:]}: {licence}")
-    for line in filter(None, owed):
-        tally.expect("credits", keys.ATTRIBUTION, line in text, f"does not carry: {line}")
+        is_named = any(line.startswith(begin) and line.endswith(licence) for line in stored)
+        expect(is_named, f"does not name {begin[2:]}: {licence}")
+    for house in houses:
+        line = house.house.get("source", {}).get("attribution", "")
+        if line:
+            expect(line in text, f"does not carry: {line}")
 
 
-def _is_owed(licence: str) -> bool:
-    """Whether it asks for a credit: all but what is in the public domain, or has none."""
+def _requires_credit(licence: str) -> bool:
+    """False for the public domain and for works without a licence."""
     return not licence.upper().startswith(("CC0", "PUBLIC", "NO LICENCE"))
 
 
 def _credits(house: StoredHouse) -> list[dict[str, Any]]:
-    found = house.dress.get("credits", [])
-    return [c for c in found if isinstance(c, dict) and "name" in c]
+    rows = house.dress.get("credits", [])
+    return [row for row in rows if isinstance(row, dict) and "name" in row]
+
+
+CHECKS = (Check(name="credits", of="root", function=check_credits, cost=2),)

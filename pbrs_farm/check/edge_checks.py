@@ -1,151 +1,130 @@
-"""Occlusion and crease edges from stored depth and normals, as far as their rounding lets one say; no effects.
+"""Occlusion and crease edges from stored depth and normals, up to their rounding; no effects.
 
-docs/formats/layer_rules.md tells the rules. Depth is known to half a millimetre and normals to 16 bits: where a rule
-hangs on less, either value is right.
+docs/formats/layer_rules.md has the rules. Depth is known to half a millimetre and normals to 16 bits: where a rule
+depends on less, either value is right.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pbrs_farm.check.certificate import Tally
-from pbrs_farm.check.embree_caster import Floats
-from pbrs_farm.check.stored_view import StoredView
+from pbrs_farm.check.axes import camera_normals
+from pbrs_farm.check.cases import ViewCase
+from pbrs_farm.check.checks import Check
+from pbrs_farm.core.arrays import F64, Bools
 
-Bools = NDArray[np.bool_]
-GAP_M, GAP_SHARE = 0.03, 0.02  # least step of an occlusion, and as a part of the nearer depth
-CREASE_COSINE = float(np.cos(np.radians(30)))
-OWNER, HIDDEN = 255, 128
-ROUNDING_M = 0.0012  # of two depths in whole mm
-NORMAL_ERROR = 1e-4  # of a component stored in 16 bits, and float32
-COSINE_ERROR = 2e-4
-FARTHEST_MM = 65535  # and what is farther
+_GAP_M, _GAP_SHARE = 0.03, 0.02  # least step of an occlusion, and as a share of the nearer depth
+_CREASE_COSINE = float(np.cos(np.radians(30)))
+_OWNER, _HIDDEN = 255, 128
+_ROUNDING_M = 0.0012  # of two depths in whole mm
+_NORMAL_ERROR = 1e-4  # of a component stored in 16 bits, and float32
+_COSINE_ERROR = 2e-4
+_FARTHEST_MM = 65535  # largest depth that 16 bits hold, and every larger one
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Sides:
+class _Sides(NamedTuple):
     """One of the two pixels of each pair."""
 
-    z: Floats
-    normal: Floats
-    ray: Floats
+    z: F64
+    normal: F64
+    ray: F64
 
 
-def check_typed_boundaries(
-    view: StoredView, arrays: Mapping[str, NDArray[Any]], tally: Tally
-) -> None:
-    """Judge boundary_occlusion and boundary_crease over the whole picture, where the view has them.
+def check_typed_boundaries(case: ViewCase) -> None:
+    """Judge boundary_occlusion and boundary_crease over the whole picture.
 
-    arrays has depth and normal, too. A pixel is right where a rule that rounding does not touch says
-    so, or where rounding leaves it open.
+    A pixel is right if a rule that rounding does not affect says so, or if rounding leaves it open.
     """
-    if not {"boundary_occlusion", "boundary_crease"} & arrays.keys():
-        return
+    view, arrays = case.view, case.arrays
     height, width = view.size
-    rows, columns = (g.reshape(-1) for g in np.mgrid[0:height, 0:width])
-    _, rays = view.rays(rows, columns)
-    rays = (rays @ view.world_from_camera[:3, :3]).reshape(height, width, 3)
-    decoded = arrays["normal"] * (2 / 65535) - 1
-    normal = np.stack([decoded[..., 0], -decoded[..., 2], decoded[..., 1]], axis=-1)
+    rays = view.ray_grid() @ view.world_from_camera[:3, :3]
+    normal = camera_normals(arrays["normal"])
     z = arrays["depth"] / 1000
-    # Beyond what 16 bits hold a step is unknown.
-    far = arrays["depth"] >= FARTHEST_MM
-    sure, may = np.zeros((height, width), int), np.zeros((height, width), int)
+    # Steps beyond what 16 bits hold are unknown.
+    far = arrays["depth"] >= _FARTHEST_MM
+    least, most = np.zeros((height, width), int), np.zeros((height, width), int)
     creases: list[tuple[Bools, Bools]] = []
-    for axis in (1, 0):
-        low, high, whole = slice(None, -1), slice(1, None), slice(None)
-        first, second = (
-            ((whole, low), (whole, high)) if axis == 1 else ((low, whole), (high, whole))
-        )
+    for first, second in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])):
         a, b = (_Sides(z[s], normal[s], rays[s]) for s in (first, second))
-        gap, maybe = _gaps(a, b)
-        open_ = far[first] | far[second]
-        gap, maybe = gap & ~open_, maybe | open_
+        gap, may_be_gap = _gaps(a, b)
+        is_open = far[first] | far[second]
+        gap, may_be_gap = gap & ~is_open, may_be_gap | is_open
         nearer = _is_nearer(a.z, b.z)
         for side, is_near in ((first, nearer), (second, ~nearer)):
-            mark = np.where(is_near, OWNER, HIDDEN)
-            sure[side] = np.maximum(sure[side], np.where(gap, mark, 0))
-            may[side] = np.maximum(may[side], np.where(maybe, np.where(open_, OWNER, mark), 0))
+            mark = np.where(is_near, _OWNER, _HIDDEN)
+            least[side] = np.maximum(least[side], np.where(gap, mark, 0))
+            may_be = np.where(may_be_gap, np.where(is_open, _OWNER, mark), 0)
+            most[side] = np.maximum(most[side], may_be)
         cosine = np.einsum("...i,...i->...", a.normal, b.normal)
-        both = (a.z > 0) & (b.z > 0)
-        creases.append(
-            (
-                both & ~maybe & (cosine < CREASE_COSINE - COSINE_ERROR),
-                both & ~gap & (cosine < CREASE_COSINE + COSINE_ERROR),
-            )
-        )
+        hit = (a.z > 0) & (b.z > 0)
+        crease = hit & ~may_be_gap & (cosine < _CREASE_COSINE - _COSINE_ERROR)
+        creases.append((crease, hit & ~gap & (cosine < _CREASE_COSINE + _COSINE_ERROR)))
     if "boundary_occlusion" in arrays:
         stored = arrays["boundary_occlusion"].astype(int)
-        right = np.isin(stored, (0, HIDDEN, OWNER)) & (sure <= stored) & (stored <= may)
-        _tally(view, "boundary_occlusion", right, tally)
+        right = np.isin(stored, (0, _HIDDEN, _OWNER)) & (least <= stored) & (stored <= most)
+        case.tally.pixels("boundary_occlusion", case.place, right)
     if "boundary_crease" in arrays:
         stored = arrays["boundary_crease"]
-        least, most = (_in_blocks(creases[0][k], creases[1][k]) for k in (0, 1))
-        right = np.where(stored == 255, most, (stored == 0) & ~least)
-        _tally(view, "boundary_crease", right, tally)
+        crease, may_be_crease = (_in_blocks(across, down) for across, down in zip(*creases))
+        right = np.where(stored == 255, may_be_crease, (stored == 0) & ~crease)
+        case.tally.pixels("boundary_crease", case.place, right)
 
 
 def _gaps(a: _Sides, b: _Sides) -> tuple[Bools, Bools]:
-    """Whether depth steps between the pixels of each pair for sure, and whether it may."""
+    """(N,) depth steps between the pixels of each pair for sure; and it may."""
     near = np.minimum(a.z, b.z)
-    limit = np.maximum(GAP_M, GAP_SHARE * near)
+    limit = np.maximum(_GAP_M, _GAP_SHARE * near)
     step = np.abs(a.z - b.z)
     (miss_b, slack_b), (miss_a, slack_a) = _miss(a, b), _miss(b, a)
     sizes, slacks = np.abs([miss_a, miss_b]), np.array([slack_a, slack_b])
-    # A plane goes on to the other pixel, or both planes meet between the two: no step.
-    on_plane = (sizes + slacks).min(0) <= limit - ROUNDING_M
-    may_be_on = (sizes - slacks).min(0) <= limit + ROUNDING_M
-    before, behind = (
-        ((miss_a < -slack_a), (miss_b < -slack_b)),
-        ((miss_a > slack_a), (miss_b > slack_b)),
-    )
-    meet = (before[0] & before[1]) | (behind[0] & behind[1])
-    part = (before[0] & behind[1]) | (behind[0] & before[1])
-    asked = near > 0
-    sure = (step > limit + ROUNDING_M) & ~(asked & (may_be_on | ~part))
-    maybe = (step > limit - ROUNDING_M) & ~(asked & (on_plane | meet))
-    return sure, maybe
+    # No step if a plane goes on to the other pixel, or both planes meet between the two.
+    on_plane = (sizes + slacks).min(0) <= limit - _ROUNDING_M
+    may_be_on = (sizes - slacks).min(0) <= limit + _ROUNDING_M
+    a_before, b_before = miss_a < -slack_a, miss_b < -slack_b
+    a_behind, b_behind = miss_a > slack_a, miss_b > slack_b
+    meet = (a_before & b_before) | (a_behind & b_behind)
+    part = (a_before & b_behind) | (a_behind & b_before)
+    hit = near > 0
+    is_gap = (step > limit + _ROUNDING_M) & ~(hit & (may_be_on | ~part))
+    may_be_gap = (step > limit - _ROUNDING_M) & ~(hit & (on_plane | meet))
+    return is_gap, may_be_gap
 
 
-def _miss(at: _Sides, other: _Sides) -> tuple[Floats, Floats]:
-    """How far the other's depth lies from the plane here, and what rounding makes of it; metres."""
-    here = np.einsum("...i,...i->...", at.normal, at.ray)
-    there = np.einsum("...i,...i->...", at.normal, other.ray)
+def _miss(side: _Sides, other: _Sides) -> tuple[F64, F64]:
+    """Distance of the other's depth from the plane here, and its rounding error; metres."""
+    here = np.einsum("...i,...i->...", side.normal, side.ray)
+    there = np.einsum("...i,...i->...", side.normal, other.ray)
     with np.errstate(divide="ignore", invalid="ignore"):
-        predicted = at.z * here / there
-        slack = ROUNDING_M * (1 + np.abs(predicted / np.maximum(at.z, 1e-6)))
-        slack += 2 * NORMAL_ERROR * np.abs(predicted) / np.abs(there) + NORMAL_ERROR * np.abs(
-            predicted
-        )
-    # A plane that grazes the ray may be met before the eye or far behind.
-    graze = ~(np.abs(there) > 4 * NORMAL_ERROR)
+        predicted = side.z * here / there
+        size = np.abs(predicted)
+        slack = _ROUNDING_M * (1 + np.abs(predicted / np.maximum(side.z, 1e-6)))
+        slack += _NORMAL_ERROR * size * (2 / np.abs(there) + 1)
+    # A plane that grazes the ray may be met in front of the eye or far behind.
+    graze = ~(np.abs(there) > 4 * _NORMAL_ERROR)
     ahead = np.where(predicted > 0, predicted, np.inf)
-    return np.nan_to_num(ahead - other.z, nan=0.0, posinf=1e9), np.where(
-        graze, np.inf, np.nan_to_num(slack, nan=np.inf, posinf=np.inf)
-    )
+    miss = np.nan_to_num(ahead - other.z, nan=0.0, posinf=1e9)
+    return miss, np.where(graze, np.inf, np.nan_to_num(slack, nan=np.inf, posinf=np.inf))
 
 
-def _is_nearer(a: Floats, b: Floats) -> Bools:
-    """The first is nearer than the second, where 0 is infinitely far."""
+def _is_nearer(a: F64, b: F64) -> Bools:
+    """The first depth is nearer than the second, where 0 is infinitely far."""
     return np.asarray(np.where(a > 0, a, np.inf) < np.where(b > 0, b, np.inf), bool)
 
 
-def _in_blocks(right: Bools, down: Bools) -> Bools:
+def _in_blocks(across: Bools, down: Bools) -> Bools:
     """(H, W) any edge within the block of a pixel and its neighbours right and below."""
-    edge = np.zeros((right.shape[0], down.shape[1]), bool)
-    edge[:, :-1] |= right
+    edge = np.zeros((across.shape[0], down.shape[1]), bool)
+    edge[:, :-1] |= across
     edge[:-1, :] |= down
-    edge[:-1, :-1] |= right[1:, :] | down[:, 1:]
+    edge[:-1, :-1] |= across[1:, :] | down[:, 1:]
     return edge
 
 
-def _tally(view: StoredView, check: str, right: Bools, tally: Tally) -> None:
-    tally.add(check, right.size)
-    if not right.all():
-        row, column = np.argwhere(~right)[0]
-        tally.fail(check, view.place, f"row {row}, column {column}", int((~right).sum()))
+CHECKS = (
+    Check(
+        name="typed boundaries", of="view", needs=("boundary_occlusion", "boundary_crease"),
+        function=check_typed_boundaries, cost=14,
+    ),
+)  # fmt: skip

@@ -10,12 +10,9 @@ from typing import Any, Final, Protocol
 
 import numpy as np
 import trimesh
-from numpy.typing import NDArray
 
 from pbrs_farm.check.stored_mesh import Triangles
-
-Floats = NDArray[np.float64]
-Faces = NDArray[np.int64]
+from pbrs_farm.core.arrays import F64, I64, Bools
 
 _MOST_SHEETS: Final = 64  # with holes, that a ray passes: behind them it meets what is solid
 _STEP: Final = 1e-5  # behind a hole, of the largest coordinate plus 1 m: above float32's rounding
@@ -24,11 +21,11 @@ _STEP: Final = 1e-5  # behind a hole, of the largest coordinate plus 1 m: above 
 class Hits(Protocol):
     """What rays meet: see Rays."""
 
-    def first(self, origin: Floats, directions: Floats) -> Faces: ...
-    def distance(self, face: Faces, origin: Floats, directions: Floats) -> Floats: ...
-    def normal(self, face: Faces, directions: Floats) -> Floats: ...
-    def without_holes(self, face: Faces, origin: Floats, directions: Floats) -> Faces: ...
-    def last_leg(self, origin: Floats, directions: Floats) -> tuple[Floats, Floats, Floats]: ...
+    def first(self, origin: F64, directions: F64) -> I64: ...
+    def distance(self, face: I64, origin: F64, directions: F64) -> F64: ...
+    def normal(self, face: I64, directions: F64) -> F64: ...
+    def without_holes(self, face: I64, origin: F64, directions: F64) -> I64: ...
+    def last_leg(self, origin: F64, directions: F64) -> tuple[F64, F64, F64]: ...
 
 
 class Rays:
@@ -38,7 +35,7 @@ class Rays:
     own origin, those with holes one behind the other.
     """
 
-    def __init__(self, triangles: Triangles, keep: NDArray[np.bool_] | None = None) -> None:
+    def __init__(self, triangles: Triangles, keep: Bools | None = None) -> None:
         # Leave out triangles without an area: they have no normal.
         corners = triangles.vertices.astype(np.float64)[triangles.faces]
         with np.errstate(invalid="ignore"):
@@ -57,11 +54,11 @@ class Rays:
             self._solid = _Embree(triangles, solid & ~self._has_holes)
             self._sheets = _Embree(triangles, solid & self._has_holes)
 
-    def first(self, origin: Floats, directions: Floats) -> Faces:
+    def first(self, origin: F64, directions: F64) -> I64:
         """(N,) number of the triangle each ray hits first, -1 = nothing; origin (3,) or (N, 3).
 
         directions (N, 3) of any length; a direction (0, 0, 0) is a pixel without a ray and meets
-        nothing. Faces are hit from both sides.
+        nothing. I64 are hit from both sides.
         """
         origins = np.broadcast_to(origin, directions.shape)
         found = self._all.first(origins, directions)
@@ -73,9 +70,7 @@ class Rays:
             return found
         return self._behind_holes(found, rays, origins, directions)
 
-    def _behind_holes(
-        self, found: Faces, rays: Faces, origins: Floats, directions: Floats
-    ) -> Faces:
+    def _behind_holes(self, found: I64, rays: I64, origins: F64, directions: F64) -> I64:
         """found, of whose rays some are known to meet a hole first."""
         here = self.distance(found[rays], origins[rays], directions[rays])
         found[rays] = self._solid.first(origins[rays], directions[rays])
@@ -96,7 +91,7 @@ class Rays:
                 break
         return found
 
-    def without_holes(self, face: Faces, origin: Floats, directions: Floats) -> Faces:
+    def without_holes(self, face: I64, origin: F64, directions: F64) -> I64:
         """(N,) face, -1 where the ray passes a hole of it."""
         kept = face.copy()
         some = np.nonzero((face >= 0) & self._has_holes[face])[0]
@@ -104,16 +99,16 @@ class Rays:
         kept[some[self._is_hole(face[some], origins[some], directions[some])]] = -1
         return kept
 
-    def last_leg(self, origin: Floats, directions: Floats) -> tuple[Floats, Floats, Floats]:
+    def last_leg(self, origin: F64, directions: F64) -> tuple[F64, F64, F64]:
         """Where the rays come from that meet something, (N, 3), their directions, and the way until there, (N,)."""
         return np.broadcast_to(origin, directions.shape), directions, np.zeros(len(directions))
 
-    def _is_hole(self, face: Faces, origins: Floats, directions: Floats) -> NDArray[np.bool_]:
+    def _is_hole(self, face: I64, origins: F64, directions: F64) -> Bools:
         t = self.distance(face, origins, directions)
         points = origins + np.where(np.isfinite(t), t, 0)[:, None] * directions
         return self._triangles.is_hole(face, points)
 
-    def distance(self, face: Faces, origin: Floats, directions: Floats) -> Floats:
+    def distance(self, face: I64, origin: F64, directions: F64) -> F64:
         """(N,) distance in lengths of directions to each face's plane; 0 where face is -1.
 
         In double precision from the plane itself, more exact than the caster's own. Where a ray
@@ -127,7 +122,7 @@ class Rays:
             t = height / np.einsum("ni,ni->n", normal, directions)
         return np.where(face >= 0, t, 0.0)
 
-    def normal(self, face: Faces, directions: Floats) -> Floats:
+    def normal(self, face: I64, directions: F64) -> F64:
         """(N, 3) unit normals turned against directions; 0 where face is -1.
 
         Of the triangle, not of the shading: float64 in the world.
@@ -140,7 +135,7 @@ class Rays:
 class _Embree:
     """Embree over some of the triangles."""
 
-    def __init__(self, triangles: Triangles, keep: NDArray[np.bool_]) -> None:
+    def __init__(self, triangles: Triangles, keep: Bools) -> None:
         self._face = np.nonzero(keep)[0]  # Embree's number -> number of the triangle
         self._caster: Any = None
         if len(self._face):
@@ -148,7 +143,7 @@ class _Embree:
             mesh = trimesh.Trimesh(triangles.vertices, triangles.faces[self._face], process=False)
             self._caster = trimesh.ray.ray_pyembree.RayMeshIntersector(mesh, scale_to_box=False)
 
-    def first(self, origins: Floats, directions: Floats) -> Faces:
+    def first(self, origins: F64, directions: F64) -> I64:
         """(N,) number of the triangle that each ray (N, 3) hits first, -1 = nothing."""
         if self._caster is None or not len(directions):
             return np.full(len(directions), -1, np.int64)

@@ -1,11 +1,14 @@
-"""Manifest, markers and files of a house: nothing missing, nothing changed, nothing unlisted. Effects: reads files."""
+"""Manifest, markers and files of a house: complete, unchanged and listed. Effects: reads files."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import Any
 
+from pbrs_farm.check.cases import RootCase
 from pbrs_farm.check.certificate import Tally
+from pbrs_farm.check.checks import Check
+from pbrs_farm.check.rules import judge
 from pbrs_farm.check.stored_files import (
     BadFile,
     object_from_json,
@@ -15,21 +18,19 @@ from pbrs_farm.check.stored_files import (
 )
 
 
-def check_files(root: Path, house: Path, tally: Tally) -> None:
-    """Compare manifest.jsonl of house with the files on disk and with the done markers.
+def check_files(case: RootCase) -> None:
+    """Compare a house's manifest.jsonl with the files on disk and with the done markers.
 
-    A file below views that no row lists fails as well.
+    A file below views/ that no row lists fails as well.
     """
-    # Each listed file is there, with the bytes and the hash that are listed.
+    root, (house,), tally = case.root, case.houses, case.tally
     rows = _manifest(house / "manifest.jsonl", house.name, tally)
     credit = _credit(house)
     for key, row in rows.items():
         _check_row(root, key, row, tally)
         if credit is not None:
-            same = row.get("attribution", "") == credit
-            tally.expect("credits", key, same, "its line of manifest.jsonl carries another credit")
+            judge("manifest credit", key, tally, row={"attribution": "", **row}, credit=credit)
     _check_markers(house, rows, tally)
-    # Find files that nothing lists.
     listed = {root / key for key in rows}
     for file in sorted(p for p in (house / "views").rglob("*") if p.is_file()):
         place = str(file.relative_to(root))
@@ -37,30 +38,24 @@ def check_files(root: Path, house: Path, tally: Tally) -> None:
 
 
 def _credit(house: Path) -> str | None:
-    """The line that what is made from a house must carry; None where house.json does not say."""
+    """The credit line of a house; None where house.json has none."""
     try:
         return str(stored_object(house / "house.json")["source"]["attribution"])
     except (BadFile, KeyError, TypeError):
         return None
 
 
-def check_root_manifest(root: Path, houses: list[Path], tally: Tally) -> None:
-    """The root's manifest.jsonl is the houses' manifests one after another, if there is one.
-
-    Nothing is counted where the root has no manifest. houses must be in the order in which it was
-    merged.
-    """
-    merged = root / "manifest.jsonl"
-    if not merged.is_file():
-        return
-    files = [h / "manifest.jsonl" for h in houses]
+def check_root_manifest(case: RootCase) -> None:
+    """The root's manifest.jsonl is the houses' manifests in their order."""
+    expect = case.tally.at("files", "manifest.jsonl")
+    files = [house / "manifest.jsonl" for house in case.houses]
     try:
         parts = [stored_bytes(f) for f in files if f.is_file()]
-        same = stored_bytes(merged) == b"".join(parts)
+        same = stored_bytes(case.root / "manifest.jsonl") == b"".join(parts)
     except BadFile as error:
-        tally.expect("files", "manifest.jsonl", False, str(error))
+        expect(False, str(error))
         return
-    tally.expect("files", "manifest.jsonl", same, "differs from the houses'")
+    expect(same, "differs from the houses'")
 
 
 def _manifest(file: Path, house: str, tally: Tally) -> dict[str, dict[str, Any]]:
@@ -76,7 +71,7 @@ def _manifest(file: Path, house: str, tally: Tally) -> dict[str, dict[str, Any]]
         try:
             row = object_from_json(line)
             key = str(row["key"])
-            # A key that leads out of the root is no row either.
+            # A key must not lead out of the root.
             if not {"bytes", "sha256"} <= row.keys() or ".." in key.split("/") or key[:1] == "/":
                 raise ValueError
         except (ValueError, KeyError, TypeError):
@@ -92,13 +87,11 @@ def _check_row(root: Path, key: str, row: dict[str, Any], tally: Tally) -> None:
     if not tally.expect("files", key, file.is_file(), "is missing"):
         return
     try:
-        digest = stored_digest(file)
+        disk = {"sha256": stored_digest(file), "bytes": file.stat().st_size}
     except BadFile as error:
         tally.expect("files", key, False, str(error))
         return
-    n_bytes = file.stat().st_size
-    tally.expect("files", key, n_bytes == row["bytes"], f"{n_bytes} bytes, not {row['bytes']}")
-    tally.expect("hashes", key, digest == row["sha256"], "content differs from its sha256")
+    judge("manifest row", key, tally, row=row, disk=disk)
 
 
 def _check_markers(house: Path, rows: dict[str, dict[str, Any]], tally: Tally) -> None:
@@ -106,21 +99,21 @@ def _check_markers(house: Path, rows: dict[str, dict[str, Any]], tally: Tally) -
         place = f"{house.name}/done/{file.name}"
         try:
             marker = stored_object(file)
-            stored = marker["files"]
-            pairs = [(str(s["key"]), s["sha256"], s["n_bytes"]) for s in stored]
-            told = (marker["step"], marker["house_id"], marker.get("view_id"))
-            digest = marker["digest"]
+            stored = [(str(s["key"]), s["sha256"], s["n_bytes"]) for s in marker["files"]]
+            marker = {"view_id": None, **marker}
+            _ = marker["step"], marker["house_id"], marker["digest"]
         except (ValueError, KeyError, TypeError):
             tally.expect("markers", place, False, "is no marker")
             continue
-        # Its name says what it is of.
         step, _, view = file.stem.partition(".")
-        same = told == (step, house.name, view or None)
-        tally.expect("markers", place, same, "is told to be of another step, house or view")
-        # A marker and the manifest tell the same of each file.
-        for key, sha256, n_bytes in pairs:
-            row = rows.get(key, {})
-            same = row.get("sha256") == sha256 and row.get("bytes") == n_bytes
-            tally.expect("markers", place, same, f"{key} is not as in manifest.jsonl")
-            same = (row.get("step"), row.get("digest")) == (step, digest)
-            tally.expect("markers", place, same, f"{key} is of another step in manifest.jsonl")
+        name = {"step": step, "house": house.name, "view": view or None}
+        judge("marker", place, tally, marker=marker, name=name)
+        for key, sha256, n_bytes in stored:
+            entry = {"key": key, "sha256": sha256, "n_bytes": n_bytes}
+            judge("marker file", place, tally, row=rows.get(key, {}), entry=entry, marker=marker, name=name)  # fmt: skip
+
+
+CHECKS = (
+    Check(name="files", of="root", needs=("manifest.jsonl",), function=check_root_manifest, cost=1),
+    Check(name="files", of="files", function=check_files, cost=1),
+)

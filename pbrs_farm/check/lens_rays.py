@@ -10,9 +10,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from pbrs_farm.core.arrays import F64
 
 _HALVINGS = 60
 _STEPS = 200  # of the fixed point, which a third of a pixel of tangential part needs few of
@@ -42,7 +41,7 @@ class StoredLens:
         k = tuple(float(table[name]) for name in names)
         return StoredLens(model, k, p, float(table.get("max_angle_rad", np.pi)))
 
-    def rays(self, plane: Floats) -> Floats:
+    def rays(self, plane: F64) -> F64:
         """(N, 3) directions with OpenCV's axes, of unit depth, of points (N, 2) of the plane.
 
         Of unit depth for radtan; of unit length for fisheye and equirect, whose depth is the
@@ -71,7 +70,7 @@ class StoredLens:
         seen = radius <= self._radial(np.array([most]))[0]
         return np.where(seen[:, None], np.stack(parts, axis=1), 0.0)
 
-    def plane_and_depth(self, points: Floats) -> tuple[Floats, Floats]:
+    def plane_and_depth(self, points: F64) -> tuple[F64, F64]:
         """(N, 2) of the plane and (N,) depth of points (N, 3), OpenCV's axes; NaN = unseen.
 
         Points are in the camera's frame, metres. Depth is z for radtan and the distance for the
@@ -90,7 +89,7 @@ class StoredLens:
         radius = np.where(angle <= self._turn(self.limit), self._radial(angle), np.nan)
         return np.stack([radius * np.cos(turn), radius * np.sin(turn)], axis=1), distance
 
-    def _radial(self, r: Floats) -> Floats:
+    def _radial(self, r: F64) -> F64:
         """r (1 + k1 r^2 + k2 r^4 + ...)."""
         powers = [k * r ** (2 * n) for n, k in enumerate(self.k, start=1)]
         return np.asarray(r * (1 + np.sum(powers, axis=0)))
@@ -101,7 +100,7 @@ class StoredLens:
         turns = np.nonzero(np.diff(self._radial(grid)) <= 0)[0]
         return float(grid[turns[0]]) if len(turns) else most
 
-    def _inverse(self, value: Floats, most: float) -> Floats:
+    def _inverse(self, value: F64, most: float) -> F64:
         """The r in 0..most whose _radial is value, by bisection."""
         low, high = np.zeros_like(value), np.full_like(value, most)
         for _ in range(_HALVINGS):
@@ -110,19 +109,19 @@ class StoredLens:
             low, high = np.where(is_below, middle, low), np.where(is_below, high, middle)
         return (low + high) / 2
 
-    def _tangential(self, x: Floats, y: Floats) -> Floats:
+    def _tangential(self, x: F64, y: F64) -> F64:
         p1, p2 = self.p
         r2 = x * x + y * y
         across = 2 * p1 * x * y + p2 * (r2 + 2 * x * x)
         down = p1 * (r2 + 2 * y * y) + 2 * p2 * x * y
         return np.stack([across, down], axis=1)
 
-    def _distorted(self, ideal: Floats) -> Floats:
+    def _distorted(self, ideal: F64) -> F64:
         r = np.hypot(ideal[:, 0], ideal[:, 1])
         scale = np.divide(self._radial(r), r, out=np.ones_like(r), where=r > 0)
         return ideal * scale[:, None] + self._tangential(ideal[:, 0], ideal[:, 1])
 
-    def _undistorted(self, plane: Floats) -> Floats:
+    def _undistorted(self, plane: F64) -> F64:
         # Bracket the radius below the fold, then take the tangential part off again and again.
         most = self._turn(4.0)
         ideal = plane.copy()
@@ -137,7 +136,7 @@ class StoredLens:
         return ideal
 
 
-def _cube_rays(plane: Floats) -> Floats:
+def _cube_rays(plane: F64) -> F64:
     number = np.clip(np.floor((plane[:, 0] + 1) / 2), 0, 5).astype(np.int64)
     u, v, one = plane[:, 0] - 2 * number, plane[:, 1], np.ones(len(plane))
     # Front, right, back, left, up, down: what the face's right, down and forward are.
@@ -148,7 +147,7 @@ def _cube_rays(plane: Floats) -> Floats:
     return np.asarray(found / np.linalg.norm(found, axis=1, keepdims=True))
 
 
-def _cube_plane(points: Floats) -> Floats:
+def _cube_plane(points: F64) -> F64:
     x, y, z = points.T
     ax, ay, az = np.abs(points).T
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -1,8 +1,8 @@
-"""Whether sun and lamps light in radiance.exr what they reach by shadow rays of the checker's own.
+"""Light of sun and lamps in radiance.exr against independent shadow rays.
 
-Effects: none beside reading documents. At some hundred places amid surfaces, the light that arrives is
-radiance over albedo. Where a ray to the sun or to a bulb is free it must be at least half of what that
-alone brings; where the sun is hidden it must be less than half of it.
+Effects: none beside reading documents. At some hundred places amid surfaces, the arriving light is radiance over
+albedo. If a ray to the sun or to a bulb is free it must be at least half of the light that this source alone gives;
+if the sun is hidden it must be less than half of it.
 """
 
 from __future__ import annotations
@@ -19,40 +19,39 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from pbrs_farm.check.certificate import Tally
-from pbrs_farm.check.embree_caster import Faces, Floats, Rays
-from pbrs_farm.check.fact_checks import lamp_names
+from pbrs_farm.check.cases import ViewCase
+from pbrs_farm.check.checks import Check
+from pbrs_farm.check.colours import LM_PER_W, has_channels, luminance_of
+from pbrs_farm.check.embree_caster import Rays
 from pbrs_farm.check.lamp_checks import flux_lm
-from pbrs_farm.check.radiance_checks import COAT, LUMINANCE, Channels, coated_materials, matte_items
-from pbrs_farm.check.solid_checks import is_within
+from pbrs_farm.check.plan import is_within, points_in_plan
+from pbrs_farm.check.radiance_checks import COAT, coated_materials, is_amid, matte_items
 from pbrs_farm.check.stored_house import StoredHouse
 from pbrs_farm.check.stored_mesh import Triangles
-from pbrs_farm.check.stored_view import StoredView
+from pbrs_farm.core.arrays import F64, I64, Bools
 
-LM_PER_W = 179.0  # of white
 _WINDOW_PX = 5  # over which light is averaged: noise, and the pixel's filter
 _PLACES = 400  # of a view
-_LEAST_COSINE = 0.25  # to a light: slanting light is of the shading normal's making
+_LEAST_COSINE = 0.25  # to a light: the shading normal decides about slanting light
 _LEAST_ALBEDO = 0.04
-_HALF = 0.5  # of what the sun brings by itself: noise, and colours that albedo's luminance averages
-_LAMP = 0.6  # of what a bulb brings by itself: noise, and clamped bounces
-_LEVEL = (
-    5.0  # between the floor that a view sees and that of its room: furniture shades, lamps are near
-)
+_HALF = 0.5  # of the sun's own light: noise, and colours that albedo's luminance averages
+_LAMP = 0.6  # of a bulb's own light: noise, and clamped bounces
+_LEVEL = 5.0  # ratio of a view's floor to its room's: furniture shades, lamps are near
 _LEAST_FLOOR_LX = 1.0  # of a floor, below which noise decides
 _FLOOR_GRID = 40  # points a side, from which the sun is looked for
+_FLOOR_M = 0.1  # height above a floor that still counts as the floor
 _UPRIGHT = 0.9  # least cosine of a floor's normal
-_BULB_SHARE = 0.05  # of a bulb's radiance
-_GREY = 0.02  # between the colours of a light that names none
+_BULB_SHARE = 0.05  # relative error of a bulb's radiance
+_GREY = 0.02  # range of the colours of a light without one
 _WARM_K = 4000.0  # of lamps that are redder than any day
 _DAY_LX = 1000.0  # of the sky, above which windows outshine lamps that they mirror
 _WINDOW_RAYS = 3000  # of a view, that look for windows
 _MOST_BULB_PX = 400  # that are looked at
-_BULB_GRID = 15  # places a side of such a pixel and those about it, a fifth of a pixel apart
-_FEW_BULB_PX = 4  # pixels amid a bulb that tell nothing
-_SUN_RAD = math.radians(0.6)  # about the sun's middle, twice its disc: its shadow has soft edges
-_FEW = 24  # places that tell nothing
-_SHARE = 0.8  # of places that must be as shadow rays say
+_BULB_GRID = 15  # places a side of such a pixel and those around it, a fifth of a pixel apart
+_FEW_BULB_PX = 4  # fewer pixels amid a bulb are not judged
+_SUN_RAD = math.radians(0.6)  # around the sun's middle, twice its disc: its shadow has soft edges
+_FEW = 24  # fewer places are not judged
+_SHARE = 0.8  # of places that must agree with shadow rays
 _LEAST_LX = 20.0  # of a lamp, below which bounced light decides
 _ROUND = 0.5  # shortest side of a bulb over its longest: flatter ones do not shine evenly
 _PUSH_M = 2e-3  # off the surface, against its own shadow
@@ -60,77 +59,78 @@ _PUSH_M = 2e-3  # off the surface, against its own shadow
 
 @dataclass(frozen=True)
 class LitScene:
-    """What stands in light's way: triangles of a home, without panes, and what lies outside."""
+    """The obstacles of light: triangles of a home, without panes, and the outdoors."""
 
     house: StoredHouse
     triangles: Triangles
 
     @cached_property
-    def is_outside(self) -> NDArray[np.bool_]:
-        """(F,) of what lies before the windows."""
+    def is_outside(self) -> Bools:
+        """(F,) the outdoors."""
         outside = [i for i, row in self.house.items.items() if "outside" in row["tags"]]
         return np.isin(self.triangles.instance, outside)
 
     @cached_property
     def inside(self) -> Rays:
-        """Rays that meet the home alone; panes let light pass."""
-        clear = self._of_kinds("pane")
-        return Rays(self.triangles, ~(clear | self.is_outside))
+        """Rays among the triangles of the home; panes let light pass."""
+        return Rays(self.triangles, ~(self.triangles.is_of("pane") | self.is_outside))
 
     @cached_property
     def outside(self) -> Rays:
-        """Rays that meet what lies outside."""
+        """Rays among the outdoors."""
         return Rays(self.triangles, self.is_outside)
 
-    def _of_kinds(self, *kinds: str) -> NDArray[np.bool_]:
-        found = np.array([k in kinds for k in self.triangles.kinds], bool)
-        t = self.triangles
-        return found[t.material] if len(t.material) else np.zeros(0, bool)
+    @cached_property
+    def is_unsure(self) -> Bools:
+        """(F,) neither clear nor dark: glass, shades, mirrors, leaves with holes."""
+        return self.triangles.is_of("glass", "shade", "mirror") | self.triangles.has_holes
 
     @cached_property
-    def is_unsure(self) -> NDArray[np.bool_]:
-        """(F,) of what is neither clear nor dark: glass, shades, mirrors, leaves with holes."""
-        return self._of_kinds("glass", "shade", "mirror") | self.triangles.has_holes
-
-    @cached_property
-    def is_bulb(self) -> NDArray[np.bool_]:
-        """(F,) of what shines by itself."""
-        return self._of_kinds("bulb")
-
-    @cached_property
-    def bulbs(self) -> dict[str, tuple[Floats, float, int]]:
-        """Name of a light -> points (N, 3) of its bulb, its flux in lm, its item's instance; round ones alone."""
-        found = {}
+    def bulbs(self) -> dict[str, _Bulb]:
+        """Round bulbs by the name of their light."""
         emission = self.house.recipe.get("emission")
         if not emission or emission["preset"] == "released":
             return {}
-        for name, (instance, k) in lamp_names(self.house).items():
-            light = self.house.items[instance]["lights"][k]
+        bulbs = {}
+        for name, (instance, _k) in self.house.lamps.items():
+            light = self.house.light(name)
             corners = self.triangles.points_of_surfaces(instance, light["emitting"])
             if len(corners):
                 size = np.ptp(corners, axis=0)
                 if size.min() >= _ROUND * size.max():
-                    found[name] = corners, flux_lm(light, emission), instance
-        return found
+                    faces = self.triangles.is_of("bulb") & (self.triangles.instance == instance)
+                    faces &= np.isin(self.triangles.surface, light["emitting"])
+                    bulbs[name] = _Bulb(corners, flux_lm(light, emission), instance, faces)
+        return bulbs
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Bulb:
+    """The luminous surface of a light."""
+
+    corners: F64  # (N, 3) of its triangles
+    flux: float  # lm
+    instance: int
+    faces: Bools  # (F,)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Places:
     """N windows amid surfaces."""
 
-    rows: NDArray[np.int64]
-    columns: NDArray[np.int64]
-    points: Floats  # (N, 3), pushed off the surface
-    normals: Floats  # (N, 3), towards the camera
-    corners: Floats  # (N, 5, 3) middle and corners of the window, on the surface, pushed off it
-    painted: Floats  # (N,) of light that comes and leaves upright: not by a coat; 1 = has none
-    facing: Floats  # (N,) cosine of the normal to the ray that sees it
+    rows: I64
+    columns: I64
+    points: F64  # (N, 3), pushed off the surface
+    normals: F64  # (N, 3), towards the camera
+    corners: F64  # (N, 5, 3) middle and corners of the window, pushed off the surface
+    painted: F64  # (N,) share of light at normal incidence that does not pass through a coat; 1 = no coat
+    facing: F64  # (N,) cosine of the normal to the view ray
 
     def __len__(self) -> int:
         return len(self.rows)
 
-    def returned(self, cosine: Floats) -> Floats:
-        """(N,) share of a matt surface's light that is sent to the camera, at least; cosine: to the light.
+    def returned(self, cosine: F64) -> F64:
+        """(N,) least share of a matte surface's light that is sent to the camera; cosine: to the light.
 
         Under a coat slanting light does not reach the paint, nor leave it (Ashikhmin and Shirley 2000).
         """
@@ -139,44 +139,42 @@ class _Places:
         return np.where(self.painted < 1, under_coat, 1.0)
 
 
-def check_lit(
-    view: StoredView,
-    channels: Channels,
-    arrays: Mapping[str, NDArray[Any]],
-    scene: LitScene,
-    rays: Rays,
-    tally: Tally,
-) -> None:
-    """Judge sun and lamps at up to _PLACES windows of _WINDOW_PX; few of a kind tell nothing.
+def check_lit(case: ViewCase) -> None:
+    """Judge sun and lamps at up to _PLACES windows of _WINDOW_PX; few of a kind are not judged.
 
-    rays: of all triangles, as labels see them. A view that blurs or has no recipe is judged alike.
+    A view that blurs or has no recipe is judged alike.
     """
-    needed = [f"{n}.{c}" for n in ("outdoor", "indoor", "albedo") for c in "RGB"]
-    if not all(n in channels and channels[n].shape == view.size for n in needed):
+    if not has_channels(case.light, case.view.size, "outdoor indoor albedo"):
         return
-    _check_seen_bulbs(view, channels, arrays["instance"], scene, rays, tally)
-    _check_windows(view, channels, scene, rays, tally)
-    places = _places(view, channels, arrays, scene, rays)
+    _check_visible_bulbs(case)
+    _check_windows(case)
+    places = _places(case)
     if len(places) < _FEW:
         return
-    _check_sun(view, channels, places, scene, tally)
-    _check_bulbs(view, channels, places, scene, tally)
-    _check_level(view, channels, places, scene, tally)
-    _check_colours(view, channels, places, scene, tally)
+    _check_sun(case, places)
+    _check_bulbs(case, places)
+    _check_level(case, places)
+    _check_colours(case, places)
 
 
-def _places(
-    view: StoredView, channels: Channels, arrays: Mapping[str, NDArray[Any]], scene: LitScene,
-    rays: Rays,
-) -> _Places:  # fmt: skip
+def _sky(case: ViewCase) -> Mapping[str, Any]:
+    sky: Mapping[str, Any] = case.view.table.get("modes", {}).get("light", {}).get("sky", {})
+    return sky
+
+
+def _to_sun(case: ViewCase) -> F64 | None:
+    """(3,) the direction to the sun; None at night and under clouds."""
+    sky = _sky(case)
+    if not sky.get("sun_lx") or sky["sun_direction"][1] <= 0:
+        return None
+    return np.array(sky["sun_direction"], np.float64)
+
+
+def _places(case: ViewCase) -> _Places:
     """Windows that show one instance with one normal, of a surface that scatters light."""
-    n = _WINDOW_PX
-    instance = arrays["instance"]
-    flat = ndimage.minimum_filter(instance, n) == ndimage.maximum_filter(instance, n)
-    for axis in range(3):
-        plane = arrays["normal"][..., axis].astype(np.int64)
-        flat &= ndimage.maximum_filter(plane, n) - ndimage.minimum_filter(plane, n) < 600
-    flat &= _luminance(channels, "albedo") > _LEAST_ALBEDO
+    view, (triangles, rays), n = case.view, case.scene, _WINDOW_PX
+    albedo = luminance_of(case.light, "albedo")
+    flat = is_amid(case.arrays["instance"], case.arrays["normal"], n) & (albedo > _LEAST_ALBEDO)
     edge = n // 2 + 1
     flat[:edge] = flat[-edge:] = False
     flat[:, :edge] = flat[:, -edge:] = False
@@ -186,9 +184,8 @@ def _places(
     rows, columns = rows[chosen], columns[chosen]
     origin, directions = view.rays(rows, columns)
     face = rays.first(origin, directions)
-    kinds = scene.triangles.kinds_of(face)
-    keep = (face >= 0) & np.isin(kinds, ("opaque",))
-    keep &= np.isin(scene.triangles.instance[face], matte_items(scene.house))
+    keep = (face >= 0) & (triangles.kinds_of(face) == "opaque")
+    keep &= np.isin(triangles.instance[face], matte_items(case.house))
     rows, columns, face, directions = rows[keep], columns[keep], face[keep], directions[keep]
     normal = rays.normal(face, directions)
     points = []
@@ -196,70 +193,63 @@ def _places(
     for dy, dx in ((0, 0), (-h, -h), (-h, h), (h, -h), (h, h)):
         _, ray = view.rays(rows + dy, columns + dx)
         with np.errstate(divide="ignore", invalid="ignore"):
-            at = origin + ray * rays.distance(face, origin, ray)[:, None]
-        points.append(np.nan_to_num(at) + _PUSH_M * normal)
+            point = origin + ray * rays.distance(face, origin, ray)[:, None]
+        points.append(np.nan_to_num(point) + _PUSH_M * normal)
     corners = np.stack(points, axis=1)
-    albedo = _luminance(channels, "albedo")[rows, columns]
-    painted = (1 - COAT) * (1 - COAT / np.maximum(albedo, COAT))
+    painted = (1 - COAT) * (1 - COAT / np.maximum(albedo[rows, columns], COAT))
     towards = directions / np.linalg.norm(directions, axis=1, keepdims=True)
     return _Places(
         rows, columns, corners[:, 0], normal, corners,
-        np.where(coated_materials(scene.house)[scene.triangles.material[face]], painted, 1.0),
+        np.where(coated_materials(case.house)[triangles.material[face]], painted, 1.0),
         -np.einsum("ni,ni->n", normal, towards),
     )  # fmt: skip
 
 
-def _luminance(channels: Channels, name: str) -> Floats:
-    planes = [channels[f"{name}.{c}"].astype(np.float64) for c in "RGB"]
-    return np.asarray(sum(p * w for p, w in zip(planes, LUMINANCE, strict=True)))
-
-
-def _lux(channels: Channels, name: str, places: _Places) -> Floats:
+def _lux(case: ViewCase, name: str, places: _Places) -> F64:
     """(N,) lx that arrive in windows: mean radiance over albedo."""
-    share = _luminance(channels, name) / np.maximum(_luminance(channels, "albedo"), _LEAST_ALBEDO)
+    albedo = np.maximum(luminance_of(case.light, "albedo"), _LEAST_ALBEDO)
+    share = luminance_of(case.light, name) / albedo
     mean = ndimage.uniform_filter(share, _WINDOW_PX, mode="nearest")
     return np.asarray(mean[places.rows, places.columns] * math.pi * LM_PER_W)
 
 
-def _check_sun(
-    view: StoredView, channels: Channels, places: _Places, scene: LitScene, tally: Tally
-) -> None:
-    sky = view.table.get("modes", {}).get("light", {}).get("sky", {})
-    if not sky.get("sun_lx") or sky["sun_direction"][1] <= 0:
+def _check_sun(case: ViewCase, places: _Places) -> None:
+    """Places that see all of the sun have its light, and places that see none of it have less."""
+    to_sun, scene = _to_sun(case), case.now.shared(LitScene)
+    if to_sun is None:
         return
-    to_sun = np.array(sky["sun_direction"], np.float64)
-    normal_lx = sky["sun_lx"] / to_sun[1]
     cosine = places.normals @ to_sun
-    turned = cosine > _LEAST_COSINE
-    n_free = np.zeros(len(places))
-    sure = turned.copy()
-    n_rays = 0
-    for ray in _about(to_sun):
+    n_free, n_rays = np.zeros(len(places)), 0
+    sure = cosine > _LEAST_COSINE
+    for direction in _around(to_sun):
         for k in range(places.corners.shape[1]):
             start = places.corners[:, k]
-            rays = np.broadcast_to(ray, start.shape)
-            met = scene.inside.first(start, rays)
-            free = met < 0
-            sure &= ~(~free & scene.is_unsure[met])
+            rays = np.broadcast_to(direction, start.shape)
+            face = scene.inside.first(start, rays)
+            free = face < 0
+            sure &= ~(~free & scene.is_unsure[face])
             sure &= ~(free & (scene.outside.first(start, rays) >= 0))
             n_free += free
             n_rays += 1
-    lux = _lux(channels, "outdoor", places)
-    least = _HALF * normal_lx * cosine
-    place = f"{view.place}/radiance.exr"
+    lux = _lux(case, "outdoor", places)
+    least = _HALF * _sky(case)["sun_lx"] / to_sun[1] * cosine
     for name, chosen, right in (
         ("lit by the sun", sure & (n_free == n_rays), lux >= least * places.returned(cosine)),
         ("in its shadow", sure & (n_free == 0), lux < least),
     ):
-        n = int(chosen.sum())
-        if n >= _FEW:
-            share = float(right[chosen].mean())
-            what = f"{name} by shadow rays, so it is at {share:.0%} of {n} places"
-            tally.expect("sun", place, share >= _SHARE, what)
+        _expect_share(case, "sun", name, right[chosen])
 
 
-def _about(direction: Floats) -> Iterator[Floats]:
-    """A direction and four about it."""
+def _expect_share(case: ViewCase, check: str, name: str, right: Bools) -> None:
+    """Most of the chosen places are right, if there are enough of them."""
+    if len(right) >= _FEW:
+        share = float(right.mean())
+        fault = f"{name} by shadow rays, so it is at {share:.0%} of {len(right)} places"
+        case.expect(check, "radiance.exr")(share >= _SHARE, fault)
+
+
+def _around(direction: F64) -> Iterator[F64]:
+    """A direction and four around it."""
     side = np.cross(direction, [1.0, 0, 0] if abs(direction[0]) < 0.7 else [0, 1.0, 0])
     side /= np.linalg.norm(side)
     up = np.cross(direction, side)
@@ -268,27 +258,25 @@ def _about(direction: Floats) -> Iterator[Floats]:
         yield direction + _SUN_RAD * (a * side + b * up)
 
 
-def _check_bulbs(
-    view: StoredView, channels: Channels, places: _Places, scene: LitScene, tally: Tally
-) -> None:
-    rows = view.table.get("modes", {}).get("light", {}).get("lamps") or []
+def _check_bulbs(case: ViewCase, places: _Places) -> None:
+    """Places that see a bulb have its light."""
+    rows = case.view.table.get("modes", {}).get("light", {}).get("lamps") or []
     layers = {row["item"]: row["layer"] for row in rows}
     total = np.zeros(len(places))
-    place = f"{view.place}/radiance.exr"
-    for name, (corners, flux, instance) in scene.bulbs.items():
-        direct = _direct_lux(places, corners, flux, instance, scene)
+    bulbs = case.now.shared(LitScene).bulbs
+    for name, bulb in bulbs.items():
+        direct = _direct_lux(case, places, bulb)
         total += direct
         layer = layers.get(name)
-        if layer is not None and f"{layer}.R" in channels:
-            _expect_lit(place, name, _lux(channels, layer, places), direct, tally)
-    if scene.bulbs:
-        _expect_lit(place, "all lamps", _lux(channels, "indoor", places), total, tally)
+        if layer is not None and f"{layer}.R" in case.light:
+            _expect_lit(case, name, layer, places, direct)
+    if bulbs:
+        _expect_lit(case, "all lamps", "indoor", places, total)
 
 
-def _direct_lux(
-    places: _Places, corners: Floats, flux: float, instance: int, scene: LitScene
-) -> Floats:
-    """(N,) lx that a round bulb alone is seen to bring, 0 where not all of it is in sight."""
+def _direct_lux(case: ViewCase, places: _Places, bulb: _Bulb) -> F64:
+    """(N,) lx of direct light of a round bulb, 0 where it is not wholly visible."""
+    scene, corners = case.now.shared(LitScene), bulb.corners
     middle = (corners.min(0) + corners.max(0)) / 2
     to = middle - places.points
     distance = np.linalg.norm(to, axis=1)
@@ -296,172 +284,137 @@ def _direct_lux(
     free = cosine > _LEAST_COSINE
     step = max(len(corners) // 8, 1)
     for target in (middle, *(middle + 0.9 * (c - middle) for c in corners[::step])):
-        ray = target - places.points
-        met: Faces = scene.inside.first(places.points, ray)
-        free &= (met >= 0) & (scene.triangles.instance[met] == instance)
-        free &= scene.triangles.kinds_of(met) == "bulb"
-    lux = flux / (4 * math.pi * distance**2) * cosine * places.returned(cosine)
+        face = scene.inside.first(places.points, target - places.points)
+        free &= (face >= 0) & (scene.triangles.instance[face] == bulb.instance)
+        free &= scene.triangles.kinds_of(face) == "bulb"
+    lux = bulb.flux / (4 * math.pi * distance**2) * cosine * places.returned(cosine)
     return np.where(free, lux, 0.0)
 
 
-def _expect_lit(place: str, name: str, lux: Floats, direct: Floats, tally: Tally) -> None:
+def _expect_lit(case: ViewCase, name: str, layer: str, places: _Places, direct: F64) -> None:
     lit = direct >= _LEAST_LX
-    n = int(lit.sum())
-    if n >= _FEW:
-        share = float((lux[lit] >= _LAMP * direct[lit]).mean())
-        what = f"lit by {name} by shadow rays, so it is at {share:.0%} of {n} places"
-        tally.expect("lamplight", place, share >= _SHARE, what)
+    right = _lux(case, layer, places)[lit] >= _LAMP * direct[lit]
+    _expect_share(case, "lamplight", f"lit by {name}", right)
 
 
-def _sun_on_floor(view: StoredView, room: Mapping[str, Any], scene: LitScene) -> float:
-    """lx that the sun brings to a level floor of which it sees any part, else 0."""
-    sky = view.table.get("modes", {}).get("light", {}).get("sky", {})
-    if not sky.get("sun_lx") or sky["sun_direction"][1] <= 0:
+def _sun_on_floor(case: ViewCase, room: Mapping[str, Any]) -> float:
+    """Sunlight in lx on a level floor of which the sun sees any part, else 0."""
+    to_sun, scene = _to_sun(case), case.now.shared(LitScene)
+    if to_sun is None:
         return 0.0
-    corners = np.array(room["polygon"], np.float64)
-    low, high = corners.min(0), corners.max(0)
-    x, z = np.meshgrid(*(np.linspace(a, b, _FLOOR_GRID) for a, b in zip(low, high, strict=True)))
-    start = np.stack([x.ravel(), np.full(x.size, room["floor_y"] + 0.1), z.ravel()], axis=1)
-    inside = np.array([is_within(room["polygon"], p) for p in start[:, [0, 2]]], bool)
-    start = start[inside]
-    to_sun = np.broadcast_to(np.array(sky["sun_direction"], np.float64), start.shape)
-    met = scene.inside.first(start, to_sun)
-    free = (met < 0) | scene.is_unsure[met]
-    return float(sky["sun_lx"]) if free.any() else 0.0
+    start = points_in_plan(room["polygon"], _FLOOR_GRID, room["floor_y"] + _FLOOR_M)
+    face = scene.inside.first(start, np.broadcast_to(to_sun, start.shape))
+    free = (face < 0) | scene.is_unsure[face]
+    return float(_sky(case)["sun_lx"]) if free.any() else 0.0
 
 
-def _check_level(
-    view: StoredView, channels: Channels, places: _Places, scene: LitScene, tally: Tally
-) -> None:
-    """The floor that is seen is about as bright as illuminance.json tells of the room's."""
-    room = scene.house.rooms.get(str(view.table.get("room")), {})
-    row = scene.house.lux_rows.get(str(view.table.get("room")))
-    # What stands elsewhere than illuminance.json had it lets in other light.
-    if row is None or not room or scene.house.moved is not None:
+def _check_level(case: ViewCase, places: _Places) -> None:
+    """The visible floor is about as bright as the room's in illuminance.json."""
+    house, name = case.house, str(case.view.table.get("room"))
+    room, row = house.rooms.get(name, {}), house.lux_rows.get(name)
+    # Items that have moved since illuminance.json let in other light.
+    if row is None or not room or house.moved is not None:
         return
-    floor = (places.normals[:, 1] > _UPRIGHT) & (places.points[:, 1] < room["floor_y"] + 0.1)
-    floor &= places.points[:, 1] > room["floor_y"] - 0.1
-    # Through an open plan one sees the floors of others.
+    above = places.points[:, 1] - room["floor_y"]
+    floor = (places.normals[:, 1] > _UPRIGHT) & (np.abs(above) < _FLOOR_M)
+    # In an open plan the floors of other rooms are visible, too.
     floor &= [is_within(room["polygon"], point) for point in places.points[:, [0, 2]]]
-    # A patch of sun that this view does not show may bring most of what is told, and one that it
-    # shows may bring more.
-    sun_lx = _sun_on_floor(view, room, scene)
+    # A patch of sun outside the view may give most of the room's light, and one inside it more.
+    sun_lx = _sun_on_floor(case, room)
     for group in ("outdoor", "indoor"):
-        told = float(row[f"{group}_lx"])
-        lux = _lux(channels, group, places)
+        stored = float(row[f"{group}_lx"])
+        lux = _lux(case, group, places)
         chosen = floor & (lux < sun_lx / 2) if group == "outdoor" and sun_lx else floor
         if chosen.sum() < _FEW:
             continue
-        seen = float(np.mean(lux[chosen]))
-        if max(told, seen) >= _LEAST_FLOOR_LX:
-            most = seen * _LEVEL + (sun_lx if group == "outdoor" else 0.0)
-            same = seen / _LEVEL <= told <= most
-            what = f"{group} light brings {seen:.3g} lx to the floor that it shows, told {told:.3g}"
-            tally.expect("levels", f"{view.place}/radiance.exr", same, what)
+        level = float(np.mean(lux[chosen]))
+        if max(stored, level) >= _LEAST_FLOOR_LX:
+            most = level * _LEVEL + (sun_lx if group == "outdoor" else 0.0)
+            same = level / _LEVEL <= stored <= most
+            fault = f"{group} light brings {level:.3g} lx to the floor that it shows, told {stored:.3g}"  # fmt: skip
+            case.expect("levels", "radiance.exr")(same, fault)
 
 
-def _check_seen_bulbs(
-    view: StoredView,
-    channels: Channels,
-    instance: NDArray[Any],
-    scene: LitScene,
-    rays: Rays,
-    tally: Tally,
-) -> None:
-    """Pixels amid a bulb hold its radiance: its flux over pi and what of its area is outside."""
-    level = _luminance(channels, "indoor")
-    for name, (corners, flux, number) in scene.bulbs.items():
-        rows, columns = np.nonzero(instance == number)
+def _check_visible_bulbs(case: ViewCase) -> None:
+    """Pixels amid a bulb hold its radiance: its flux over pi and its outer area."""
+    level, instance = luminance_of(case.light, "indoor"), case.arrays["instance"]
+    for name, bulb in case.now.shared(LitScene).bulbs.items():
+        rows, columns = np.nonzero(instance == bulb.instance)
         if len(rows) < _FEW_BULB_PX:
             continue
-        light = scene.house.items[number]["lights"][lamp_names(scene.house)[name][1]]
-        emitting = scene.is_bulb & (scene.triangles.instance == number)
-        emitting &= np.isin(scene.triangles.surface, light["emitting"])
         mask = np.zeros(instance.shape, bool)
-        mask[rows, columns] = _shows(emitting, view, rays, rows, columns)
+        mask[rows, columns] = _shows(case, bulb.faces, rows, columns)
         amid = np.argwhere(ndimage.binary_erosion(mask, np.ones((3, 3), bool)))[:_MOST_BULB_PX]
         # Between the rods of a bulb are gaps that no pixel's middle meets.
         for dy, dx in itertools.product(np.linspace(-1.4, 1.4, _BULB_GRID), repeat=2):
-            amid = amid[_shows(emitting, view, rays, amid[:, 0] + dy, amid[:, 1] + dx)]
+            amid = amid[_shows(case, bulb.faces, amid[:, 0] + dy, amid[:, 1] + dx)]
         if len(amid) < _FEW_BULB_PX:
             continue
-        found = float(np.median(level[tuple(amid.T)]))
-        expected = flux / (LM_PER_W * math.pi * _area_outside(corners.reshape(-1, 3, 3)))
-        what = f"bulb {name} shows {found:.4g} W m-2 sr-1, by house.json {expected:.4g}"
-        same = abs(found / expected - 1) <= _BULB_SHARE
-        tally.expect("bulbs", f"{view.place}/radiance.exr", same, what)
+        radiance = float(np.median(level[tuple(amid.T)]))
+        area = _outer_area(bulb.corners.reshape(-1, 3, 3))
+        expected = bulb.flux / (LM_PER_W * math.pi * area)
+        fault = f"bulb {name} shows {radiance:.4g} W m-2 sr-1, by house.json {expected:.4g}"
+        is_near = abs(radiance / expected - 1) <= _BULB_SHARE
+        case.expect("bulbs", "radiance.exr")(is_near, fault)
 
 
-def _shows(
-    faces: NDArray[np.bool_],
-    view: StoredView,
-    rays: Rays,
-    rows: NDArray[Any],
-    columns: NDArray[Any],
-) -> NDArray[np.bool_]:
-    """(N,) whether these places of the picture show one of the faces (F,)."""
+def _shows(case: ViewCase, faces: Bools, rows: NDArray[Any], columns: NDArray[Any]) -> Bools:
+    """(N,) these places of the picture show one of the faces (F,)."""
     if not len(rows):
         return np.zeros(0, bool)
-    face = rays.first(*view.rays(rows, columns))
+    face = case.now.rays.first(*case.view.rays(rows, columns))
     return np.asarray((face >= 0) & faces[face])
 
 
-def _check_windows(
-    view: StoredView, channels: Channels, scene: LitScene, rays: Rays, tally: Tally
-) -> None:
-    """By day, what is seen through panes, or where nothing is, has outdoor light, and hardly any of lamps."""
-    sky = view.table.get("modes", {}).get("light", {}).get("sky", {})
-    if not scene.house.rooms or sky.get("sky_lx", 0.0) < _DAY_LX:
+def _check_windows(case: ViewCase) -> None:
+    """By day, pixels that show the outdoors have daylight, and hardly any light of lamps."""
+    if not case.house.rooms or _sky(case).get("sky_lx", 0.0) < _DAY_LX:
         return
-    height, width = view.size
-    rng = np.random.default_rng(zlib.crc32(f"{view.place} windows".encode()))
+    height, width = case.view.size
+    rng = np.random.default_rng(zlib.crc32(f"{case.place} windows".encode()))
     index = rng.choice(height * width, min(_WINDOW_RAYS, height * width), replace=False)
     rows, columns = index // width, index % width
-    origin, directions = view.rays(rows, columns)
-    through = directions.any(axis=1) & (scene.inside.first(origin, directions) < 0)
+    origin, directions = case.view.rays(rows, columns)
+    inside = case.now.shared(LitScene).inside
+    through = directions.any(axis=1) & (inside.first(origin, directions) < 0)
     if int(through.sum()) < _FEW:
         return
     day, lamps = (
-        float(np.median(_luminance(channels, g)[rows, columns][through]))
+        float(np.median(luminance_of(case.light, g)[rows, columns][through]))
         for g in ("outdoor", "indoor")
     )
-    what = f"windows show {day:.3g} W m-2 sr-1 of daylight and {lamps:.3g} of lamps"
-    tally.expect("windows", f"{view.place}/radiance.exr", day > lamps, what)
+    fault = f"windows show {day:.3g} W m-2 sr-1 of daylight and {lamps:.3g} of lamps"
+    case.expect("windows", "radiance.exr")(day > lamps, fault)
 
 
-def _check_colours(
-    view: StoredView, channels: Channels, places: _Places, scene: LitScene, tally: Tally
-) -> None:
-    """By day, lamps whose sources name no colour are redder than what comes from outside."""
-    sky = view.table.get("modes", {}).get("light", {}).get("sky", {})
-    lights = [light for row in scene.house.items.values() for light in row["lights"]]
-    emission = scene.house.recipe.get("emission", {})
-    # Sources that name no colour have a warm white one, drawn by the recipe.
+def _check_colours(case: ViewCase, places: _Places) -> None:
+    """By day, lamps whose sources name no colour are redder than daylight."""
+    lights = [light for row in case.house.items.values() for light in row["lights"]]
+    emission = case.house.recipe.get("emission", {})
+    # The recipe draws a warm white for sources without a colour.
     is_warm = not any(x["is_coloured"] or np.ptp(x["rgb_linear"]) > _GREY for x in lights)
     is_warm &= emission.get("preset") == "photometric" and emission["lamp_kelvin_max"] <= _WARM_K
-    if not lights or not is_warm or sky.get("sky_lx", 0.0) < _DAY_LX:
+    if not lights or not is_warm or _sky(case).get("sky_lx", 0.0) < _DAY_LX:
         return
-    share = {}
-    for group in ("outdoor", "indoor"):
-        red, blue = (
-            float(
-                (channels[f"{group}.{c}"] / np.maximum(channels[f"albedo.{c}"], _LEAST_ALBEDO))[
-                    places.rows, places.columns
-                ].mean(dtype=np.float64)
-            )
-            for c in "RB"
-        )
-        share[group] = red / blue if blue > 0 else 0.0
-    if min(share.values()) > 0:
-        what = (
-            f"red over blue is {share['indoor']:.2f} of lamps, {share['outdoor']:.2f} of daylight"
-        )
-        same = share["indoor"] > share["outdoor"]
-        tally.expect("colours of light", f"{view.place}/radiance.exr", same, what)
+    outdoor, indoor = (_red_over_blue(case, places, g) for g in ("outdoor", "indoor"))
+    if min(outdoor, indoor) > 0:
+        fault = f"red over blue is {indoor:.2f} of lamps, {outdoor:.2f} of daylight"
+        case.expect("colours of light", "radiance.exr")(indoor > outdoor, fault)
 
 
-def _area_outside(corners: Floats) -> float:
-    """m2 of triangles (F, 3, 3): once where each edge has its reverse, else from both sides."""
+def _red_over_blue(case: ViewCase, places: _Places, group: str) -> float:
+    """Ratio of a light group's arriving red to its blue."""
+    means = []
+    for c in "RB":
+        light = case.light[f"{group}.{c}"]
+        arriving = light / np.maximum(case.light[f"albedo.{c}"], _LEAST_ALBEDO)
+        means.append(float(arriving[places.rows, places.columns].mean(dtype=np.float64)))
+    red, blue = means
+    return red / blue if blue > 0 else 0.0
+
+
+def _outer_area(corners: F64) -> float:
+    """Area in m2 of triangles (F, 3, 3): of one side if each edge has its reverse, else of both."""
     sides = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     area = float(np.linalg.norm(sides, axis=1).sum() / 2)
     _, numbers = np.unique(np.round(corners.reshape(-1, 3), 6), axis=0, return_inverse=True)
@@ -470,3 +423,6 @@ def _area_outside(corners: Floats) -> float:
     edges = edges[edges[:, 0] != edges[:, 1]]
     counts = np.unique(edges, axis=0, return_counts=True)[1]
     return area if float((counts >= 2).mean()) > 0.95 else 2 * area
+
+
+CHECKS = (Check(name="sun and lamps", of="view", needs=("radiance",), function=check_lit, cost=27),)

@@ -1,6 +1,6 @@
-"""How `verify` looks at each file of a root, and what it does not look at; no effects.
+"""How `verify` recomputes each file of a root, and what it does not recompute; no effects.
 
-A file whose row is missing is held against its hash and, of a layer, its size and type.
+A file without a row is compared with its hash and, if it is a layer, its size and type.
 """
 
 from __future__ import annotations
@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections import Counter
 from pathlib import Path
 
+from pbrs_farm.check.checks import all_checks
 from pbrs_farm.check.fields import field_lines
 from pbrs_farm.check.intrinsic_checks import LAYERS as INTRINSIC
 from pbrs_farm.check.pixel_checks import RAY_LAYERS
@@ -22,7 +23,7 @@ _MIRRORED = "recomputed by rays that mirrors send on"
 _INTRINSIC = "albedo x shading + residual against radiance.exr developed again, matte surfaces and clear ones by materials"
 _NOISE = "each value within its noise, mean and spread by their statistics"
 
-# File -> how it is looked at.
+# File -> how it is recomputed. Checks may have further ones: see `how_of_files`.
 HOW: dict[str, str] = {
     **{LAYER[name].file: RAYS for name in RAY_LAYERS},
     "boundary.png": FORMULA, "boundary_semantic.png": FORMULA, "nyu13.png": FORMULA,
@@ -49,7 +50,7 @@ HOW: dict[str, str] = {
     "occlusion_backward.png": _MOTION, "disparity.png": _MOTION, "occlusion_stereo.png": _MOTION,
 }  # fmt: skip
 
-# What is looked at of the files of a house and of a root, beside their fields.
+# The same of the files of a house and of a root, beside their fields.
 HOW_OF_HOUSE: dict[str, str] = {
     "house.glb": "its triangles are what rays meet; items, materials and pictures are those of house.json",
     "house.json": "each field has its check", "cameras.json": "each field has its check",
@@ -59,21 +60,26 @@ HOW_OF_HOUSE: dict[str, str] = {
     "recipe.json": "by the digest and the seeds of its views", "ATTRIBUTION.txt": "names what dress.json says must be",
 }  # fmt: skip
 
-# What no file of a root tells.
+# Facts that no file of a root holds.
 _NEVER = (
     "levels of light, but for bulbs that are seen and what sun and bulbs bring at least: no light is traced",
     "house.glb and house.json against their source, which is not stored",
 )
 
 
-def looked_at(views: list[StoredView], fields: Counter[tuple[str, str]]) -> tuple[str, ...]:
-    """A line for each kind of file that was recomputed: its name, in how many views, how.
+def how_of_files() -> dict[str, str]:
+    """File of a view -> how it is recomputed, also by checks of the table."""
+    return HOW | {file: how for check in all_checks() for file, how in check.files.items()}
 
-    In the order of the list of methods, without kinds of files that no view has; then how many
-    kinds of fields of each JSON file have a check (fields: as of `fields.stored_fields`).
+
+def looked_at(views: list[StoredView], fields: Counter[tuple[str, str]]) -> tuple[str, ...]:
+    """A line for each kind of file that was recomputed: its name, the number of views, the method.
+
+    Then the number of kinds of fields of each JSON file that have a check (fields: as of
+    `fields.stored_fields`).
     """
-    counts = _file_counts(views)
-    files = tuple(f"{file} ({counts[file]}): {how}" for file, how in HOW.items() if counts[file])
+    counts, how_of = _file_counts(views), how_of_files()
+    files = tuple(f"{file} ({counts[file]}): {how}" for file, how in how_of.items() if counts[file])
     return (*files, *field_lines(fields)[0])
 
 
@@ -84,16 +90,16 @@ def not_looked_at(
     fields: Counter[tuple[str, str]],
     n_halved: int = 0,
 ) -> tuple[str, ...]:
-    """A line for each kind of file that a hash alone speaks for, or little more, and for each field without a check.
+    """A line for each kind of file that only has a hash, or little more, and for each field without a check.
 
-    With each view whose light could not be developed again and why, of how many it was denoised
-    at half its size, and the lines that hold for every root.
+    With each view whose light could not be developed again and why, the number of views that were
+    denoised at half their size, and the lines that apply to every root.
     """
-    counts = _file_counts(views)
+    counts, how_of = _file_counts(views), how_of_files()
     layers = {layer.file for layer in LAYERS}
     lines = []
     for file in sorted(counts):
-        if file not in HOW:
+        if file not in how_of:
             how = "hash, size and type alone" if file in layers else "hash alone"
             lines.append(f"{file} ({counts[file]}): {how}")
     lines += unknown_files(root, houses)
@@ -109,19 +115,19 @@ def not_looked_at(
 
 def unknown_files(root: Path, houses: list[Path]) -> list[str]:
     """A line for each file beside the views that no check opens."""
-    found = Counter(file.name for file in root.glob("*") if file.is_file())
+    counts = Counter(file.name for file in root.glob("*") if file.is_file())
     for house in houses:
-        found.update(file.name for file in house.glob("*") if file.is_file())
+        counts.update(file.name for file in house.glob("*") if file.is_file())
     return [
         f"{name} ({n}): no check knows it"
-        for name, n in sorted(found.items())
+        for name, n in sorted(counts.items())
         if name not in HOW_OF_HOUSE
     ]
 
 
 def unowned_layers() -> list[str]:
-    """Files of layers of the package that no check looks at, nor says how little it does."""
-    return [layer.file for layer in OWN_LAYERS if layer.file not in HOW]
+    """Files of layers of the package that no check recomputes."""
+    return [layer.file for layer in OWN_LAYERS if layer.file not in how_of_files()]
 
 
 def _file_counts(views: list[StoredView]) -> Counter[str]:
@@ -134,7 +140,7 @@ def _file_counts(views: list[StoredView]) -> Counter[str]:
 
 
 def _light_fault(view: StoredView) -> str:
-    """Why a view's light modes were not compared to the step; "" where they were, or are not there."""
+    """Why a view's light modes were not compared by pixels; "" if they were, or if it has none."""
     if not (view.has("mlt_ol.png") or view.has("mlt_il_ol.png")):
         return ""
     if view.recipe is None:

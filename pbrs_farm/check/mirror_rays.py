@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from pbrs_farm.check.embree_caster import Faces, Floats, Rays
+from pbrs_farm.check.embree_caster import Rays
 from pbrs_farm.check.stored_mesh import Triangles
+from pbrs_farm.core.arrays import F64, I64
 
 _MOST = 8  # reflections; the next mirror is what is met
 _LEAST_COSINE = 0.02  # between a shading normal and the way back, to which it is bent
@@ -19,20 +20,20 @@ class MirrorRays:
     from what stands behind a window.
     """
 
-    def __init__(self, triangles: Triangles, rays: Rays, eye: Floats) -> None:
+    def __init__(self, triangles: Triangles, rays: Rays, eye: F64) -> None:
         """rays: of all triangles."""
         self._triangles, self._rays, self._eye = triangles, rays, eye
 
-    def first(self, origin: Floats, directions: Floats) -> Faces:
+    def first(self, origin: F64, directions: F64) -> I64:
         """As Rays, behind the mirrors."""
         return self._followed(origin, directions)[0]
 
-    def distance(self, face: Faces, origin: Floats, directions: Floats) -> Floats:
+    def distance(self, face: I64, origin: F64, directions: F64) -> F64:
         """(N,) the whole way to each face's plane; 0 where face is -1."""
         _face, way, at, d, _mirrors = self._followed(origin, directions)
         return np.where(face >= 0, way + self._rays.distance(face, at, d), 0.0)
 
-    def normal(self, face: Faces, directions: Floats) -> Floats:
+    def normal(self, face: I64, directions: F64) -> F64:
         """(N, 3) unit normals of the images; 0 where face is -1."""
         _face, _way, _at, d, mirrors = self._followed(self._eye, directions)
         seen = self._rays.normal(face, d)
@@ -40,24 +41,22 @@ class MirrorRays:
             seen = seen - 2 * np.einsum("ni,ni->n", seen, n)[:, None] * n
         return seen
 
-    def without_holes(self, face: Faces, origin: Floats, directions: Floats) -> Faces:
+    def without_holes(self, face: I64, origin: F64, directions: F64) -> I64:
         """As Rays, behind the mirrors."""
         at, d, _way = self.last_leg(origin, directions)
         return self._rays.without_holes(face, at, d)
 
-    def last_leg(self, origin: Floats, directions: Floats) -> tuple[Floats, Floats, Floats]:
+    def last_leg(self, origin: F64, directions: F64) -> tuple[F64, F64, F64]:
         """As Rays: from the last mirrors."""
         _face, way, at, d, _mirrors = self._followed(origin, directions)
         return at, d, way
 
-    def _followed(
-        self, origin: Floats, directions: Floats
-    ) -> tuple[Faces, Floats, Floats, Floats, list[Floats]]:
+    def _followed(self, origin: F64, directions: F64) -> tuple[I64, F64, F64, F64, list[F64]]:
         """(faces, way until the last mirrors, points there, directions, normals of all mirrors; 0 = none)."""
         at = np.broadcast_to(origin, directions.shape).copy()
         d, way = directions.copy(), np.zeros(len(directions))
         face = self._rays.first(at, d)
-        mirrors: list[Floats] = []
+        mirrors: list[F64] = []
         for _ in range(_MOST):
             on = np.nonzero((face >= 0) & (self._triangles.kinds_of(face) == "mirror"))[0]
             if not len(on):

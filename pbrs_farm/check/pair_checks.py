@@ -8,81 +8,75 @@ from __future__ import annotations
 import io
 import zlib
 from collections import Counter
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from pbrs_farm.check.certificate import Tally
-from pbrs_farm.check.embree_caster import Floats, Rays
+from pbrs_farm.check.axes import into_frame, opencv_pose
+from pbrs_farm.check.cases import HouseCase
+from pbrs_farm.check.checks import Check
+from pbrs_farm.check.embree_caster import Rays
 from pbrs_farm.check.lens_rays import StoredLens
+from pbrs_farm.check.rules import judge
 from pbrs_farm.check.stored_files import BadFile, stored_bytes, stored_object
+from pbrs_farm.core.arrays import F64, Bools
 
-SHARE = 0.01  # of 768 points: those on edges may fall either way
-GRID = (32, 24)  # rays of a view, across and down
-MOST_PAIRS = 40  # of a house, chosen by its name
-PAIR_REACH_M = 1e-3  # how far before a point the ray to it may end
-COLUMNS = ("room", "view_a", "view_b", "a_in_b", "b_in_a", "common", "baseline_m", "angle_deg")
+_FILE = "pairs.parquet"
+_GRID = (32, 24)  # rays of a view, across and down
+_MOST_PAIRS = 40  # of a house, chosen by its name
+_REACH_M = 1e-3  # tolerance of a ray's end before a point
+_COLUMNS = ("room", "view_a", "view_b", "a_in_b", "b_in_a", "common", "baseline_m", "angle_deg")
 
 
-def check_pairs(house: Path, rays: Rays, tally: Tally) -> None:
-    """Recompute the shares of some pairs of a house that has the file.
+def check_pairs(case: HouseCase) -> None:
+    """Recompute the shares of some pairs, and the other columns of all.
 
-    At most MOST_PAIRS, drawn by the house's name, so the same each time. A house without
-    pairs.parquet counts nothing; one that cannot be read is a failure.
+    At most _MOST_PAIRS, drawn by the house's name, so the same each time. A file that cannot be
+    read is a failure.
     """
-    file = house / "pairs.parquet"
-    if not file.is_file():
-        return
-    # Here, since it loads slowly and few homes have the file.
+    # Loads slowly, and few homes have the file.
     import pyarrow as pa
     import pyarrow.parquet as pq
 
+    folder, expect = case.house.folder, case.expect("pairs")
     try:
-        rows = pq.read_table(io.BytesIO(stored_bytes(file))).select(list(COLUMNS)).to_pylist()
-        views = {row["id"]: row for row in stored_object(house / "cameras.json")["views"]}
+        data = io.BytesIO(stored_bytes(folder / _FILE))
+        rows = pq.read_table(data).select(list(_COLUMNS)).to_pylist()
+        views = {row["id"]: row for row in stored_object(folder / "cameras.json")["views"]}
     except (BadFile, pa.ArrowException, KeyError, TypeError) as error:
-        tally.expect("pairs", house.name, False, f"cannot be read: {error}")
+        expect(False, f"cannot be read: {error}")
         return
-    named = {row[key] for row in rows for key in ("view_a", "view_b")}
-    if not tally.expect("pairs", house.name, named <= views.keys(), "names views that are none"):
+    names = {row[key] for row in rows for key in ("view_a", "view_b")}
+    if not expect(names <= views.keys(), "names views that are none"):
         return
-    rng = np.random.default_rng(zlib.crc32(house.name.encode()))
-    chosen = rng.permutation(len(rows))[:MOST_PAIRS]
-    for row in (rows[int(k)] for k in sorted(chosen)):
-        a, b = views[row["view_a"]], views[row["view_b"]]
-        for key, one, other in (("a_in_b", a, b), ("b_in_a", b, a)):
-            share = _share(_Camera(one), _Camera(other), rays)
-            place = f"{house.name}: {row['view_a']}, {row['view_b']}"
-            right = abs(row[key] - share) <= SHARE
-            tally.expect("pairs", place, right, f"{key} is {row[key]:.3f}, here {share:.3f}")
-    for row in rows:
-        _check_row(house, row, views[row["view_a"]], views[row["view_b"]], tally)
+    rng = np.random.default_rng(zlib.crc32(case.house.id.encode()))
+    chosen = set(rng.permutation(len(rows))[:_MOST_PAIRS].tolist())
+    for k, row in enumerate(rows):
+        _check_row(case, row, views, is_followed=k in chosen)
     # Each pair of views of a room has a row.
     counts = Counter(view["room"] for view in views.values())
-    expected = sum(n * (n - 1) // 2 for n in counts.values())
-    what = f"has {len(rows)} rows, views of a room make {expected} pairs"
-    tally.expect("pairs", house.name, len(rows) == expected, what)
+    n_pairs = sum(n * (n - 1) // 2 for n in counts.values())
+    fault = f"has {len(rows)} rows, views of a room make {n_pairs} pairs"
+    expect(len(rows) == n_pairs, fault)
 
 
 def _check_row(
-    house: Path, row: dict[str, Any], a: dict[str, Any], b: dict[str, Any], tally: Tally
+    case: HouseCase, row: dict[str, Any], views: dict[str, dict[str, Any]], *, is_followed: bool
 ) -> None:
-    """Both views are of the room that is told; what follows from their shares and cameras."""
-    place = f"{house.name}: {row['view_a']}, {row['view_b']}"
-    same = row["room"] == a["room"] == b["room"]
-    tally.expect("pairs", place, same, f"are not both of room {row['room']}")
-    one, other = _Camera(a), _Camera(b)
-    cosine = float(np.clip(one.rotation[:, 2] @ other.rotation[:, 2], -1, 1))
-    expected = {
+    """Rooms and shares of a pair, and what follows from these and from the cameras."""
+    place = f"{case.house.id}: {row['view_a']}, {row['view_b']}"
+    rows = [views[row["view_a"]], views[row["view_b"]]]
+    a, b = (_Camera(view) for view in rows)
+    if is_followed:
+        shares = {"a_in_b": _share(a, b, case.rest.rays), "b_in_a": _share(b, a, case.rest.rays)}
+        judge("pair shares", place, case.tally, row=row, shares=shares)
+    cosine = float(np.clip(a.rotation[:, 2] @ b.rotation[:, 2], -1, 1))
+    facts = {
         "common": (row["a_in_b"] + row["b_in_a"]) / 2,
-        "baseline_m": float(np.linalg.norm(one.eye - other.eye)),
+        "baseline_m": float(np.linalg.norm(a.eye - b.eye)),
         "angle_deg": float(np.degrees(np.arccos(cosine))),
     }
-    for key, value in expected.items():
-        # Stored as 32-bit floats; an angle near 0 is the arc of a cosine near 1.
-        right = abs(row[key] - value) <= 1e-3 + 1e-5 * abs(value)
-        tally.expect("pairs", place, right, f"{key} is {row[key]:.4f}, here {value:.4f}")
+    judge("pair", place, case.tally, row=row, views=rows, facts=facts)
 
 
 class _Camera:
@@ -90,46 +84,47 @@ class _Camera:
 
     def __init__(self, row: dict[str, Any]) -> None:
         i = row["intrinsics"]
-        x, y = GRID[0] / i["width_px"], GRID[1] / i["height_px"]
+        x, y = _GRID[0] / i["width_px"], _GRID[1] / i["height_px"]
         self.f = np.array([i["fx"] * x, i["fy"] * y])
         self.c = np.array([i["cx"] * x, i["cy"] * y])
         self.lens = StoredLens.of(i["lens"]) if "lens" in i else None
-        # OpenGL axes to x right, y down, z forward.
-        pose = np.array(row["world_from_camera_opengl"], np.float64) @ np.diag([1.0, -1, -1, 1])
-        self.rotation, self.eye = pose[:3, :3], pose[:3, 3]
+        self.pose = opencv_pose(row["world_from_camera_opengl"])
+        self.rotation, self.eye = self.pose[:3, :3], self.pose[:3, 3]
 
-    def directions(self) -> Floats:
-        """(N, 3) through the middles of the grid's pixels that see anything, of unit depth."""
-        columns, rows = np.meshgrid(np.arange(GRID[0]) + 0.5, np.arange(GRID[1]) + 0.5)
+    def directions(self) -> F64:
+        """(N, 3) of unit depth, through the centres of the grid's pixels that see anything."""
+        columns, rows = np.meshgrid(np.arange(_GRID[0]) + 0.5, np.arange(_GRID[1]) + 0.5)
         plane = (np.stack([columns.ravel(), rows.ravel()], axis=1) - self.c) / self.f
         if self.lens is None:
             return np.asarray(np.insert(plane, 2, 1.0, axis=1) @ self.rotation.T)
         local = self.lens.rays(plane)
         return np.asarray(local[np.abs(local).sum(1) > 0] @ self.rotation.T)
 
-    def shows(self, points: Floats) -> np.ndarray[Any, np.dtype[np.bool_]]:
-        """(N,) points (N, 3) that fall into the picture."""
-        local = (points - self.eye) @ self.rotation
+    def shows(self, points: F64) -> Bools:
+        """(N,) points (N, 3) inside the picture."""
+        local = into_frame(self.pose, points)
         with np.errstate(divide="ignore", invalid="ignore"):
             plane, depth = local[:, :2] / local[:, 2:], local[:, 2]
             if self.lens is not None:
                 plane, depth = self.lens.plane_and_depth(local)
             px = plane * self.f + self.c
-            inside = ((px >= 0) & (px < GRID)).all(axis=1)
+            inside = ((px >= 0) & (px < _GRID)).all(axis=1)
             return np.asarray(inside & (depth > 1e-3), bool)
 
 
-def _share(one: _Camera, other: _Camera, rays: Rays) -> float:
-    """The part of the ends of one's rays that other sees; 0 where they meet nothing."""
-    directions = one.directions()
-    face = rays.first(one.eye, directions)
-    z = rays.distance(face, one.eye, directions)
-    points = (one.eye + directions * z[:, None])[face >= 0]
+def _share(camera: _Camera, other: _Camera, rays: Rays) -> float:
+    """Share of the ends of one camera's rays that the other sees; 0 if they meet nothing."""
+    directions = camera.directions()
+    face = rays.first(camera.eye, directions)
+    z = rays.distance(face, camera.eye, directions)
+    points = (camera.eye + directions * z[:, None])[face >= 0]
     if not len(points):
         return 0.0
-    inside = points[other.shows(points)]
-    to = inside - other.eye
+    to = points[other.shows(points)] - other.eye
     face = rays.first(other.eye, to)
     t = rays.distance(face, other.eye, to)
-    seen = (face < 0) | ((1 - t) * np.linalg.norm(to, axis=1) <= PAIR_REACH_M)
-    return float(seen.sum() / len(points))
+    visible = (face < 0) | ((1 - t) * np.linalg.norm(to, axis=1) <= _REACH_M)
+    return float(visible.sum() / len(points))
+
+
+CHECKS = (Check(name="pairs", of="views", needs=(_FILE,), function=check_pairs, cost=3),)

@@ -1,14 +1,15 @@
-"""Every label of a pixel against what an independent ray through its centre finds; no effects.
+"""Every label of a pixel against an independent ray through its centre; no effects.
 
 A ray that grazes an edge, or meets two surfaces in the same place, has more than one right
-answer. Where the centre's answer does not explain what is stored, the triangles next to it (rays
+answer. If the centre's answer does not explain the stored labels, the triangles next to it (rays
 at most 0.02 px away) and those of the stored instance at the same depth are tried. If one of them
-explains every layer at once the pixel is a tie, which is counted; otherwise it failed. A tie of
-two parallel surfaces within 0.1 mm is the source's own: a window frame in the plane of its wall.
+explains every layer together the pixel is a tie, which is counted; otherwise it failed. A tie of
+two parallel surfaces within 0.1 mm is a fault of the source: a window frame in the plane of its wall.
 """
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
@@ -16,31 +17,32 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.check.embree_caster import Faces, Floats, Hits, Rays
+from pbrs_farm.check.axes import published_directions, stored_normals
+from pbrs_farm.check.cases import Pixels, Scene, ViewCase
+from pbrs_farm.check.checks import Check
+from pbrs_farm.check.colours import srgb_from_linear
+from pbrs_farm.check.mirror_rays import MirrorRays
 from pbrs_farm.check.stored_mesh import Triangles
 from pbrs_farm.check.stored_view import StoredView
+from pbrs_farm.core.arrays import F64, I64, Bools
 
-Bools = NDArray[np.bool_]
-Labels = dict[str, NDArray[Any]]  # layer -> what is stored at N pixels: (N,) or (N, 3)
+Labels = dict[str, NDArray[Any]]  # layer -> stored values at N pixels: (N,) or (N, 3)
 
-ROUNDING_MM = 0.505  # of depth stored in whole mm
-# Per metre of depth, over the cosine: rays with float32 directions, magnified by a slanting face.
-RAY_ERROR_MM = 2e-4
-MAX_RAY_ERROR_MM = 5.0
-NORMAL_TOLERANCE_DEG = 0.02
-SHADING_TOLERANCE_DEG = (
-    0.5  # of a normal between texels of a map, whose bytes are half a degree apart
+_ROUNDING_MM = 0.505  # tolerance of depth stored in whole mm
+_RAY_ERROR_MM = 2e-4  # per metre of depth, over the cosine: float32 directions on a slanting face
+_MAX_RAY_ERROR_MM = 5.0
+_NORMAL_DEG = 0.02  # tolerance of a normal
+_SHADING_DEG = 0.5  # the same between texels of a map, whose bytes are half a degree apart
+_TIE_M = 1e-4  # two surfaces closer than this, across them, may both be hit
+_METRES = 2e-4  # tolerance of depths and positions stored as floats
+_ALBEDO_STEPS = 2.5  # of 255
+_ROUGHNESS_STEPS = 2.5  # of 255
+_PHYSICAL_ALBEDO = 0.9  # the recipe's `physical` materials clip colour times texture to this
+_MOST_COINCIDENT = (
+    3  # pixels of a view with two colours that chance explains: items meet at an edge
 )
-TIE_DEPTH_M = 1e-4  # two surfaces closer than this, across them, may both be hit
-METRES = 2e-4  # tolerance of depths and positions stored as floats
-ALBEDO_STEPS = 2  # of 255, by which an albedo may differ
-ROUGHNESS_STEPS = 2  # of 255, by which a roughness of a map may differ
-PHYSICAL_ALBEDO = (
-    0.9  # that light holds colour times texture to, materials of the recipe's `physical`
-)
-
 _PARALLEL = 0.999  # least cosine between the normals of coincident surfaces
-# From the pixel's centre to the neighbouring rays: a silhouette may be nearer than a thin thing is wide.
+# Distances of neighbouring rays from the pixel's centre: a silhouette may be nearer than a thin item is wide.
 _JITTER_PX = (0.02, 0.005, 0.002)
 _JITTER = np.concatenate(
     [
@@ -50,38 +52,75 @@ _JITTER = np.concatenate(
 )
 
 
-def labels_at(labels: Labels, index: NDArray[np.int64]) -> Labels:
-    """The labels of some of the pixels."""
-    return {name: array[index] for name, array in labels.items()}
-
-
 @dataclass(frozen=True, slots=True, eq=False)
-class PixelChecks:
-    """What is right at N pixels."""
+class PixelVerdict:
+    """Which labels are right at N pixels."""
 
-    right: dict[str, Bools]  # check -> (N,) what is stored is right
+    right: dict[str, Bools]  # layer -> (N,)
     tied: Bools  # (N,) right by another triangle than the one that the centre's ray hit
-    face: Faces  # (N,) that triangle, -1 = nothing
+    face: I64  # (N,) that triangle, -1 = nothing
     coincident: Bools  # (N,) tied, and the two triangles fill one place
-    first: Faces  # (N,) the triangle that the centre's ray hit, -1 = nothing
+    first: I64  # (N,) the triangle that the centre's ray hit, -1 = nothing
 
 
-def judge(
-    view: StoredView,
-    labels: Labels,
-    rows: NDArray[np.int64],
-    columns: NDArray[np.int64],
-    scene: tuple[Triangles, Hits],
-) -> PixelChecks:
-    """Compare labels at pixels (rows, columns) with rays through the scene.
+def check_rays(case: ViewCase) -> None:
+    """Judge the labels of some pixels, also behind glass and behind mirrors."""
+    everything, triangles = case.scene, case.now.triangles
+    basic = ("depth", "normal", "semantic", "instance")
+    scenes: list[tuple[Scene, str, dict[str, str]]] = [
+        (everything, "ray: ", {name: name for name in RAY_LAYERS}),
+        (Scene(triangles, case.now.opaque), "ray: behind glass ", {name: f"behind_glass_{name}" for name in basic}),
+    ]  # fmt: skip
+    mirrored = {name: f"behind_mirror_{name}" for name in basic}
+    if any(file in case.arrays for file in mirrored.values()):
+        rays = MirrorRays(triangles, case.now.rays, case.view.world_from_camera[:3, 3])
+        scenes.append((Scene(triangles, rays), "ray: behind mirror ", mirrored))
+    rows, columns = case.pixels
+    for scene, prefix, files in scenes:
+        labels = {k: case.arrays[f][rows, columns] for k, f in files.items() if f in case.arrays}
+        if not labels:
+            continue
+        labels = {k: a.astype(np.int64) if a.dtype.kind == "u" else a for k, a in labels.items()}
+        verdict = judge_pixels(case.view, labels, case.pixels, scene)
+        # Coincident surfaces are listed by pairs of items.
+        _note_pairs(case, verdict.first[verdict.coincident], verdict.face[verdict.coincident])
+        if prefix == "ray: ":
+            _note_glitter(case, verdict)
+        ties = int((verdict.tied & ~verdict.coincident).sum())
+        for layer, right in verdict.right.items():
+            case.tally.add(f"{prefix}{layer}", len(rows), ties=ties)
+            for k in np.nonzero(~right)[0]:
+                place = f"row {rows[k]}, column {columns[k]}"
+                case.tally.fail(f"{prefix}{layer}", case.place, place)
 
-    labels: layer -> (N,) or (N, 3) stored values, of RAY_LAYERS. rows, columns: (N,). Where the ray
-    through a centre does not explain what is stored, rays beside it and coincident surfaces
-    are tried; the result says which checks hold by the triangle that explains most, and where that
-    was a tie.
+
+def _note_pairs(case: ViewCase, first: I64, second: I64) -> None:
+    triangles = case.now.triangles
+    for pair in np.stack([triangles.instance[first], triangles.instance[second]], axis=1):
+        a, b = (triangles.item[int(i)] for i in pair)
+        case.tally.coincide(case.place.partition("/")[0], (a, b))
+
+
+def _note_glitter(case: ViewCase, verdict: PixelVerdict) -> None:
+    """Report the pixels that show either of two colours, if a pair of items has more than a few."""
+    instance = case.now.triangles.instance
+    origin, directions = case.view.rays(*case.pixels)
+    other = of_another_colour(verdict.first, origin, directions, case.scene)
+    shown = np.nonzero((other >= 0) & ~verdict.coincident)[0]
+    first, second = verdict.first[shown], other[shown]
+    pairs = np.sort(np.stack([instance[first], instance[second]], 1), axis=1)
+    _, number, n = np.unique(pairs, axis=0, return_inverse=True, return_counts=True)
+    many = n[number.reshape(-1)] > _MOST_COINCIDENT
+    _note_pairs(case, first[many], second[many])
+
+
+def judge_pixels(view: StoredView, labels: Labels, pixels: Pixels, scene: Scene) -> PixelVerdict:
+    """Compare labels at N pixels with rays through the scene.
+
+    labels: layer -> (N,) or (N, 3) stored values, of RAY_LAYERS. Rays beside a pixel and coincident
+    surfaces are tried where its own ray does not explain the stored values.
     """
-    # Explain what is stored by the triangle that the centre's ray hits.
-    _, rays = scene
+    rays, (rows, columns) = scene.rays, pixels
     origin, directions = view.rays(rows, columns)
     first = rays.first(origin, directions)
     face = first.copy()
@@ -90,307 +129,282 @@ def judge(
 
     # Try other triangles where the first one does not explain everything.
     open_ = np.nonzero(~np.logical_and.reduce(list(right.values())))[0]
+    open_labels = {name: array[open_] for name, array in labels.items()}
     candidates = [
         rays.first(origin, view.rays(rows[open_] + dy, columns[open_] + dx)[1])
         for dx, dy in _JITTER
     ]
-    candidates.append(
-        _coincident(labels_at(labels, open_), face[open_], origin, directions[open_], scene)
-    )
-    # Take over a candidate where it leaves fewer checks wrong.
+    candidates.append(_coincident(open_labels, face[open_], origin, directions[open_], scene))
+    # Take a candidate that leaves fewer labels wrong.
     best = np.sum([~right[name][open_] for name in right], axis=0)
-    for other in candidates:
-        trial = _explain(view, labels_at(labels, open_), other, directions[open_], scene)
+    for candidate in candidates:
+        trial = _explain(view, open_labels, candidate, directions[open_], scene)
         wrong = np.sum([~ok for ok in trial.values()], axis=0)
         better = wrong < best
         best = np.where(better, wrong, best)
-        face[open_[better]] = other[better]
+        face[open_[better]] = candidate[better]
         for name in right:
             right[name][open_[better]] = trial[name][better]
     tied[open_] = best == 0
     coincident = tied & _fill_one_place(first, face, tied, origin, directions, scene)
-    return PixelChecks(right, tied, face, coincident, first)
+    return PixelVerdict(right, tied, face, coincident, first)
 
 
 def _fill_one_place(
-    first: Faces,
-    other: Faces,
-    chosen: Bools,
-    origin: Floats,
-    directions: Floats,
-    scene: tuple[Triangles, Hits],
+    first: I64, second: I64, chosen: Bools, origin: F64, directions: F64, scene: Scene
 ) -> Bools:
     """(N,) of the chosen pixels, those whose ray pierces two parallel triangles in one place."""
     triangles, rays = scene
-    found = np.zeros(len(first), bool)
-    # Only pixels where both rays hit something, and not the same triangle.
-    both = np.nonzero(chosen & (first >= 0) & (other >= 0) & (first != other))[0]
+    fill = np.zeros(len(first), bool)
+    both = np.nonzero(chosen & (first >= 0) & (second >= 0) & (first != second))[0]
     starts, legs, _way = rays.last_leg(origin, directions[both])
     for k, start, leg in zip(both, starts, legs, strict=True):
-        pair, ray = np.array([first[k], other[k]]), directions[k]
+        pair, ray = np.array([first[k], second[k]]), directions[k]
         normals = rays.normal(pair, np.stack([ray, ray]))
         t = distances_pierced(triangles, pair, start, leg)
-        # One place: parallel, and closer along the normal than a tie may be.
         if np.isfinite(t).all() and abs(normals[0] @ normals[1]) >= _PARALLEL:
-            found[k] = abs(t[0] - t[1]) * abs(normals[0] @ ray) <= TIE_DEPTH_M
-    return found
+            fill[k] = abs(t[0] - t[1]) * abs(normals[0] @ ray) <= _TIE_M
+    return fill
 
 
 def _explain(
-    view: StoredView, labels: Labels, face: Faces, directions: Floats, scene: tuple[Triangles, Hits]
+    view: StoredView, labels: Labels, face: I64, directions: F64, scene: Scene
 ) -> dict[str, Bools]:
-    """Per layer whether hitting these faces explains what is stored."""
+    """Layer -> (N,) True where hitting these faces explains the stored value."""
     triangles, rays = scene
     classes = np.zeros(max(triangles.nyu40, default=0) + 1, np.int64)
     classes[list(triangles.nyu40)] = list(triangles.nyu40.values())
     z = rays.distance(face, view.world_from_camera[:3, 3], directions)
-    pierced = _Pierced(view, triangles, classes, face, z, rays.normal(face, directions), directions)
-    return {
-        name: np.asarray(_CHECKS[name](stored, pierced), bool) for name, stored in labels.items()
-    }
+    hits = _Hits(view, triangles, classes, face, z, rays.normal(face, directions), directions)
+    return {name: np.asarray(_LABELS[name](stored, hits), bool) for name, stored in labels.items()}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Pierced:
-    """N pixels and the faces that their rays are taken to meet."""
+class _Hits:
+    """N pixels and the faces that their rays are assumed to hit."""
 
     view: StoredView
     triangles: Triangles
-    classes: NDArray[np.int64]  # instance -> NYU40
-    face: Faces  # (N,), -1 = nothing
-    z: Floats  # (N,) metres along the ray, in units of directions
-    normal: Floats  # (N, 3) of the face, world
-    directions: Floats  # (N, 3)
+    classes: I64  # instance -> NYU40
+    face: I64  # (N,), -1 = nothing
+    z: F64  # (N,) metres along the ray, in units of directions
+    normal: F64  # (N, 3) of the face, world
+    directions: F64  # (N, 3)
 
     @property
     def hit(self) -> Bools:
         return self.face >= 0
 
     @property
-    def instance(self) -> NDArray[np.int64]:
-        return _of_face(self.triangles.instance, self.face)
+    def instance(self) -> I64:
+        return self.of_face(self.triangles.instance)
 
     @property
-    def point(self) -> Floats:
+    def point(self) -> F64:
         return np.asarray(self.view.world_from_camera[:3, 3] + self.directions * self.z[:, None])
 
     @property
-    def depth_error_mm(self) -> Floats:
-        """(N,) by which a depth in whole mm may differ: rounding, and what the ray loses on a slant."""
+    def depth_error_mm(self) -> F64:
+        """(N,) tolerance of a depth in whole mm: rounding, and the ray's error on a slant."""
         cosine = np.abs(np.einsum("ni,ni->n", self.normal, self.directions))
-        slant_mm = RAY_ERROR_MM * self.z / np.maximum(cosine, 1e-9)
-        return np.asarray(ROUNDING_MM + np.minimum(slant_mm, MAX_RAY_ERROR_MM))
+        slant_mm = _RAY_ERROR_MM * self.z / np.maximum(cosine, 1e-9)
+        return np.asarray(_ROUNDING_MM + np.minimum(slant_mm, _MAX_RAY_ERROR_MM))
+
+    def of_face(self, table: NDArray[Any]) -> NDArray[Any]:
+        """(N,) table[face], 0 where face is -1."""
+        if not len(table):
+            return np.zeros(len(self.face), table.dtype)
+        return np.where(self.hit, table[self.face], table.dtype.type(0))
+
+    def mask(self, chosen: Bools) -> NDArray[Any]:
+        """(N,) 255 where something is hit and chosen, else 0."""
+        return np.where(self.hit & chosen, 255, 0)
+
+    def where_hit(self, function: Callable[[I64, F64, Any], Any], *width: int) -> F64:
+        """(N, *width) function(face, point, index) where something is hit, else 0."""
+        values = np.zeros((len(self.face), *width))
+        hit = np.nonzero(self.hit)[0]
+        values[hit] = function(self.face[hit], self.point[hit], hit)
+        return values
 
 
-def _depth_is_right(stored: NDArray[Any], at: _Pierced) -> Bools:
-    mm = np.clip(at.z * 1000, 0.5, 65535)
-    return np.where(at.hit, np.abs(stored - mm) <= at.depth_error_mm, stored == 0)
+def _depth_is_right(stored: NDArray[Any], hits: _Hits) -> Bools:
+    mm = np.clip(hits.z * 1000, 0.5, 65535)
+    return np.where(hits.hit, np.abs(stored - mm) <= hits.depth_error_mm, stored == 0)
 
 
-def _position_is_right(stored: NDArray[Any], at: _Pierced) -> Bools:
-    near = np.abs(stored - at.point).max(axis=1) <= METRES
-    return np.where(at.hit, near, ~stored.any(axis=1))
+def _position_is_right(stored: NDArray[Any], hits: _Hits) -> Bools:
+    near = np.abs(stored - hits.point).max(axis=1) <= _METRES
+    return np.where(hits.hit, near, ~stored.any(axis=1))
 
 
-def _shading_is_right(stored: NDArray[Any], at: _Pierced) -> Bools:
-    expected = np.zeros(at.point.shape)
-    hit = np.nonzero(at.hit)[0]
-    expected[hit] = at.triangles.shading_normals(at.face[hit], at.point[hit], at.normal[hit])
-    return normal_is_right(stored, published_axes(expected, at.view), SHADING_TOLERANCE_DEG)
+def _shading_is_right(stored: NDArray[Any], hits: _Hits) -> Bools:
+    normals = hits.where_hit(
+        lambda face, point, k: hits.triangles.shading_normals(face, point, hits.normal[k]), 3
+    )
+    published = published_directions(normals, hits.view.world_from_camera)
+    return normal_is_right(stored, published, _SHADING_DEG)
 
 
-def _albedo_is_right(stored: NDArray[Any], at: _Pierced) -> Bools:
-    expected = albedo_of_faces(at.view, at.face, at.point, at.triangles)
-    return np.asarray(np.abs(stored - expected).max(axis=1) <= ALBEDO_STEPS + 0.5)
+def _albedo_is_right(stored: NDArray[Any], hits: _Hits) -> Bools:
+    expected = albedo_of_faces(hits.view, hits.face, hits.point, hits.triangles)
+    return np.asarray(np.abs(stored - expected).max(axis=1) <= _ALBEDO_STEPS)
 
 
-def albedo_of_faces(view: StoredView, face: Faces, point: Floats, triangles: Triangles) -> Floats:
+def albedo_of_faces(view: StoredView, face: I64, point: F64, triangles: Triangles) -> F64:
     """(N, 3) sRGB 0..255 of the materials at points (N, 3) on faces; 0 where face is -1."""
-    found = np.zeros((len(face), 3))
+    colours = np.zeros((len(face), 3))
     hit = np.nonzero(face >= 0)[0]
-    at = triangles.uv_at(face[hit], point[hit])
     is_physical = view.recipe is not None and view.recipe.materials.preset == "physical"
-    most = PHYSICAL_ALBEDO if is_physical else 1.0
-    found[hit] = triangles.colours.at(triangles.material[face[hit]], at, most)
-    return found
+    most = _PHYSICAL_ALBEDO if is_physical else 1.0
+    colours[hit] = triangles.colour_at(face[hit], point[hit], most)
+    return colours
 
 
-def _roughness_is_right(stored: NDArray[Any], at: _Pierced) -> Bools:
-    expected = np.zeros(len(at.face))
-    hit = np.nonzero(at.hit)[0]
-    expected[hit] = 255 * np.sqrt(at.triangles.alpha_at(at.face[hit], at.point[hit]))
-    return np.asarray(np.abs(stored - expected) <= ROUGHNESS_STEPS + 0.5)
+def _roughness_is_right(stored: NDArray[Any], hits: _Hits) -> Bools:
+    alpha = hits.where_hit(lambda face, point, _k: hits.triangles.alpha_at(face, point))
+    return np.asarray(np.abs(stored - 255 * np.sqrt(alpha)) <= _ROUGHNESS_STEPS)
 
 
-def _f0_is_right(stored: NDArray[Any], at: _Pierced) -> Bools:
-    linear = np.zeros((len(at.face), 3))
-    linear[at.hit] = at.triangles.finishes.f0()[at.triangles.material[at.face[at.hit]]]
-    low = linear * 12.92
-    srgb = np.where(linear <= 0.0031308, low, 1.055 * np.maximum(linear, 1e-9) ** (1 / 2.4) - 0.055)
-    return np.asarray(np.abs(stored - 255 * srgb).max(axis=1) <= 0.51)
+def _f0_is_right(stored: NDArray[Any], hits: _Hits) -> Bools:
+    triangles = hits.triangles
+    linear = hits.where_hit(lambda face, *_: triangles.finishes.f0()[triangles.material[face]], 3)
+    return np.asarray(np.abs(stored - 255 * srgb_from_linear(linear)).max(axis=1) <= 0.51)
 
 
-def _metallic_is_right(stored: NDArray[Any], at: _Pierced) -> Bools:
-    metal = at.triangles.finishes.is_metal()[at.triangles.material]
-    return np.asarray(stored == np.where(at.hit & _of_face(metal, at.face), 255, 0))
-
-
-def _nocs_is_right(stored: NDArray[Any], at: _Pierced) -> Bools:
-    """(N,) stored model coordinates are those of points (N, 3); of what is no placed model, 0."""
-    triangles, instance, point = at.triangles, at.instance, at.point
+def _nocs_is_right(stored: NDArray[Any], hits: _Hits) -> Bools:
+    """(N,) stored model coordinates are those of the points; 0 off placed models."""
+    triangles, instance, point = hits.triangles, hits.instance, hits.point
     right = np.asarray(~stored.any(axis=1), bool)
-    for row in at.view.table["instances"]:
-        own = instance == int(row["id"])
-        if "world_from_model" not in row or not own.any():
+    for row in hits.view.table["instances"]:
+        chosen = instance == int(row["id"])
+        if "world_from_model" not in row or not chosen.any():
             continue
         pose = np.array(row["world_from_model"], np.float64)
-        vertices = triangles.faces[triangles.instance == int(row["id"])].reshape(-1)
-        # The model's box, with its triangles and the points back in its own frame.
-        box = _in_frame(pose, triangles.vertices[vertices].astype(np.float64))
+        # The model's box, and the points, in the model's own frame.
+        box = _in_model(pose, triangles.points_of(triangles.instance == int(row["id"])))
         middle, extent = (box.max(0) + box.min(0)) / 2, np.sqrt((np.ptp(box, axis=0) ** 2).sum())
-        expected = 0.5 + (_in_frame(pose, point[own]) - middle) / extent
-        tolerance = METRES / extent + 1 / 65535
-        close = (np.abs(stored[own] / 65535 - expected) <= tolerance).all(axis=1)
-        right[own] = close & stored[own].any(axis=1)
+        expected = 0.5 + (_in_model(pose, point[chosen]) - middle) / extent
+        tolerance = _METRES / extent + 1 / 65535
+        close = (np.abs(stored[chosen] / 65535 - expected) <= tolerance).all(axis=1)
+        right[chosen] = close & stored[chosen].any(axis=1)
     return right
 
 
-def _part_is_right(stored: NDArray[Any], at: _Pierced) -> Bools:
-    """(N,) the part's row in articulation.json names the part of the face there; 0 what does not move."""
-    rows = {int(row["id"]): (int(row["instance"]), str(row["part"])) for row in at.view.parts}
-    names, own = at.triangles.parts, _of_face(at.triangles.part, at.face)
+def _in_model(pose: F64, points: F64) -> F64:
+    """(N, 3) world points in the frame of a pose, which may be off a rotation."""
+    local = np.linalg.solve(pose[:3, :3], (points - pose[:3, 3]).T)
+    return np.asarray(local.T, np.float64)
+
+
+def _part_is_right(stored: NDArray[Any], hits: _Hits) -> Bools:
+    """(N,) the part's row in articulation.json names the part of the face; 0 for static faces."""
+    rows = {int(row["id"]): (int(row["instance"]), str(row["part"])) for row in hits.view.parts}
+    names, parts = hits.triangles.parts, hits.of_face(hits.triangles.part)
     return np.array(
         [
             rows.get(int(number)) == (int(instance), names[part]) if number else part == 0
-            for number, instance, part in zip(stored, at.instance, own, strict=True)
+            for number, instance, part in zip(stored, hits.instance, parts, strict=True)
         ],
         bool,
     )
 
 
-def _in_frame(world_from_frame: Floats, points: Floats) -> Floats:
-    """(N, 3) world points in a frame."""
-    own = np.linalg.solve(world_from_frame[:3, :3], (points - world_from_frame[:3, 3]).T)
-    return np.asarray(own.T, np.float64)
-
-
-def _of_face(table: NDArray[Any], face: Faces) -> NDArray[Any]:
-    """table[face], 0 where face is -1."""
-    if not len(table):
-        return np.zeros(len(face), table.dtype)
-    return np.where(face >= 0, table[face], table.dtype.type(0))
-
-
-def published_axes(world: Floats, view: StoredView) -> Floats:
-    """(N, 3) x right, y forward, z up from world directions.
-
-    world is (N, 3) of directions, not points: the camera's position does not enter. The view's pose
-    has OpenCV's axes.
-    """
-    camera = world @ view.world_from_camera[:3, :3]
-    return np.stack([camera[:, 0], camera[:, 2], -camera[:, 1]], axis=1)
-
-
 def normal_is_right(
-    stored: NDArray[np.int64], expected: Floats, tolerance_deg: float = NORMAL_TOLERANCE_DEG
+    stored: NDArray[Any], expected: F64, tolerance_deg: float = _NORMAL_DEG
 ) -> Bools:
-    """(N,) stored 16-bit normals decode to the expected ones; where those are 0, to nothing.
+    """(N,) stored 16-bit normals (N, 3) decode to the expected ones; where those are 0, to nothing.
 
-    stored is (N, 3) as in the layer, 0..65535 for -1..1, nothing = 32768 three times; expected is
-    (N, 3) float64, of unit length or 0. tolerance_deg: between the two.
+    expected: (N, 3) of unit length or 0.
     """
-    # Compare by the sine: the cosine of a small angle is too flat.
-    decoded = stored * (2 / 65535) - 1
-    length = np.linalg.norm(decoded, axis=1)
-    sine = np.linalg.norm(np.cross(decoded, expected), axis=1)
-    close = (np.einsum("ni,ni->n", decoded, expected) > 0) & (
-        sine <= np.radians(tolerance_deg) * length
-    )
+    # The sine is more accurate than the cosine for small angles.
+    normals = stored_normals(stored)
+    length = np.linalg.norm(normals, axis=1)
+    sine = np.linalg.norm(np.cross(normals, expected), axis=1)
+    is_near = sine <= np.radians(tolerance_deg) * length
+    close = (np.einsum("ni,ni->n", normals, expected) > 0) & is_near & (np.abs(length - 1) < 1e-3)
     nothing = (stored == 32768).all(axis=1)
-    right = np.where(expected.any(axis=1), close & (np.abs(length - 1) < 1e-3), nothing)
-    return np.asarray(right, bool)
+    return np.asarray(np.where(expected.any(axis=1), close, nothing), bool)
 
 
-def _coincident(
-    labels: Labels, face: Faces, origin: Floats, directions: Floats, scene: tuple[Triangles, Hits]
-) -> Faces:
+def _coincident(labels: Labels, face: I64, origin: F64, directions: F64, scene: Scene) -> I64:
     """(N,) another triangle of the stored instance that the ray pierces at the first hit's depth, or -1.
 
     A model may have a face twice, with other texture coordinates.
     """
-    triangles, rays = scene
-    found = np.full(len(face), -1, np.int64)
     if "instance" not in labels:
-        return found
-    starts, legs, way = rays.last_leg(origin, directions)
-    first = rays.distance(face, origin, directions) - way
-    # Measure gaps across the surface: a slanting ray is longer between the two.
-    across = np.abs(np.einsum("ni,ni->n", rays.normal(face, directions), directions))
-    for instance in np.unique(labels["instance"]):
-        # Look for a triangle of that instance at the depth of the first hit.
-        own = np.nonzero(triangles.instance == instance)[0]
-        for pixel in np.nonzero(labels["instance"] == instance)[0]:
-            t = distances_pierced(triangles, own, starts[pixel], legs[pixel])
-            gap = np.abs(t - first[pixel]) * across[pixel]
-            gap[own == face[pixel]] = np.inf
-            if len(own) and gap.min() <= TIE_DEPTH_M:
-                found[pixel] = own[gap.argmin()]
-    return rays.without_holes(found, origin, directions)
+        return np.full(len(face), -1, np.int64)
+
+    @functools.cache
+    def of_instance(instance: int) -> I64:
+        return np.nonzero(scene.triangles.instance == instance)[0]
+
+    def candidates(k: int) -> I64:
+        faces = of_instance(int(labels["instance"][k]))
+        return np.asarray(faces[faces != face[k]])
+
+    return _pierced_beside(face, origin, directions, scene, candidates)
 
 
-def of_another_colour(
-    face: Faces, origin: Floats, directions: Floats, scene: tuple[Triangles, Rays]
-) -> Faces:
+def of_another_colour(face: I64, origin: F64, directions: F64, scene: Scene) -> I64:
     """(N,) a triangle of another material that each ray pierces where it meets face, or -1.
 
-    Both are right for a label that they share, and the picture shows either: it glitters.
+    Either is right for a label that they share; the picture shows one or the other and glitters.
     """
-    triangles, rays = scene
-    found = np.full(len(face), -1, np.int64)
-    corners = triangles.vertices.astype(np.float64)[triangles.faces]
-    planes = _number_planes(corners)
+    triangles = scene.triangles
+    planes = _number_planes(triangles.vertices.astype(np.float64)[triangles.faces])
     order = np.argsort(planes, kind="stable")
     last = np.searchsorted(planes[order], planes, side="right")
     start = np.searchsorted(planes[order], planes, side="left")
-    distance = rays.distance(face, origin, directions)
-    across = np.abs(np.einsum("ni,ni->n", rays.normal(face, directions), directions))
-    for k in np.nonzero(face >= 0)[0]:
-        own = order[start[face[k]] : last[face[k]]]
-        own = own[triangles.material[own] != triangles.material[face[k]]]
-        if len(own):
-            gap = np.abs(distances_pierced(triangles, own, origin, directions[k]) - distance[k])
-            if gap.min() * across[k] <= TIE_DEPTH_M:
-                found[k] = own[gap.argmin()]
-    return rays.without_holes(found, origin, directions)
+
+    def candidates(k: int) -> I64:
+        faces = order[start[face[k]] : last[face[k]]] if face[k] >= 0 else order[:0]
+        return np.asarray(faces[triangles.material[faces] != triangles.material[face[k]]])
+
+    return _pierced_beside(face, origin, directions, scene, candidates)
 
 
-def of_another_part(
-    face: Faces, origin: Floats, directions: Floats, scene: tuple[Triangles, Rays]
-) -> Faces:
+def of_another_part(face: I64, origin: F64, directions: F64, scene: Scene) -> I64:
     """(N,) a triangle of another item or part that each ray pierces where it meets face, or -1.
 
-    Of a leaf and its frame that cross at one depth either may be seen.
+    Where a leaf and its frame cross at one depth, either may be visible.
     """
     triangles, rays = scene
-    found = np.full(len(face), -1, np.int64)
     corners = triangles.vertices.astype(np.float64)[triangles.faces]
-    low, high = corners.min(1) - TIE_DEPTH_M, corners.max(1) + TIE_DEPTH_M
+    low, high = corners.min(1) - _TIE_M, corners.max(1) + _TIE_M
     distance = rays.distance(face, origin, directions)
-    across = np.abs(np.einsum("ni,ni->n", rays.normal(face, directions), directions))
-    for k in np.nonzero(face >= 0)[0]:
+
+    def candidates(k: int) -> I64:
         point = origin + distance[k] * directions[k]
         is_other = triangles.instance != triangles.instance[face[k]]
         is_other |= triangles.part != triangles.part[face[k]]
-        own = np.nonzero(is_other & ((low <= point) & (point <= high)).all(1))[0]
-        if len(own):
-            gap = np.abs(distances_pierced(triangles, own, origin, directions[k]) - distance[k])
-            if gap.min() * across[k] <= TIE_DEPTH_M:
-                found[k] = own[gap.argmin()]
-    return rays.without_holes(found, origin, directions)
+        is_other &= bool(face[k] >= 0)
+        return np.nonzero(is_other & ((low <= point) & (point <= high)).all(1))[0]
+
+    return _pierced_beside(face, origin, directions, scene, candidates)
 
 
-def _number_planes(corners: Floats) -> NDArray[np.int64]:
-    """(F,) the number of each triangle's plane, whichever way it looks; planes 0.1 mm apart differ."""
+def _pierced_beside(
+    face: I64, origin: F64, directions: F64, scene: Scene, candidates: Callable[[int], I64]
+) -> I64:
+    """(N,) of each ray's candidate triangles, the one that it pierces at the depth of face, or -1."""
+    triangles, rays = scene
+    nearest = np.full(len(face), -1, np.int64)
+    starts, legs, way = rays.last_leg(origin, directions)
+    depth = rays.distance(face, origin, directions) - way
+    # Measure gaps across the surface: along a slanting ray they are longer.
+    across = np.abs(np.einsum("ni,ni->n", rays.normal(face, directions), directions))
+    for k in range(len(face)):
+        faces = candidates(k)
+        if len(faces):
+            gap = np.abs(distances_pierced(triangles, faces, starts[k], legs[k]) - depth[k])
+            if gap.min() * across[k] <= _TIE_M:
+                nearest[k] = faces[gap.argmin()]
+    return rays.without_holes(nearest, origin, directions)
+
+
+def _number_planes(corners: F64) -> I64:
+    """(F,) the number of each triangle's plane, whichever way it faces; planes 0.1 mm apart differ."""
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     with np.errstate(divide="ignore", invalid="ignore"):
         normal /= np.linalg.norm(normal, axis=1, keepdims=True)
@@ -398,15 +412,13 @@ def _number_planes(corners: Floats) -> NDArray[np.int64]:
     largest = np.take_along_axis(normal, np.abs(normal).argmax(1)[:, None], 1)
     normal *= np.where(largest < 0, -1.0, 1.0)
     offset = np.einsum("fi,fi->f", normal, corners[:, 0])
-    keys = np.round(np.column_stack([normal * 1e3, offset / TIE_DEPTH_M])).astype(np.int64)
+    keys = np.round(np.column_stack([normal * 1e3, offset / _TIE_M])).astype(np.int64)
     return np.asarray(np.unique(keys, axis=0, return_inverse=True)[1].reshape(-1), np.int64)
 
 
-def distances_pierced(
-    triangles: Triangles, own: NDArray[np.int64], origin: Floats, ray: Floats
-) -> Floats:
-    """(F,) distance at which one ray pierces each of the triangles own, in lengths of ray; inf = misses it."""
-    a, b, c = (triangles.vertices[triangles.faces[own, k]].astype(np.float64) for k in range(3))
+def distances_pierced(triangles: Triangles, faces: I64, origin: F64, ray: F64) -> F64:
+    """(F,) distance at which a ray pierces each of some triangles, in lengths of ray; inf = misses it."""
+    a, b, c = (triangles.vertices[triangles.faces[faces, k]].astype(np.float64) for k in range(3))
     # Moeller and Trumbore 1997, one ray and many triangles.
     e1, e2, s = b - a, c - a, origin - a
     p = np.cross(ray, e2)
@@ -420,27 +432,30 @@ def distances_pierced(
     return np.where(inside, t, np.inf)
 
 
-# Layer -> what is right of its stored values at the pixels.
-_CHECKS: Final[Mapping[str, Callable[[NDArray[Any], _Pierced], Any]]] = {
-    "instance": lambda stored, at: stored == at.instance,
-    "semantic": lambda stored, at: stored == at.classes[at.instance],
+# Layer -> which of its stored values are right.
+_LABELS: Final[Mapping[str, Callable[[NDArray[Any], _Hits], Any]]] = {
+    "instance": lambda stored, hits: stored == hits.instance,
+    "semantic": lambda stored, hits: stored == hits.classes[hits.instance],
     "depth": _depth_is_right,
-    "normal": lambda stored, at: normal_is_right(stored, published_axes(at.normal, at.view)),
-    "valid": lambda stored, at: stored == np.where(at.hit, 255, 0),
-    "depth_z": lambda stored, at: np.where(at.hit, np.abs(stored - at.z) <= METRES, stored == 0),
+    "normal": lambda stored, hits: normal_is_right(
+        stored, published_directions(hits.normal, hits.view.world_from_camera)
+    ),
+    "valid": lambda stored, hits: stored == np.where(hits.hit, 255, 0),
+    "depth_z": lambda stored, hits: np.where(
+        hits.hit, np.abs(stored - hits.z) <= _METRES, stored == 0
+    ),
     "position": _position_is_right,
-    "normal_world": lambda stored, at: normal_is_right(stored, at.normal),
-    "material": lambda stored, at: (
-        stored == np.where(at.hit, _of_face(at.triangles.material, at.face) + 1, 0)
-    ),
-    "glass": lambda stored, at: (
-        stored == np.where(at.hit & _of_face(at.triangles.see_through, at.face), 255, 0)
-    ),
-    "mirror": lambda stored, at: (
-        stored == np.where(at.hit & (at.triangles.kinds_of(at.face) == "mirror"), 255, 0)
+    "normal_world": lambda stored, hits: normal_is_right(stored, hits.normal),
+    "material": lambda stored, hits: stored == hits.of_face(hits.triangles.material + 1),
+    "glass": lambda stored, hits: stored == hits.mask(hits.of_face(hits.triangles.see_through)),
+    "mirror": lambda stored, hits: (
+        stored == hits.mask(hits.triangles.kinds_of(hits.face) == "mirror")
     ),
     "roughness": _roughness_is_right,
-    "metallic": _metallic_is_right,
+    "metallic": lambda stored, hits: (
+        stored
+        == hits.mask(hits.of_face(hits.triangles.of_material(hits.triangles.finishes.is_metal())))
+    ),
     "f0": _f0_is_right,
     "normal_shading": _shading_is_right,
     "nocs": _nocs_is_right,
@@ -448,5 +463,8 @@ _CHECKS: Final[Mapping[str, Callable[[NDArray[Any], _Pierced], Any]]] = {
     "albedo": _albedo_is_right,
 }
 
-RAY_LAYERS: Final = tuple(_CHECKS)
+RAY_LAYERS: Final = tuple(_LABELS)
 """Layers that a ray through the pixel's centre decides."""
+
+
+CHECKS = (Check(name="ray", of="view", function=check_rays, cost=90),)

@@ -1,13 +1,12 @@
-"""Whether radiance.exr shows what the labels show: its guides against surfaces, its light against their albedo.
+"""Contents of radiance.exr against the labels: its guides against surfaces, its light against their albedo.
 
-Effects: none. Light is albedo times what arrives, so that steps of its logarithm follow those of albedo's,
+Effects: none. Light is albedo times the arriving light, so that steps of its logarithm follow those of albedo's,
 in this place of the picture and in no other, whatever the noise.
 """
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,102 +14,113 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from pbrs_farm.check.certificate import Tally
-from pbrs_farm.check.embree_caster import Floats, Rays
+from pbrs_farm.check.axes import world_normals
+from pbrs_farm.check.cases import SAMPLE, ViewCase
+from pbrs_farm.check.checks import Check
+from pbrs_farm.check.colours import has_channels, linear_from_srgb, luminance_of
+from pbrs_farm.check.finishes import has_roughness
+from pbrs_farm.check.picture_checks import moved_copies
 from pbrs_farm.check.pixel_checks import albedo_of_faces
 from pbrs_farm.check.stored_house import StoredHouse
-from pbrs_farm.check.stored_mesh import Triangles
-from pbrs_farm.check.stored_view import StoredView
+from pbrs_farm.core.arrays import F64, Bools
 
-Channels = Mapping[str, NDArray[np.float32]]
-
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # of linear sRGB
+COAT = 0.04  # reflectance of a coat at normal incidence: glass of index 1.5
+_FLAT_STEPS = 600  # of 65535: range of a normal's component amid a surface
 _GUIDE_DEG = 25.0  # a normal map may bend a guide, and a pixel is not flat
 _GUIDE_ALBEDO = 0.1  # of 1, in linear light: a texture's mean over the pixel against its middle
-_BESIDE = (-0.3, 0.3)  # px from a pixel's middle: fine cloth and print are other colours there
-COAT = 0.04  # of light that comes upright, what a coat reflects: glass of index 1.5
+_BESIDE = (-0.3, 0.3)  # px from a pixel's middle: fine cloth and print have other colours there
 _VARNISH = 0.3  # of 1, as stored: .07 in linear light
 _GUIDE_SHARE = 0.8  # of pixels amid one surface; blur and depth of field cost the rest
-_GUIDE_PX = 1  # by which the guides' edges may lie beside the labels': a few samples against one
-_FEW_GUIDES = 50  # pixels amid surfaces that tell nothing
+_GUIDE_PX = 1  # distance of the guides' edges from the labels': a few samples against one
+_FEW_GUIDES = 50  # fewer pixels amid surfaces are not judged
 _FAINT = 0.05  # of albedo, and of the mean light: darker steps count less
 _MOST_STEP = 1.0  # of a logarithm: one firefly is not a picture
 _EDGE = 0.1  # step of albedo's logarithm that counts as an edge
-_FEW_EDGES = 300  # pixels with one that tell nothing
+_FEW_EDGES = 300  # fewer pixels with one are not judged
 _BLUR_PX = 0.7  # of both before they are compared: noise goes, edges stay within a pixel
 _BRIGHT_KINDS = {"bulb", "glass", "mirror", "pane", "shade"}  # whose light is not their albedo's
-_BRIGHT_PX = 2  # beside them, which the blur reaches
-_NOISY = 0.09  # error of the slope above which noise hides all
+_BRIGHT_PX = 2  # around them, which the blur reaches
+_NOISY = 0.09  # error of the slope above which noise hides everything
 _LEAST_SLOPE = 0.15  # of steps of light over those of albedo, whose logarithms rise alike
-_LEAST_SIGMAS = 3.0  # of the slope where the picture stands
+_LEAST_SIGMAS = 3.0  # of the slope at the stored place
 _TIE_SIGMAS = 2.0  # by which another place may fit better by chance
 _GROUP_SIGMAS = 5.0  # the same of a light group alone, which may reach few of the edges
 
 
-def check_guides(
-    view: StoredView,
-    channels: Channels,
-    pixels: tuple[NDArray[np.int64], NDArray[np.int64]],
-    arrays: Mapping[str, NDArray[Any]],
-    scene: tuple[Triangles, Rays],
-    house: StoredHouse,
-    tally: Tally,
-) -> None:
-    """The guides that radiance.exr holds, mean albedo and normal, are those of the surfaces seen there.
+def check_radiance(case: ViewCase) -> None:
+    """Every group of light is present, finite and not negative."""
+    channels, place, tally = case.light, case.place, case.tally
+    names = {f"{g}.{c}" for g in ("outdoor", "indoor", "albedo") for c in "RGB"}
+    lacking = names - channels.keys()
+    tally.expect("radiance", place, not lacking, f"lacks {lacking}")
+    # Normals may be negative; light and albedo may not.
+    names |= {name for name in channels if name.startswith(("lamp", "diffuse_"))}
+    for name in sorted(names & channels.keys()):
+        plane = channels[name]
+        bad = int((~(np.isfinite(plane) & (plane >= 0))).sum())
+        tally.add("radiance", plane.size)
+        if bad or plane.shape != case.view.size:
+            fault = f"{bad} pixels negative or not finite"
+            tally.fail("radiance", f"{place} {name}", fault, max(bad, 1))
 
-    pixels: rows and columns to look at; only those amid one surface count, of no glass and no mirror,
-    nor of things that shine like varnish: their guide holds what they mirror, too.
+
+def check_guides(case: ViewCase) -> None:
+    """The guides in radiance.exr, mean albedo and normal, are those of the visible surfaces.
+
+    Of a sample of pixels, only those amid one surface count. Glass, mirrors and varnished items are
+    left out: their guides contain reflections.
     """
-    names = [*(f"albedo.{c}" for c in "RGB"), *(f"normal.{c}" for c in "XYZ")]
-    if not all(name in channels and channels[name].shape == view.size for name in names):
+    view, channels, house = case.view, case.light, case.house
+    if not has_channels(channels, view.size, "albedo", "normal"):
         return
-    _check_place(view, channels, arrays["normal"], tally)
-    triangles, rays = scene
-    rows, columns = pixels
+    _check_alignment(case)
+    triangles, rays = case.scene
+    rows, columns = case.sample(SAMPLE)
     origin, directions = view.rays(rows, columns)
     face = rays.first(origin, directions)
     kinds = triangles.kinds_of(face)
-    flat = is_amid(arrays["instance"], arrays["normal"])[rows, columns]
+    flat = is_amid(case.arrays["instance"], case.arrays["normal"])[rows, columns]
     keep = (face >= 0) & flat & ~np.isin(kinds, ("glass", "pane", "mirror", "bulb"))
-    # What lies outside is a picture of its own, and no surface of the home.
+    # The outdoors is a picture, and no surface of the home.
     keep &= np.isin(triangles.instance[face], matte_items(house))
     if keep.sum() < _FEW_GUIDES:
         return
     rows, columns, face, directions = rows[keep], columns[keep], face[keep], directions[keep]
     point = origin + directions * rays.distance(face, origin, directions)[:, None]
-    srgb = [albedo_of_faces(view, face, point, triangles) / 255]
+    middle = albedo_of_faces(view, face, point, triangles) / 255
+    linear = [linear_from_srgb(middle)]
     for dy, dx in itertools.product(_BESIDE, repeat=2):
-        _, beside = view.rays(rows + dy, columns + dx)
-        met = rays.first(origin, beside)
-        met = np.where(met >= 0, met, face)
-        point = origin + beside * rays.distance(met, origin, beside)[:, None]
+        _, ray = view.rays(rows + dy, columns + dx)
+        beside = rays.first(origin, ray)
+        beside = np.where(beside >= 0, beside, face)
+        point = origin + ray * rays.distance(beside, origin, ray)[:, None]
         point = np.where(np.isfinite(point), point, 0.0)
-        srgb.append(albedo_of_faces(view, met, point, triangles) / 255)
-    linear = np.mean(
-        [np.where(s <= 0.04045, s / 12.92, ((s + 0.055) / 1.055) ** 2.4) for s in srgb], axis=0
-    )
-    # Light of the published materials takes their plain colours as they are (docs/spec/suncg.md).
+        linear.append(linear_from_srgb(albedo_of_faces(view, beside, point, triangles) / 255))
+    albedo = np.mean(linear, axis=0)
+    # Light of the published materials takes their plain colours without conversion (docs/spec/suncg.md).
     if _is_released(house):
         is_plain = np.array([m["texture_id"] is None for m in house.house["materials"]], bool)
-        linear = np.where(is_plain[triangles.material[face]][:, None], srgb[0], linear)
-    # The guide is of all light that comes back, a coat's, too.
-    linear += np.where(coated_materials(house)[triangles.material[face]], COAT, 0.0)[:, None]
-    stored = np.stack([channels[n][rows, columns] for n in names], axis=1).astype(np.float64)
-    close = np.abs(stored[:, :3] - linear).max(axis=1) <= _GUIDE_ALBEDO
-    normal = rays.normal(face, directions)
-    length = np.maximum(np.linalg.norm(stored[:, 3:], axis=1), 1e-9)
-    cosine = np.einsum("ni,ni->n", normal, stored[:, 3:]) / length
-    turned = cosine >= np.cos(np.radians(_GUIDE_DEG))
-    for name, right in (("albedo", close), ("normal", turned)):
+        albedo = np.where(is_plain[triangles.material[face]][:, None], middle, albedo)
+    # The guide contains all reflected light, also that of a coat.
+    albedo += np.where(coated_materials(house)[triangles.material[face]], COAT, 0.0)[:, None]
+    guides = [
+        np.stack([channels[f"{g}.{c}"][rows, columns] for c in axes], axis=1).astype(np.float64)
+        for g, axes in (("albedo", "RGB"), ("normal", "XYZ"))
+    ]
+    close = np.abs(guides[0] - albedo).max(axis=1) <= _GUIDE_ALBEDO
+    length = np.maximum(np.linalg.norm(guides[1], axis=1), 1e-9)
+    cosine = np.einsum("ni,ni->n", rays.normal(face, directions), guides[1]) / length
+    aligned = cosine >= np.cos(np.radians(_GUIDE_DEG))
+    for name, right in (("albedo", close), ("normal", aligned)):
         share = float(right.mean())
-        what = f"its {name} is that of the surface at {share:.0%} of {len(right)} pixels"
-        tally.expect("light guides", f"{view.place}/radiance.exr", share >= _GUIDE_SHARE, what)
+        fault = f"its {name} is that of the surface at {share:.0%} of {len(right)} pixels"
+        case.expect("light guides", "radiance.exr")(share >= _GUIDE_SHARE, fault)
 
 
 def matte_items(house: StoredHouse) -> list[int]:
-    """Instances of the home, not of what lies outside, whose guides hold their albedo and no more.
+    """Instances of the home, without the outdoors, whose guides hold only their albedo.
 
-    The guide of what shines like varnish holds what it mirrors, too.
+    The guide of a varnished item contains its reflections, too.
     """
     colours = [material["specular"] or (0.0,) for material in house.house["materials"]]
     return [
@@ -121,109 +131,95 @@ def matte_items(house: StoredHouse) -> list[int]:
 
 
 def _is_released(house: StoredHouse) -> bool:
-    """Whether light is made with the published materials."""
+    """True if light is made with the published materials."""
     return bool(house.recipe.get("materials", {}).get("preset") == "released")
 
 
-def coated_materials(house: StoredHouse) -> NDArray[np.bool_]:
-    """(M,) whether a material shines at all, be it ever so rough (docs/light_methods.md); the published ones never do."""
+def coated_materials(house: StoredHouse) -> Bools:
+    """(M,) materials with a coat, however rough (docs/light_methods.md); the published ones have none."""
     rows = house.house["materials"]
     if _is_released(house):
         return np.zeros(len(rows), bool)
-    is_rough = [r["roughness"] is not None or r["roughness_texture_id"] is not None for r in rows]
-    shines = [r["shininess"] > 1 and max(r["specular"] or (0.0,)) > 0 for r in rows]
-    return np.asarray(np.array(is_rough, bool) | np.array(shines, bool))
+    is_shiny = [r["shininess"] > 1 and max(r["specular"] or (0.0,)) > 0 for r in rows]
+    return np.array([has_roughness(r) or s for r, s in zip(rows, is_shiny, strict=True)], bool)
 
 
-def _check_place(view: StoredView, channels: Channels, normal: NDArray[Any], tally: Tally) -> None:
-    """The mean normal turns where the label's does, and a few pixels beside it less so."""
-    decoded = normal * (2 / 65535) - 1
-    # Published axes are x right, y forward, z up; the pose's are x right, y down, z forward.
-    facing = np.stack([decoded[..., 0], -decoded[..., 2], decoded[..., 1]], axis=-1)
-    world = facing @ view.world_from_camera[:3, :3].T
-    total = np.zeros(view.size)
+def _check_alignment(case: ViewCase) -> None:
+    """Edges of the mean normal are at those of the label, and fit less well a few pixels beside them."""
+    world = world_normals(case.arrays["normal"], case.view.world_from_camera)
+    total = np.zeros(case.view.size)
     n_edges = 0
     for k, c in enumerate("XYZ"):
-        found, _energy = _correlation(channels[f"normal.{c}"], _Transformed.of(world[..., k]))
-        total += found
+        products, _energy = _correlation(case.light[f"normal.{c}"], _Transformed.of(world[..., k]))
+        total += products
         n_edges += int((np.hypot(*_steps(world[..., k])) > _EDGE).sum())
     if n_edges < _FEW_EDGES:
         return
     best = np.unravel_index(int(total.argmax()), total.shape)
-    moved = tuple(
+    down, right = (
         int(k) if k <= n // 2 else int(k) - n for k, n in zip(best, total.shape, strict=True)
     )
-    what = f"its normal fits the label's best {moved[1]} px to the right and {moved[0]} px below"
-    same = max(abs(m) for m in moved) <= _GUIDE_PX
-    tally.expect("light guides", f"{view.place}/radiance.exr", same, what)
+    fault = f"its normal fits the label's best {right} px to the right and {down} px below"
+    is_aligned = max(abs(down), abs(right)) <= _GUIDE_PX
+    case.expect("light guides", "radiance.exr")(is_aligned, fault)
 
 
-def is_amid(instance: NDArray[Any], normal: NDArray[Any]) -> NDArray[np.bool_]:
-    """(H, W) whether a pixel and its neighbours show one instance with one normal."""
-    flat = ndimage.minimum_filter(instance, 3) == ndimage.maximum_filter(instance, 3)
+def is_amid(instance: NDArray[Any], normal: NDArray[Any], size: int = 3) -> Bools:
+    """(H, W) the window of pixels around each shows one instance with one normal."""
+    flat = ndimage.minimum_filter(instance, size) == ndimage.maximum_filter(instance, size)
     for axis in range(3):
         plane = normal[..., axis].astype(np.int64)
-        flat &= ndimage.maximum_filter(plane, 3) - ndimage.minimum_filter(plane, 3) < 600
+        low, high = ndimage.minimum_filter(plane, size), ndimage.maximum_filter(plane, size)
+        flat &= high - low < _FLAT_STEPS
     return np.asarray(flat, bool)
 
 
-def check_fit(
-    view: StoredView, channels: Channels, bright: NDArray[np.bool_], tally: Tally
-) -> None:
-    """The light of radiance.exr fits its albedo as it stands, and mirrored, turned or moved no better.
+def check_fit(case: ViewCase) -> None:
+    """The light of radiance.exr fits its albedo, and mirrored, turned or moved no better.
 
     All light together must fit; a light group alone may reach few edges, and must not fit another
-    place much better. bright: (H, W) pixels of what shines, mirrors or lies outside, whose steps do
-    not count: a bright window is no bright wall. Pictures with few edges, or more noise than light,
-    are a note.
+    place much better. Luminous, mirroring and outdoor pixels do not count: a bright window is no
+    bright wall. Pictures with few edges, or more noise than light, are noted.
     """
-    needed = [f"{name}.{c}" for name in ("outdoor", "indoor", "albedo") for c in "RGB"]
-    if not all(n in channels and channels[n].shape == view.size for n in needed):
+    channels = case.light
+    if not has_channels(channels, case.view.size, "outdoor indoor albedo"):
         return
     level = {
-        name: ndimage.gaussian_filter(
-            sum(channels[f"{name}.{c}"] * w for c, w in zip("RGB", LUMINANCE, strict=True)),
-            _BLUR_PX,
-        )
+        name: ndimage.gaussian_filter(luminance_of(channels, name), _BLUR_PX)
         for name in ("outdoor", "indoor", "albedo")
     }
+    bright = _bright_pixels(case.arrays["instance"], case.house)
     bright = ndimage.binary_dilation(bright, iterations=_BRIGHT_PX)
     logs_of_albedo = _filled(np.log(level.pop("albedo") + _FAINT), bright)
-    across, down = _steps(logs_of_albedo)
-    if int((np.hypot(across, down) > _EDGE).sum()) < _FEW_EDGES:
-        tally.note(f"{view.place}/radiance.exr has too few edges to compare")
+    place = f"{case.place}/radiance.exr"
+    if int((np.hypot(*_steps(logs_of_albedo)) > _EDGE).sum()) < _FEW_EDGES:
+        case.tally.note(f"{place} has too few edges to compare")
         return
     surface = _Transformed.of(logs_of_albedo)
     level["all light"] = level["outdoor"] + level["indoor"]
-    place = f"{view.place}/radiance.exr"
     for name, light in level.items():
         if not (light > 0).any():
             continue
         logs = _filled(np.log(light + _FAINT * float(light[light > 0].mean())), bright)
-        own, error, elsewhere = _slopes(logs, surface)
+        slope, error, elsewhere = _slopes(logs, surface)
         if error > _NOISY:
             if name == "all light":
-                tally.note(f"{place} has more noise than edges: {name} is not compared")
+                case.tally.note(f"{place} has more noise than edges: {name} is not compared")
             continue
-        others = {"moved": elsewhere}
-        for what, turned in (
-            ("mirrored", logs[:, ::-1]),
-            ("upside down", logs[::-1]),
-            ("turned", logs[::-1, ::-1]),
-        ):
-            others[what] = _slopes(turned, surface)[0]
+        slopes = {"moved": elsewhere}
+        slopes |= {word: _slopes(copy, surface)[0] for word, copy in moved_copies(logs).items()}
         slack = (_TIE_SIGMAS if name == "all light" else _GROUP_SIGMAS) * error
-        for what, other in others.items():
-            text = f"{name} fits the albedo better {what} ({other:.2f}) than as it is ({own:.2f})"
-            tally.expect("light edges", place, other <= own + slack, text)
+        expect = case.expect("light edges", "radiance.exr")
+        for word, other in slopes.items():
+            fault = f"{name} fits the albedo better {word} ({other:.2f}) than as it is ({slope:.2f})"  # fmt: skip
+            expect(other <= slope + slack, fault)
         if name == "all light":
-            text = f"{name} does not follow the albedo: {own:.2f} +- {error:.2f}"
-            least = max(_LEAST_SIGMAS * error, _LEAST_SLOPE)
-            tally.expect("light edges", place, own >= least, text)
+            fault = f"{name} does not follow the albedo: {slope:.2f} +- {error:.2f}"
+            expect(slope >= max(_LEAST_SIGMAS * error, _LEAST_SLOPE), fault)
 
 
-def bright_pixels(instance: NDArray[Any], house: StoredHouse) -> NDArray[np.bool_]:
-    """(H, W) pixels of things that have a surface which shines, mirrors or is seen through, and of no thing."""
+def _bright_pixels(instance: NDArray[Any], house: StoredHouse) -> Bools:
+    """(H, W) pixels of the outdoors, of no item, and of items with a luminous, mirroring or clear surface."""
     kinds = [material["kind"] for material in house.house["materials"]]
     dull = [
         n
@@ -234,18 +230,19 @@ def bright_pixels(instance: NDArray[Any], house: StoredHouse) -> NDArray[np.bool
     return ~np.isin(instance, dull)
 
 
-def _filled(picture: NDArray[Any], hole: NDArray[np.bool_]) -> NDArray[Any]:
-    """The picture whose pixels in a hole are those of the nearest outside it, so that no step leads across."""
+def _filled(picture: NDArray[Any], hole: Bools) -> NDArray[Any]:
+    """The picture with pixels in a hole replaced by the nearest outside it, so that no step is added."""
     if not hole.any() or hole.all():
         return picture
     nearest = ndimage.distance_transform_edt(hole, return_distances=False, return_indices=True)
     return np.asarray(picture[tuple(nearest)])
 
 
-def _steps(picture: NDArray[Any]) -> tuple[Floats, Floats]:
+def _steps(picture: NDArray[Any]) -> list[F64]:
+    """Steps of a picture across and down."""
     across = np.diff(picture, axis=1, append=picture[:, -1:])
     down = np.diff(picture, axis=0, append=picture[-1:])
-    return tuple(np.clip(s.astype(np.float64), -_MOST_STEP, _MOST_STEP) for s in (across, down))  # type: ignore[return-value]
+    return [np.clip(s.astype(np.float64), -_MOST_STEP, _MOST_STEP) for s in (across, down)]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -263,21 +260,31 @@ class _Transformed:
 
 
 def _slopes(light: NDArray[Any], surface: _Transformed) -> tuple[float, float, float]:
-    """Steps of light over those of the surface: the slope here, its error, and the largest elsewhere.
+    """Steps of light over those of the surface: the slope, its error, and the largest elsewhere.
 
-    The error is the spread over all other places, which a Fourier transform compares at once.
+    The error is the spread over all other places, which a Fourier transform compares together.
     """
-    found, energy = _correlation(light, surface)
-    found /= max(energy, 1e-12)
-    own = float(found[0, 0])
-    found[0, 0] = -np.inf
-    rest = found[np.isfinite(found)]
-    return own, float(rest.std()), float(rest.max())
+    slopes, energy = _correlation(light, surface)
+    slopes /= max(energy, 1e-12)
+    slope = float(slopes[0, 0])
+    slopes[0, 0] = -np.inf
+    rest = slopes[np.isfinite(slopes)]
+    return slope, float(rest.std()), float(rest.max())
 
 
-def _correlation(light: NDArray[Any], surface: _Transformed) -> tuple[Floats, float]:
-    """(H, W) products of steps of light with those of the surface moved by so much; squares of the latter."""
+def _correlation(light: NDArray[Any], surface: _Transformed) -> tuple[F64, float]:
+    """(H, W) products of steps of light with those of the moved surface; sum of squares of the latter."""
     products = sum(
         np.fft.rfft2(s) * other for s, other in zip(_steps(light), surface.steps, strict=True)
     )
     return np.asarray(np.fft.irfft2(products, light.shape)), surface.energy
+
+
+CHECKS = tuple(
+    Check(name=name, of="view", needs=("radiance",), function=function, cost=cost)
+    for name, function, cost in (
+        ("radiance", check_radiance, 20),
+        ("light guides", check_guides, 24),
+        ("light edges", check_fit, 26),
+    )
+)

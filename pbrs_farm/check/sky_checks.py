@@ -8,54 +8,49 @@ from typing import Any
 
 import numpy as np
 
-from pbrs_farm.check.certificate import Tally
-from pbrs_farm.check.stored_house import StoredHouse
+from pbrs_farm.check.cases import HouseCase
+from pbrs_farm.check.checks import Check
+from pbrs_farm.check.rules import judge
 from pbrs_farm.core import keys
 
-SKY_LX = 0.06  # of illuminances stored to a tenth
-SKY_SHARE = 0.02  # of the dome's: it is summed over texels
-SUN_SHARE = 0.005  # of the sun's: its direction is rounded to a texel or not
-DIRECTION = 2e-6  # of a direction stored to six digits
-EXPECTED_LX = {"outdoor": [20.0, 5000.0], "indoor": [30.0, 1000.0]}  # docs/formats/view_json.md
-DARK_LX = 1.0
+_EXPECTED_LX = {"outdoor": [20.0, 5000.0], "indoor": [30.0, 1000.0]}  # docs/formats/view_json.md
+_DARK_LX = 1.0
 
 
-def check_illuminance(house: StoredHouse, tally: Tally) -> None:
+def check_illuminance(case: HouseCase) -> None:
     """illuminance.json: rooms of house.json, their warnings by its own numbers, the recipe's sky."""
-    held = house.illuminance
-    if not held:
+    house, document = case.house, case.house.illuminance
+    if not document:
         return
-    sky = held.get("sky", {})
-    if "expected_lx" in held:
-        same = held["expected_lx"] == EXPECTED_LX
-        tally.expect("illuminance", house.id, same, "expects other light than it should")
+    sky = document.get("sky", {})
+    if "expected_lx" in document:
+        judge("expected lux", house.id, case.tally, document=document, lux=_EXPECTED_LX)
     is_day = sky.get("sun_direction", [0, 1, 0])[1] >= 0
-    for row in held["rooms"]:
+    for row in document["rooms"]:
         place = f"{house.id} room {row['room']}"
         room = house.rooms.get(str(row["room"]))
-        if house.rooms and tally.expect("illuminance", place, room is not None, "is no room"):
-            assert room is not None
-            same = row.get("name") == room["name"] and row["lit_by"] == room["lit_by"]
-            tally.expect("illuminance", place, same, "is another room in house.json")
+        is_room = house.rooms and case.tally.expect("illuminance", place, room is not None, "is no room")  # fmt: skip
+        if is_room:
+            judge("lit room", place, case.tally, row=row, room=room)
         if "warnings" in row:
-            same = row["warnings"] == _warnings(row, is_day=is_day)
-            tally.expect("illuminance", place, same, "its warnings are not those of its numbers")
-        told = house.told_by_marker("illuminance").get("floor_lux", {}).get(row["room"])
-        if told:
-            same = told == {"outdoor": row["outdoor_lx"], "indoor": row["indoor_lx"]}
-            tally.expect("illuminance", place, same, "has another light in the step's marker")
+            warnings = _warnings(row, is_day=is_day)
+            judge("lux warnings", place, case.tally, row=row, warnings=warnings)
+        in_marker = house.marker_facts("illuminance").get("floor_lux", {}).get(row["room"])
+        if in_marker:
+            lux = {"outdoor": row["outdoor_lx"], "indoor": row["indoor_lx"]}
+            judge("lux in marker", place, case.tally, marker=in_marker, lux=lux)
     if sky and house.recipe:
-        _check_sky(house, sky, tally)
+        _check_sky(case, sky)
 
 
 def _warnings(row: Mapping[str, Any], *, is_day: bool) -> list[str]:
-    """Lines for what is out of range: docs/formats/view_json.md."""
+    """Warnings about levels out of range: docs/formats/view_json.md."""
     lit, lines = set(row["lit_by"]), []
     has = {
         "outdoor": is_day and bool(lit & {"windows", "sky"}),
         "indoor": bool(lit & {"lamps", "fallback", "added"}),
     }
-    for group, (low, high) in EXPECTED_LX.items():
+    for group, (low, high) in _EXPECTED_LX.items():
         value = row[f"{group}_lx"]
         if (has[group] and value < low) or value > high:
             lines.append(
@@ -63,57 +58,43 @@ def _warnings(row: Mapping[str, Any], *, is_day: bool) -> list[str]:
                 f"expected {low:g} to {high:g}"
             )
     total = row["outdoor_lx"] + row["indoor_lx"]
-    if total < DARK_LX:
+    if total < _DARK_LX:
         lines.append(
-            f"room {row['room']}: {total:.2g} lx on the floor by all light, less than {DARK_LX:g}"
+            f"room {row['room']}: {total:.2g} lx on the floor by all light, less than {_DARK_LX:g}"
         )
     return lines
 
 
-def _check_sky(house: StoredHouse, sky: Mapping[str, Any], tally: Tally) -> None:
-    """Where the sun stands, and what sky and sun give open ground: by the recipe and the house's draws."""
+def _check_sky(case: HouseCase, sky: Mapping[str, Any]) -> None:
+    """The sun's direction, and the light of sky and sun on open ground, by the recipe and the house's draws."""
+    house, place = case.house, case.house.id
     direction = np.array(sky["sun_direction"], np.float64)
-    same = bool(abs(np.linalg.norm(direction) - 1) <= 5 * DIRECTION)
-    tally.expect("sky", house.id, same, "its sun's direction has not length 1")
     elevation = math.degrees(math.asin(min(max(direction[1], -1.0), 1.0)))
-    same = abs(elevation - sky["sun_elevation_deg"]) <= 0.01
-    tally.expect("sky", house.id, same, f"its sun stands at {elevation:.3f} degrees")
-    fields, light = house.recipe["sky"], house.recipe["emission"]
-    if fields["kind"] != "sunsky":
+    length = float(np.linalg.norm(direction))
+    judge("sun", place, case.tally, sky=sky, length=length, elevation=elevation)
+    if house.recipe["sky"]["kind"] != "sunsky":
         return
     height, azimuth, is_overcast = _sun(house.id, house.recipe)
     flat = math.cos(height)
-    expected = [flat * math.sin(azimuth), math.sin(height), -flat * math.cos(azimuth)]
-    same = bool(np.abs(direction - expected).max() <= DIRECTION)
-    tally.expect(
-        "sky",
-        house.id,
-        same,
-        f"its sun is not that of the recipe, {np.round(expected, 4).tolist()}",
-    )
+    sun = [flat * math.sin(azimuth), math.sin(height), -flat * math.cos(azimuth)]
     name = "sunsky"
     if is_overcast:
         name = "overcast"
     elif height < 0:
         name = "dusk" if math.degrees(-height) < 12 else "night"
-    same = (sky["name"], sky["rotation_deg"]) == (name, 0.0)
-    tally.expect("sky", house.id, same, f"is told to be {sky['name']}, the recipe gives {name}")
-    # The ground's share of the dome is not seen by level ground.
-    level, sun = _sky_lx(height, is_overcast, light)
-    same = abs(sky["sky_lx"] - level) <= SKY_LX + SKY_SHARE * level
-    tally.expect("sky", house.id, same, f"gives {sky['sky_lx']} lx, by its tables {level:.1f}")
-    same = abs(sky["sun_lx"] - sun) <= SKY_LX + SUN_SHARE * sun
-    tally.expect(
-        "sky", house.id, same, f"its sun gives {sky['sun_lx']} lx, by its tables {sun:.1f}"
-    )
+    # Level ground does not see the ground's share of the dome.
+    sky_lx, sun_lx = _sky_lx(height, is_overcast, house.recipe["emission"])
+    recipe = {"sun": sun, "name": name, "sky_lx": sky_lx, "sun_lx": sun_lx}
+    rounded = np.round(sun, 4).tolist()
+    judge("sky", place, case.tally, sky=sky, recipe=recipe, rounded=rounded)
 
 
-def _drawn(house: str, seed: int, what: str) -> float:
-    return keys.seed("sky", what, house, seed) / 2**32
+def _drawn(house: str, seed: int, name: str) -> float:
+    return keys.seed("sky", name, house, seed) / 2**32
 
 
 def _sun(house: str, recipe: Mapping[str, Any]) -> tuple[float, float, bool]:
-    """(elevation, azimuth) in rad, whether clouds hide it; azimuth from -z, north, towards +x (docs/light.md)."""
+    """(elevation, azimuth) in rad, hidden by clouds; azimuth from -z, north, towards +x (docs/light.md)."""
     fields, seed = recipe["sky"], recipe["seed"]
     share = _drawn(house, seed, "elevation")
     elevation = math.radians(15 + 45 * share)
@@ -160,3 +141,10 @@ def _sky_lx(height: float, is_overcast: bool, light: Mapping[str, Any]) -> tuple
     mass = 1 / (math.sin(height) + 0.50572 * (degrees + 6.07995) ** -1.6364)
     normal = light["sun_lx"] * math.exp(-0.21 * (mass - 1))
     return clear * scale, normal * math.sin(height)
+
+
+CHECKS = (
+    Check(
+        name="illuminance", of="house", needs=("illuminance.json",), function=check_illuminance, cost=7,
+    ),
+)  # fmt: skip

@@ -1,4 +1,4 @@
-"""What house.json says of solids against the triangles of house.glb: boxes, floors, lights, poses of models. Effects: none beside reading documents."""
+"""Boxes, floors, lights and model poses of house.json against the triangles of house.glb. Effects: none beside reading documents."""
 
 from __future__ import annotations
 
@@ -6,160 +6,152 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pbrs_farm.check.certificate import Tally
-from pbrs_farm.check.embree_caster import Floats, Rays
-from pbrs_farm.check.fact_checks import is_rigid
-from pbrs_farm.check.stored_house import StoredHouse
+from pbrs_farm.check.axes import into_frame, is_rigid
+from pbrs_farm.check.cases import HouseCase
+from pbrs_farm.check.checks import Check
+from pbrs_farm.check.embree_caster import Rays
+from pbrs_farm.check.plan import points_in_plan
+from pbrs_farm.check.rules import judge
 from pbrs_farm.check.stored_mesh import Triangles
+from pbrs_farm.core.arrays import F64, I64, Bools
 from pbrs_farm.core.house import FLOATING
 
-MODEL_M = (
-    1e-4  # between two instances of one model, in its own frame: what float32 keeps in the world
+_MODEL_M = 1e-4  # between two instances of a model in its frame: float32 precision in the world
+_BOX_M = 0.001  # tolerance of a box's sides
+_FLOOR_M = 0.05  # height above a floor that clears items lying on it; tolerance below it
+_FLOOR_SHARE = 0.5  # least share of a floor that is met: the rest may be covered, or a stairwell
+_LIGHT_M = (
+    0.05  # between a light and its surfaces beside its radius, as of a shade's ring about a bulb
 )
-BOX_M = 0.001  # by which a side of a box may differ from its triangles
-FLOOR_M = 0.05  # above a floor, where what lies on it is not met, and below it
-FLOOR_SHARE = 0.5  # of a room's floor: the rest may be covered, or a stairwell
-LIGHT_M = 0.05  # between a light and its surfaces, beside its radius: a shade's ring about a bulb
-TOLD_STEP = 1e-6  # repair.json tells measures to six digits
 
 
-def check_solids(house: StoredHouse, triangles: Triangles, rays: Rays, tally: Tally) -> None:
-    """Boxes, floors and bulbs that house.json tells of are where the triangles of house.glb are."""
+def check_solids(case: HouseCase) -> None:
+    """Boxes, floors and bulbs of house.json are where the triangles of house.glb are."""
+    house, triangles = case.house, case.rest.triangles
     for instance, row in sorted(house.items.items()):
-        place = f"{house.id} item {row['id']}"
         points = triangles.loose.get(instance)
         if points is None:
             continue
         if row["box"]:
             off = _box_off(row["box"], points.astype(np.float64))
-            what = f"its box differs by {off * 1000:.1f} mm from its triangles"
-            tally.expect("house items", place, off <= BOX_M, what)
+            fault = f"its box differs by {off * 1000:.1f} mm from its triangles"
+            case.expect("house items", f"item {row['id']}")(off <= _BOX_M, fault)
         if row["lights"]:
-            _check_lights(house, instance, triangles, place, tally)
+            _check_lights(case, instance)
     for name, room in house.rooms.items():
         if room["has_floor"]:
-            share = _share_of_floor(room, rays)
-            what = f"its floor lies elsewhere below {1 - share:.0%} of it"
-            tally.expect("rooms", f"{house.id} room {name}", share >= FLOOR_SHARE, what)
+            share = _share_of_floor(room, case.rest.rays)
+            fault = f"its floor lies elsewhere below {1 - share:.0%} of it"
+            case.expect("rooms", f"room {name}")(share >= _FLOOR_SHARE, fault)
 
 
-def check_floating(house: StoredHouse, triangles: Triangles, tally: Tally) -> None:
-    """What hangs in the air touches nothing that stands: no edge of either passes through a face of the other."""
+def check_floating(case: HouseCase) -> None:
+    """No edge of a floating item passes through a face of another one, nor the other way round."""
+    house, triangles = case.house, case.rest.triangles
     hung = [n for n, row in house.items.items() if FLOATING in row["tags"]]
     if not hung:
         return
     floats = np.isin(triangles.instance, hung)
     begin, along = _edges(triangles, floats)
     owner = np.repeat(triangles.instance[floats], 3)
-    touches = set(owner[_met(Rays(triangles, ~floats), begin, along) >= 0].tolist())
-    # Of what stands, look at what is near.
+    touching = set(owner[_pierced(Rays(triangles, ~floats), begin, along) >= 0].tolist())
+    # Of the other items, only the near triangles matter.
     corners = triangles.vertices[triangles.faces].astype(np.float64)
     low, high = begin.min(0), begin.max(0)
     near = ~floats & ((corners.max(1) >= low) & (corners.min(1) <= high)).all(1)
-    met = _met(Rays(triangles, floats), *_edges(triangles, near))
-    touches |= set(triangles.instance[met[met >= 0]].tolist())
+    face = _pierced(Rays(triangles, floats), *_edges(triangles, near))
+    touching |= set(triangles.instance[face[face >= 0]].tolist())
     for instance in hung:
-        place = f"{house.id} item {house.items[instance]['id']}"
-        tally.expect("floating", place, instance not in touches, "is said to hang, and touches")
+        expect = case.expect("floating", f"item {house.items[instance]['id']}")
+        expect(instance not in touching, "is said to hang, and touches")
 
 
-def _edges(triangles: Triangles, which: NDArray[np.bool_]) -> tuple[Floats, Floats]:
-    """(3 F, 3) begins of the edges of some triangles, face by face, and the ways to their ends."""
-    corners = triangles.vertices[triangles.faces[which]].astype(np.float64)
+def _edges(triangles: Triangles, chosen: Bools) -> tuple[F64, F64]:
+    """(3 F, 3) begins of the edges of some triangles, face by face, and the vectors to their ends."""
+    corners = triangles.vertices[triangles.faces[chosen]].astype(np.float64)
     begin = corners.reshape(-1, 3)
     return begin, np.roll(corners, -1, axis=1).reshape(-1, 3) - begin
 
 
-def _met(rays: Rays, begin: Floats, along: Floats) -> NDArray[np.int64]:
+def _pierced(rays: Rays, begin: F64, along: F64) -> I64:
     """(N,) the triangle that each edge passes through, -1 = none."""
     face = rays.first(begin, along)
     return np.where(rays.distance(face, begin, along) <= 1, face, -1)
 
 
-def _box_off(box: Mapping[str, Any], points: Floats) -> float:
-    """Metres by which the worst side of a box of house.json, whose axes are columns, is off."""
+def _box_off(box: Mapping[str, Any], points: F64) -> float:
+    """Largest error in metres of the sides of a box of house.json, whose axes are columns."""
     axes = np.array(box["axes"], np.float64)
     local = (points - np.array(box["centre"])) @ axes
     half = np.array(box["half"], np.float64)
     return float(np.abs([local.min(0) + half, local.max(0) - half]).max())
 
 
-def _check_lights(
-    house: StoredHouse, instance: int, triangles: Triangles, place: str, tally: Tally
-) -> None:
-    """A light stands where its surfaces are; what repair measured of it is told alike."""
-    row = house.items[instance]
-    measured = {
-        (r["item_id"], r["source"]): r for r in house.repair.get("sources", [])
-    }  # fmt: skip
+def _check_lights(case: HouseCase, instance: int) -> None:
+    """Lights are at their surfaces, and repair.json has the same measures of them."""
+    house, row = case.house, case.house.items[instance]
+    place = f"{house.id} item {row['id']}"
+    expect = case.tally.at("lights", place)
+    measured = {(r["item_id"], r["source"]): r for r in house.repair.get("sources", [])}
     total = sum(light["share"] for light in row["lights"])
-    tally.expect(
-        "lights", place, abs(total - 1) <= 1e-6, f"its lights share {total:g} of its power"
-    )
+    judge("lights of an item", place, case.tally, total=total)
     for k, light in enumerate(row["lights"]):
-        same = all(0 <= n < len(row["surfaces"]) for n in light["emitting"])
-        if not tally.expect("lights", place, same, "shines by a surface that it has not"):
+        exist = all(0 <= n < len(row["surfaces"]) for n in light["emitting"])
+        if not expect(exist, "shines by a surface that it has not"):
             continue
-        kinds = {
-            house.house["materials"][row["surfaces"][n]["material"]]["kind"]
-            for n in light["emitting"]
-        }
-        tally.expect("lights", place, kinds <= {"bulb"}, f"shines by what is {sorted(kinds)}")
-        points = triangles.points_of_surfaces(instance, light["emitting"])
+        materials = {row["surfaces"][n]["material"] for n in light["emitting"]}
+        kinds = {house.house["materials"][m]["kind"] for m in materials}
+        expect(kinds <= {"bulb"}, f"shines by what is {sorted(kinds)}")
+        points = case.rest.triangles.points_of_surfaces(instance, light["emitting"])
         if len(points):
             low, high = points.min(0), points.max(0)
             outside = np.maximum(np.maximum(low - light["position"], light["position"] - high), 0)
             off = float(np.linalg.norm(outside))
-            what = f"light {k} stands {off:.2f} m beside what shines"
-            tally.expect("lights", place, off <= LIGHT_M + light["radius_m"], what)
-        told = measured.get((row["id"], k))
-        if told is not None:
-            same = all(abs(told[n] - light[n]) <= TOLD_STEP for n in ("escape", "radius_m"))
-            tally.expect("lights", place, same, f"light {k} is another in repair.json")
+            fault = f"light {k} stands {off:.2f} m beside what shines"
+            expect(off <= _LIGHT_M + light["radius_m"], fault)
+        source = measured.get((row["id"], k))
+        if source is not None:
+            measures = [[r["escape"], r["radius_m"]] for r in (source, light)]
+            judge("repaired light", place, case.tally, measures=measures, k=k)
 
 
 def _share_of_floor(room: Mapping[str, Any], rays: Rays) -> float:
-    """The part of a grid of points of a room below which the floor lies where it is told to."""
-    corners = np.array(room["polygon"], np.float64)
-    low, high = corners.min(0), corners.max(0)
-    x, z = np.meshgrid(*(np.linspace(a, b, 12)[1:-1] for a, b in zip(low, high, strict=True)))
-    inside = [p for p in np.stack([x.ravel(), z.ravel()], 1) if is_within(room["polygon"], p)]
-    if not inside:
+    """Share of a grid of points of a room that have the floor at its height below them."""
+    points = points_in_plan(room["polygon"], 12, room["floor_y"] + _FLOOR_M, inner=True)
+    if not len(points):
         return 1.0
-    above = np.insert(np.array(inside), 1, room["floor_y"] + FLOOR_M, axis=1)
-    down = np.broadcast_to([0.0, -1.0, 0.0], above.shape)
-    face = rays.first(above, down)
-    return float(((face >= 0) & (rays.distance(face, above, down) <= 2 * FLOOR_M)).mean())
+    down = np.broadcast_to([0.0, -1.0, 0.0], points.shape)
+    face = rays.first(points, down)
+    return float(((face >= 0) & (rays.distance(face, points, down) <= 2 * _FLOOR_M)).mean())
 
 
-def is_within(polygon: list[list[float]], point: Floats) -> bool:
-    """Whether a polygon in plan holds a point: an odd number of its sides lie beyond it."""
-    corners = np.array(polygon, np.float64)
-    a, b = corners, np.roll(corners, -1, axis=0)
-    crosses = (a[:, 1] > point[1]) != (b[:, 1] > point[1])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        at = a[:, 0] + (point[1] - a[:, 1]) * (b[:, 0] - a[:, 0]) / (b[:, 1] - a[:, 1])
-    return bool((crosses & (point[0] < at)).sum() % 2)
-
-
-def check_models(house: StoredHouse, triangles: Triangles, tally: Tally) -> None:
+def check_models(case: HouseCase) -> None:
     """Poses of placed models are rigid, and bring instances of one model to the same points."""
-    first: dict[str, tuple[str, Floats]] = {}
-    for instance, row in sorted(house.items.items()):
+    first: dict[str, tuple[str, F64]] = {}
+    for instance, row in sorted(case.house.items.items()):
         if not row.get("pose"):
             continue
-        place = f"{house.id} item {row['id']}"
+        expect = case.expect("model poses", f"item {row['id']}")
         pose = np.array(row["pose"]["world_from_model"], np.float64)
-        if not tally.expect("model poses", place, is_rigid(pose), "has no rigid pose"):
+        if not expect(is_rigid(pose), "has no rigid pose"):
             continue
-        points = triangles.loose.get(instance)
+        points = case.rest.triangles.loose.get(instance)
         if points is None:
             continue
-        own = (points.astype(np.float64) - pose[:3, 3]) @ pose[:3, :3]
-        name, known = first.setdefault(row["pose"]["model"], (row["id"], own))
+        local = into_frame(pose, points.astype(np.float64))
+        name, model = first.setdefault(row["pose"]["model"], (row["id"], local))
         if name != row["id"]:
-            same = known.shape == own.shape and bool(np.abs(known - own).max() <= MODEL_M)
-            what = f"is not where its pose brings {row['pose']['model']}, as {name} has it"
-            tally.expect("model poses", place, same, what)
+            same = model.shape == local.shape and np.abs(model - local).max() <= _MODEL_M
+            fault = f"is not where its pose brings {row['pose']['model']}, as {name} has it"
+            expect(same, fault)
+
+
+CHECKS = tuple(
+    Check(name=name, of="house", needs=("house.json",), function=function, cost=cost)
+    for name, function, cost in (
+        ("model poses", check_models, 2),
+        ("floating", check_floating, 3),
+        ("house items", check_solids, 4),
+    )
+)

@@ -1,11 +1,11 @@
-"""A house's folder as its stored files say: documents and what its markers tell. Effects: reads files.
+"""The documents and markers of a house's folder. Effects: reads files.
 
-Knows nothing of the House that made them. A document that is missing or damaged is empty here: the
-checks of files say so.
+Uses no House. A document that is missing or damaged is empty here: the checks of files report that.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -16,19 +16,19 @@ from pbrs_farm.check.stored_files import BadFile, stored_object
 
 @dataclass(frozen=True)
 class StoredHouse:
-    """One houses/<house_id> folder."""
+    """A houses/<house_id> folder."""
 
     folder: Path
-    moved: dict[str, Any] | None = None  # house.json as it would be at another time
+    moved: dict[str, Any] | None = None  # house.json for another time
 
     @property
     def id(self) -> str:
-        """As the folder is called."""
+        """Name of the folder."""
         return self.folder.name
 
     @cached_property
     def house(self) -> dict[str, Any]:
-        """house.json; of a house at another time, as that would be."""
+        """house.json, of a house at another time for that time."""
         return self.moved if self.moved is not None else _document(self.folder / "house.json")
 
     @cached_property
@@ -48,12 +48,12 @@ class StoredHouse:
 
     @cached_property
     def dress(self) -> dict[str, Any]:
-        """dress.json, of a house that was dressed."""
+        """dress.json of a dressed house."""
         return _document(self.folder / "dress.json")
 
     @cached_property
     def recipe(self) -> dict[str, Any]:
-        """recipe.json of the root, as it stands: no field is added."""
+        """recipe.json of the root, without added fields."""
         return _document(self.folder.parents[1] / "recipe.json")
 
     @cached_property
@@ -76,8 +76,26 @@ class StoredHouse:
         """Room's id -> its row in illuminance.json."""
         return {str(row["room"]): row for row in self.illuminance.get("rooms", [])}
 
-    def told_by_marker(self, step: str, view: str = "") -> dict[str, Any]:
-        """The facts that the marker of a step holds; {} where it has none."""
+    @cached_property
+    def lamps(self) -> dict[str, tuple[int, int]]:
+        """Name of each light -> instance of its item and number among the item's lights.
+
+        A single light has the id of its item; several have a slash and their number behind it.
+        """
+        return {
+            f"{row['id']}/{k}" if len(row["lights"]) > 1 else row["id"]: (instance, k)
+            for instance, row in sorted(self.items.items())
+            for k in range(len(row["lights"]))
+        }
+
+    def light(self, name: str) -> dict[str, Any]:
+        """The row of a light of `lamps`."""
+        instance, k = self.lamps[name]
+        row: dict[str, Any] = self.items[instance]["lights"][k]
+        return row
+
+    def marker_facts(self, step: str, view: str = "") -> dict[str, Any]:
+        """The facts that the marker of a step holds; {} if there are none."""
         name = f"{step}.{view}.json" if view else f"{step}.json"
         facts = _document(self.folder / "done" / name).get("facts", {})
         return facts if isinstance(facts, dict) else {}
@@ -88,3 +106,9 @@ def _document(file: Path) -> dict[str, Any]:
         return stored_object(file)
     except BadFile:
         return {}
+
+
+def eye_of_row(row: Mapping[str, Any]) -> str:
+    """The camera of a rig that took a view of cameras.json; "" for the rig's first camera and without a rig."""
+    rig = row.get("rig")
+    return "" if rig is None or rig["instant"] == row["id"] else str(rig["camera"])

@@ -1,6 +1,6 @@
-"""house.glb -> triangles with instance, class, material and texture, read here alone; no effects.
+"""Triangles of house.glb with instance, class, material and texture; no effects.
 
-Deliberately shares no code with the package's own reader and writer of GLB: it is their check.
+Shares no code with the package's own reader and writer of GLB on purpose: it checks them.
 """
 
 from __future__ import annotations
@@ -14,17 +14,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.check.finish_checks import Finishes
-from pbrs_farm.check.shading_normals import NormalMaps, bent, between_corners, decoded
-from pbrs_farm.core.errors import BadInput
-from pbrs_farm.images import decode_texture
+from pbrs_farm.check.colours import linear_from_srgb, srgb_from_linear
+from pbrs_farm.check.finishes import Finishes, mapped_alpha
+from pbrs_farm.check.shading_normals import bent, between_corners, decoded
+from pbrs_farm.check.textures import Encoded, Pixels, Textures, between_texels
+from pbrs_farm.core.arrays import F32, F64, I64, Bools
 
 _DTYPES = {5121: "<u1", 5123: "<u2", 5125: "<u4", 5126: "<f4"}  # glTF component types
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3}  # components of an element
-_SHARE = np.arange(256) / 255  # of one, that a byte is; and its linear light
-_LINEAR = np.where(_SHARE <= 0.04045, _SHARE / 12.92, ((_SHARE + 0.055) / 1.055) ** 2.4)
+_SHARE = np.arange(256) / 255  # value 0..1 of a byte
+_LINEAR = linear_from_srgb(_SHARE)  # linear light of a byte
 _SEE_THROUGH = ("glass", "pane")  # kinds of material
-_MAX_ELEMENTS = 50_000_000  # vertices, triangles: nodes may show one mesh many times
+_BENT = ("opaque", "mirror", "shade")  # kinds whose normal map has an effect
+_MAX_ELEMENTS = 50_000_000  # vertices or triangles: nodes may repeat a mesh many times
 
 
 class BadGlb(ValueError):
@@ -32,170 +34,157 @@ class BadGlb(ValueError):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Colours:
-    """The diffuse colours of a house's materials, textures decoded when one is looked up."""
+class Materials:
+    """The M materials of a house.glb."""
 
-    factors: NDArray[np.float64]  # (M, 3) linear
-    pictures: tuple[tuple[str, bytes] | None, ...]  # of each material: media type and bytes
-    decoded: dict[int, NDArray[np.uint8] | None]  # of those looked up until now
-    cutoffs: NDArray[np.float64]  # (M,) alpha below which there is a hole, 0 = no holes
+    kinds: tuple[str, ...]
+    factors: F64  # (M, 3) linear colour
+    cutoffs: F64  # (M,) alpha below which there is a hole, 0 = no holes
+    normal_scales: F64  # (M,)
+    colours: Textures
+    normals: Textures
+    roughness: Textures
 
-    def at(
-        self, material: NDArray[np.int64], uv: NDArray[np.float64], most: float
-    ) -> NDArray[np.float64]:
-        """(N, 3) sRGB 0..255: colour times texture at uv (N, 2), v down, held to most in linear.
+    def colour(self, material: I64, uv: F64, most: float) -> F64:
+        """(N, 3) sRGB 0..255 of colour times texture at uv (N, 2), v down.
 
-        material is (N,) int64 indices. Textures are filtered between texels; most is the largest
-        linear value, as a picture cannot show more. Zeros where the mesh has no materials.
+        material: (N,). most: the largest linear value, to which colours are clipped.
         """
         if not len(self.factors):
             return np.zeros((len(material), 3))
         linear = self.factors[material]
-        for number in np.unique(material):
-            pixels = self._picture(int(number))
-            if pixels is not None:
-                own = material == number
-                linear[own] *= _between_texels(pixels[..., :3], uv[own], _LINEAR)
-        linear = np.clip(linear, 0.0, most)
-        low = linear * 12.92
-        return np.asarray(
-            255 * np.where(linear <= 0.0031308, low, 1.055 * linear ** (1 / 2.4) - 0.055)
-        )
 
-    def is_hole(self, material: NDArray[np.int64], uv: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """(N,) whether alpha at uv (N, 2), v down, is below the cutoff of material (N,) there."""
-        hole = np.zeros(len(material), bool)
-        for number in np.unique(material):
-            if self.cutoffs[number] > 0:
-                own = material == number
-                pixels = self._picture(int(number))
-                alpha = np.ones(int(own.sum()))
-                if pixels is not None and pixels.shape[2] == 4:
-                    alpha = _between_texels(pixels[..., 3:], uv[own], _SHARE)[:, 0]
-                hole[own] = alpha < self.cutoffs[number]
-        return hole
+        def multiply(_number: int, points: Bools, pixels: Pixels) -> None:
+            linear[points] *= between_texels(pixels[..., :3], uv[points], _LINEAR)
 
-    def _picture(self, material: int) -> NDArray[np.uint8] | None:
-        stored = self.pictures[material]
-        if stored is None:
-            return None
-        if material not in self.decoded:
-            try:
-                self.decoded[material] = decode_texture(
-                    stored[1], f"material {material}", stored[0]
-                )
-            except BadInput:
-                self.decoded[material] = None  # counts as white
-        return self.decoded[material]
+        self.colours.apply(material, multiply)
+        return 255 * srgb_from_linear(np.clip(linear, 0.0, most))
 
+    def is_hole(self, material: I64, uv: F64) -> Bools:
+        """(N,) True where alpha at uv (N, 2), v down, is below the cutoff of material (N,)."""
+        alpha = np.ones(len(material))
 
-def _between_texels(
-    pixels: NDArray[np.uint8], uv: NDArray[np.float64], value_of_byte: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """(N, C) values between the four texels about each uv (N, 2), which repeats; v down."""
-    height, width = pixels.shape[:2]
-    x, y = uv[:, 0] * width - 0.5, uv[:, 1] * height - 0.5
-    found = np.zeros((len(uv), pixels.shape[2]))
-    for dx, dy in ((0, 0), (1, 0), (0, 1), (1, 1)):
-        column, row = np.floor(x) + dx, np.floor(y) + dy
-        weight = (1 - np.abs(x - column)) * (1 - np.abs(y - row))
-        texel = value_of_byte[pixels[(row % height).astype(int), (column % width).astype(int)]]
-        found += weight[:, None] * texel
-    return found
+        def read(number: int, points: Bools, pixels: Pixels) -> None:
+            if self.cutoffs[number] > 0 and pixels.shape[2] == 4:
+                alpha[points] = between_texels(pixels[..., 3:], uv[points], _SHARE)[:, 0]
+
+        self.colours.apply(material, read)
+        return alpha < self.cutoffs[material]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Triangles:
-    """The F triangles of a house."""
+    """The F triangles of a house, of V vertices."""
 
-    vertices: NDArray[np.float32]  # (V, 3) metres
-    faces: NDArray[np.int64]  # (F, 3) indices of vertices
-    instance: NDArray[np.int64]  # (F,) instance id
-    material: NDArray[np.int64]  # (F,) index of the GLB's materials
-    nyu40: dict[int, int]  # instance id -> class as the GLB says
-    see_through: NDArray[np.bool_]  # (F,) glass and panes
+    vertices: F32  # (V, 3) metres
+    normals: F32  # (V, 3), 0 = none
+    uv: F32  # (V, 2) v down, 0 = none
+    faces: I64  # (F, 3) indices of vertices
+    instance: I64  # (F,) instance id
+    material: I64  # (F,) index of materials
+    surface: I64  # (F,) number of the primitive among those of its node
+    part: I64  # (F,) index of parts
+    parts: tuple[str, ...]  # names of moving parts, "" first
+    nyu40: dict[int, int]  # instance id -> class
     item: dict[int, str]  # instance id -> id of the item
-    uv: NDArray[np.float32]  # (V, 2) v down; 0 where there are none
-    colours: Colours
-    loose: dict[
-        int, NDArray[np.float32]
-    ]  # instance id -> (N, 3) vertices, also those of no triangle
-
-    # (F,) number of the triangle's primitive among those of its node, as surfaces with vertices are
-    surface: NDArray[np.int64]
-
-    parts: tuple[str, ...]  # names of parts that move, "" first
-    part: NDArray[np.int64]  # (F,) index of parts
-
-    def points_of_surfaces(self, instance: int, surfaces: list[int]) -> NDArray[np.float64]:
-        """(N, 3) corners of the triangles of some surfaces of an item."""
-        own = (self.instance == instance) & np.isin(self.surface, surfaces)
-        return np.asarray(self.vertices[self.faces[own].reshape(-1)], np.float64)
-
-    kinds: tuple[str, ...]  # of each material
-    normals: NDArray[np.float32]  # (V, 3) of the corners; 0 where there are none
-    maps: NormalMaps
-    rough_maps: tuple[tuple[str, bytes] | None, ...] = ()  # of each material
-    finishes: Finishes = field(default_factory=lambda: Finishes((), ()))
+    loose: dict[int, F32]  # instance id -> (N, 3) all vertices, also those of no triangle
+    materials: Materials
+    finishes: Finishes = field(default_factory=Finishes)
 
     def with_finishes(self, rows: Sequence[Mapping[str, Any]]) -> Triangles:
-        """The same with the materials' rows of house.json, which say more of gloss than glTF does."""
-        return replace(self, finishes=Finishes(tuple(rows), self.rough_maps))
+        """The same with the materials' rows of house.json, which hold more of gloss than glTF does."""
+        return replace(self, finishes=Finishes(tuple(rows)))
 
-    def alpha_at(self, face: NDArray[np.int64], points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(N,) GGX roughness at points (N, 3) on faces (N,), with maps."""
-        material = self.material[face]
-        alpha = self.finishes.alpha()[material]
-        at = self.uv_at(face, points)
-        for number in np.unique(material):
-            green = self.finishes.green(int(number))
-            if green is not None:
-                own = material == number
-                share = _between_texels(green, at[own], _SHARE)[:, 0]
-                alpha[own] = np.maximum(alpha[own] * share**2, 0.05)
-        return alpha
+    def only(self, instance: int) -> Triangles:
+        """The triangles of one item."""
+        chosen = self.instance == instance
+        used, numbers = np.unique(self.faces[chosen], return_inverse=True)
+        arrays = {n: getattr(self, n)[used] for n in ("vertices", "normals", "uv")}
+        arrays |= {n: getattr(self, n)[chosen] for n in ("instance", "material", "surface", "part")}
+        return replace(self, faces=numbers.reshape(-1, 3).astype(np.int64), **arrays)
 
-    def shading_normals(
-        self, face: NDArray[np.int64], points: NDArray[np.float64], facing: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
-        """(N, 3) unit normals that light follows at points (N, 3) on faces (N,), on the side of facing."""
-        corners = self.faces[face]
-        weights = self._weights(face, points)
-        seen = between_corners(weights, self.normals[corners], facing)
-        at = self.uv_at(face, points)
-        for number in np.unique(self.material[face]):
-            pixels = self.maps.of(int(number))
-            if pixels is None:
-                continue
-            own = self.material[face] == number
-            values = _between_texels(pixels[..., :3], at[own], np.arange(256.0))
-            mapped = decoded(values, float(self.maps.scales[number]))
-            triangles = self.vertices[corners[own]].astype(np.float64)
-            uv = self.uv[corners[own]].astype(np.float64)
-            seen[own] = bent(seen[own], triangles, uv, mapped)
-        return seen
+    def points_of(self, chosen: Bools) -> F64:
+        """(N, 3) corners of some triangles."""
+        return np.asarray(self.vertices[self.faces[chosen].reshape(-1)], np.float64)
 
-    def kinds_of(self, face: NDArray[np.int64]) -> NDArray[Any]:
-        """(N,) the kind of each face's material; "" where face is -1."""
-        names = np.array([*self.kinds, ""])
-        return names[np.where(face >= 0, self.material[face], len(self.kinds))]
+    def points_of_surfaces(self, instance: int, surfaces: list[int]) -> F64:
+        """(N, 3) corners of the triangles of some surfaces of an item."""
+        return self.points_of((self.instance == instance) & np.isin(self.surface, surfaces))
+
+    def is_part(self, name: str) -> Bools:
+        """(F,) triangles of the parts of a name."""
+        number = self.parts.index(name) if name in self.parts else -1
+        return np.asarray(self.part == number)
 
     @property
-    def has_holes(self) -> NDArray[np.bool_]:
-        """(F,) whether the material may be cut out."""
-        if not len(self.material):
-            return np.zeros(0, bool)
-        return np.asarray(self.colours.cutoffs[self.material] > 0)
+    def see_through(self) -> Bools:
+        """(F,) glass and panes."""
+        return self.is_of(*_SEE_THROUGH)
 
-    def uv_at(self, face: NDArray[np.int64], points: NDArray[np.float64]) -> NDArray[np.float64]:
+    @property
+    def has_holes(self) -> Bools:
+        """(F,) triangles whose material may be cut out."""
+        return self.of_material(self.materials.cutoffs) > 0
+
+    def is_of(self, *kinds: str) -> Bools:
+        """(F,) triangles whose material is of some kinds."""
+        return self.of_material(np.array([k in kinds for k in self.materials.kinds], bool))
+
+    def of_material(self, table: NDArray[Any]) -> NDArray[Any]:
+        """(F,) the value of a table (M,) for each triangle's material."""
+        return table[self.material] if len(self.material) else np.zeros(0, table.dtype)
+
+    def kinds_of(self, face: I64) -> NDArray[Any]:
+        """(N,) the kind of each face's material; "" where face is -1."""
+        names = np.array([*self.materials.kinds, ""])
+        return names[np.where(face >= 0, self.material[face], len(names) - 1)]
+
+    def colour_at(self, face: I64, points: F64, most: float) -> F64:
+        """(N, 3) sRGB 0..255 at points (N, 3) on faces (N,); most as of `Materials.colour`."""
+        return self.materials.colour(self.material[face], self.uv_at(face, points), most)
+
+    def is_hole(self, face: I64, points: F64) -> Bools:
+        """(N,) True where alpha cuts faces (N,) out at points (N, 3) on them."""
+        return self.materials.is_hole(self.material[face], self.uv_at(face, points))
+
+    def alpha_at(self, face: I64, points: F64) -> F64:
+        """(N,) GGX roughness at points (N, 3) on faces (N,), with maps."""
+        material, uv = self.material[face], self.uv_at(face, points)
+        alpha = self.finishes.alpha()[material]
+
+        def multiply(number: int, chosen: Bools, pixels: Pixels) -> None:
+            if self.finishes.is_mapped(number):
+                share = between_texels(pixels[..., 1:2], uv[chosen], _SHARE)[:, 0]
+                alpha[chosen] = mapped_alpha(alpha[chosen], share)
+
+        self.materials.roughness.apply(material, multiply)
+        return alpha
+
+    def shading_normals(self, face: I64, points: F64, facing: F64) -> F64:
+        """(N, 3) unit shading normals at points (N, 3) on faces (N,), on the side of facing."""
+        corners, uv = self.faces[face], self.uv_at(face, points)
+        normals = between_corners(self._weights(face, points), self.normals[corners], facing)
+
+        def bend(number: int, chosen: Bools, pixels: Pixels) -> None:
+            if self.materials.kinds[number] in _BENT:
+                values = between_texels(pixels[..., :3], uv[chosen], np.arange(256.0))
+                mapped = decoded(values, float(self.materials.normal_scales[number]))
+                triangles = self.vertices[corners[chosen]].astype(np.float64)
+                corner_uv = self.uv[corners[chosen]].astype(np.float64)
+                normals[chosen] = bent(normals[chosen], triangles, corner_uv, mapped)
+
+        self.materials.normals.apply(self.material[face], bend)
+        return normals
+
+    def uv_at(self, face: I64, points: F64) -> F64:
         """(N, 2) texture coordinates, v down, of points (N, 3) on faces (N,)."""
         weights = self._weights(face, points)
         uv = self.uv[self.faces[face]].astype(np.float64)
-        at = uv[:, 0] + weights[:, 1:2] * (uv[:, 1] - uv[:, 0])
-        return np.asarray(np.nan_to_num(at + weights[:, 2:] * (uv[:, 2] - uv[:, 0])))
+        at_point = uv[:, 0] + weights[:, 1:2] * (uv[:, 1] - uv[:, 0])
+        return np.asarray(np.nan_to_num(at_point + weights[:, 2:] * (uv[:, 2] - uv[:, 0])))
 
-    def _weights(self, face: NDArray[np.int64], points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(N, 3) weights of the corners at points: the areas over against them."""
+    def _weights(self, face: I64, points: F64) -> F64:
+        """(N, 3) barycentric weights of the corners at points."""
         corners = self.faces[face]
         a, b, c = (self.vertices[corners[:, k]].astype(np.float64) for k in range(3))
         normal = np.cross(b - a, c - a)
@@ -205,19 +194,14 @@ class Triangles:
             at_c = np.einsum("ni,ni->n", np.cross(b - a, points - a), normal) / squared
         return np.stack([1 - at_b - at_c, at_b, at_c], axis=1)
 
-    def is_hole(self, face: NDArray[np.int64], points: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """(N,) whether alpha leaves nothing of faces (N,) at points (N, 3) on them."""
-        return self.colours.is_hole(self.material[face], self.uv_at(face, points))
-
 
 def triangles_from_glb(data: bytes) -> Triangles:
-    """Every triangle of every node; raises BadGlb.
+    """Every triangle of every node of a binary glTF.
 
-    Of the binary glTF that `house.glb` is, read apart from the exporter. BadGlb for anything that
-    cannot be followed: damaged chunks, indices that point nowhere, other types.
+    Raises BadGlb for damaged chunks, indices out of range and types that house.glb does not have.
     """
     try:
-        return _triangles(*_chunks(data))
+        return _triangles(_Glb(*_chunks(data)))
     except (KeyError, IndexError, TypeError, ValueError, struct.error) as error:
         raise BadGlb(f"cannot be read: {error}") from None
 
@@ -237,113 +221,94 @@ def _chunks(data: bytes) -> tuple[dict[str, Any], bytes]:
     return document, data[20 + n_json + 8 :]
 
 
-def _accessor(document: dict[str, Any], binary: bytes, index: int) -> NDArray[Any]:
-    accessor = document["accessors"][index]
-    view = document["bufferViews"][accessor["bufferView"]]
-    start = view.get("byteOffset", 0) + accessor.get("byteOffset", 0)
-    width = _WIDTHS[accessor["type"]]
-    flat = np.frombuffer(
-        binary, _DTYPES[accessor["componentType"]], accessor["count"] * width, start
-    )
-    return flat.reshape(-1, width)
+@dataclass(frozen=True, slots=True)
+class _Glb:
+    """A binary glTF."""
+
+    document: dict[str, Any]
+    binary: bytes
+
+    def accessor(self, index: int) -> NDArray[Any]:
+        """(N, C) values of an accessor."""
+        accessor = self.document["accessors"][index]
+        view = self.document["bufferViews"][accessor["bufferView"]]
+        start = view.get("byteOffset", 0) + accessor.get("byteOffset", 0)
+        width = _WIDTHS[accessor["type"]]
+        dtype, n = _DTYPES[accessor["componentType"]], accessor["count"] * width
+        return np.frombuffer(self.binary, dtype, n, start).reshape(-1, width)
+
+    def picture(self, texture: dict[str, Any] | None) -> Encoded:
+        """Media type and bytes of a texture's picture; None for no texture."""
+        if texture is None:
+            return None
+        image = self.document["images"][self.document["textures"][texture["index"]]["source"]]
+        view = self.document["bufferViews"][image["bufferView"]]
+        start = view.get("byteOffset", 0)
+        return image["mimeType"], self.binary[start : start + view["byteLength"]]
 
 
-def _triangles(document: dict[str, Any], binary: bytes) -> Triangles:
-    vertices = [np.zeros((0, 3), np.float32)]
-    faces = [np.zeros((0, 3), np.int64)]
-    # Instance, material, surface, number of faces, part.
+def _triangles(glb: _Glb) -> Triangles:
+    vertices, normals = [np.zeros((0, 3), np.float32)], [np.zeros((0, 3), np.float32)]
+    uvs, faces = [np.zeros((0, 2), np.float32)], [np.zeros((0, 3), np.int64)]
+    # Instance, material, surface, part and number of faces of each primitive.
     owners: list[tuple[int, int, int, int, int]] = []
     parts = {"": 0}
     nyu40: dict[int, int] = {}
     item: dict[int, str] = {}
-    uvs = [np.zeros((0, 2), np.float32)]
-    normals = [np.zeros((0, 3), np.float32)]
-    loose: dict[int, list[NDArray[np.float32]]] = {}
+    loose: dict[int, list[F32]] = {}
     n_vertices = n_faces = 0
     # Join the primitives of all nodes: those of this package carry no transform.
-    for node in document.get("nodes", []):
+    for node in glb.document.get("nodes", []):
         instance = int(node["extras"]["instance"])
         nyu40[instance] = int(node["extras"]["nyu40"])
         item[instance] = str(node["extras"].get("item", instance))
-        mesh = document["meshes"][node["mesh"]] if "mesh" in node else {"primitives": []}
+        mesh = glb.document["meshes"][node["mesh"]] if "mesh" in node else {"primitives": []}
         for number, primitive in enumerate(mesh["primitives"]):
             attributes = primitive["attributes"]
-            points = _accessor(document, binary, attributes["POSITION"])
+            points = glb.accessor(attributes["POSITION"])
             loose.setdefault(instance, []).append(points)
             if primitive.get("mode", 4) != 4:
                 continue  # not triangles
-            none = np.zeros((len(points), 2), np.float32)
-            uv = attributes.get("TEXCOORD_0")
-            uvs.append(none if uv is None else _accessor(document, binary, uv))
-            normal = attributes.get("NORMAL")
-            flat = np.zeros((len(points), 3), np.float32)
-            normals.append(flat if normal is None else _accessor(document, binary, normal))
-            corners = _accessor(document, binary, primitive["indices"]).reshape(-1, 3)
+            for arrays, name, width in ((uvs, "TEXCOORD_0", 2), (normals, "NORMAL", 3)):
+                index = attributes.get(name)
+                missing = np.zeros((len(points), width), np.float32)
+                arrays.append(missing if index is None else glb.accessor(index))
+            corners = glb.accessor(primitive["indices"]).reshape(-1, 3)
             vertices.append(points)
             faces.append(corners.astype(np.int64) + n_vertices)
             part = parts.setdefault(str(primitive.get("extras", {}).get("part", "")), len(parts))
-            owners.append((instance, int(primitive["material"]), number, len(corners), part))
+            owners.append((instance, int(primitive["material"]), number, part, len(corners)))
             n_vertices += len(points)
             n_faces += len(corners)
             if max(n_vertices, n_faces) > _MAX_ELEMENTS:
                 raise ValueError(f"more than {_MAX_ELEMENTS} vertices or triangles")
 
-    # Repeat each primitive's instance and material for its faces.
+    # Repeat the owner of each primitive for its faces.
     table = np.array(owners, np.int64).reshape(-1, 5)
-    material = np.repeat(table[:, 1], table[:, 3])
-    kinds = [m.get("extras", {}).get("kind", "opaque") for m in document.get("materials", [])]
-    clear = np.array([k in _SEE_THROUGH for k in kinds], bool)
+    instance_, material, surface, part_ = np.repeat(table[:, :4], table[:, 4], axis=0).T
     return Triangles(
-        np.concatenate(vertices),
-        np.concatenate(faces),
-        np.repeat(table[:, 0], table[:, 3]),
-        material,
-        nyu40,
-        clear[material] if len(material) else np.zeros(0, bool),
-        item,
-        np.concatenate(uvs),
-        _colours(document, binary),
-        {instance: np.concatenate(points) for instance, points in loose.items()},
-        np.repeat(table[:, 2], table[:, 3]),
-        tuple(parts),
-        np.repeat(table[:, 4], table[:, 3]),
-        tuple(str(k) for k in kinds),
-        np.concatenate(normals),
-        _normal_maps(document, binary, tuple(str(k) for k in kinds)),
-        tuple(
-            _picture(document, binary, m["pbrMetallicRoughness"].get("metallicRoughnessTexture"))
-            for m in document.get("materials", [])
-        ),
-    )
+        np.concatenate(vertices), np.concatenate(normals), np.concatenate(uvs), np.concatenate(faces),
+        instance_, material, surface, part_, tuple(parts), nyu40, item,
+        {instance: np.concatenate(points) for instance, points in loose.items()}, _materials(glb),
+    )  # fmt: skip
 
 
-def _picture(
-    document: dict[str, Any], binary: bytes, texture: dict[str, Any] | None
-) -> tuple[str, bytes] | None:
-    """Media type and bytes of a material's picture, by its texture's source."""
-    if texture is None:
-        return None
-    image = document["images"][document["textures"][texture["index"]]["source"]]
-    view = document["bufferViews"][image["bufferView"]]
-    start = view.get("byteOffset", 0)
-    return image["mimeType"], binary[start : start + view["byteLength"]]
-
-
-def _normal_maps(document: dict[str, Any], binary: bytes, kinds: tuple[str, ...]) -> NormalMaps:
-    rows = [m.get("normalTexture") for m in document.get("materials", [])]
-    scales = np.array([1.0 if row is None else row.get("scale", 1.0) for row in rows], np.float64)
-    return NormalMaps(tuple(_picture(document, binary, row) for row in rows), scales, kinds)
-
-
-def _colours(document: dict[str, Any], binary: bytes) -> Colours:
-    factors, pictures, cutoffs = [], [], []
-    for material in document.get("materials", []):
-        pbr = material["pbrMetallicRoughness"]
-        factors.append(pbr["baseColorFactor"][:3])
-        pictures.append(_picture(document, binary, pbr.get("baseColorTexture")))
+def _materials(glb: _Glb) -> Materials:
+    rows = glb.document.get("materials", [])
+    pbr = [row["pbrMetallicRoughness"] for row in rows]
+    normals = [row.get("normalTexture") for row in rows]
+    scales = [1.0 if texture is None else texture.get("scale", 1.0) for texture in normals]
+    cutoffs = []
+    for row in rows:
         # Glass with holes, for which glTF has no mode, has its cutoff among its extras.
-        given = material if material.get("alphaMode") == "MASK" else material.get("extras", {})
-        cutoffs.append(float(given.get("alphaCutoff", 0.5 if given is material else 0.0)))
-    return Colours(
-        np.array(factors, np.float64).reshape(-1, 3), tuple(pictures), {}, np.array(cutoffs)
-    )
+        is_mask = row.get("alphaMode") == "MASK"
+        given = row if is_mask else row.get("extras", {})
+        cutoffs.append(float(given.get("alphaCutoff", 0.5 if is_mask else 0.0)))
+    return Materials(
+        tuple(str(row.get("extras", {}).get("kind", "opaque")) for row in rows),
+        np.array([p["baseColorFactor"][:3] for p in pbr], np.float64).reshape(-1, 3),
+        np.array(cutoffs), np.array(scales, np.float64),
+        Textures(tuple(glb.picture(p.get("baseColorTexture")) for p in pbr)),
+        Textures(tuple(glb.picture(texture) for texture in normals)),
+        Textures(tuple(glb.picture(p.get("metallicRoughnessTexture")) for p in pbr)),
+    )  # fmt: skip

@@ -1,6 +1,6 @@
-"""A finished view as its stored files say: camera, table of instances, layers on demand.
+"""A finished view by its stored files: camera, table of instances, layers on demand.
 
-Effects: reads files. Knows nothing of the House or the Camera that made them.
+Effects: reads files. Uses neither House nor Camera.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from pbrs_farm.check.lens_rays import StoredLens
 from pbrs_farm.check.stored_files import BadFile, stored_bytes, stored_object
+from pbrs_farm.core.arrays import F32, F64
 from pbrs_farm.core.errors import BadInput, BadRecipe
 from pbrs_farm.core.recipe import Recipe, recipe_from_json
 from pbrs_farm.images import array_from_png, layers_from_exr
@@ -22,7 +23,7 @@ from pbrs_farm.images import array_from_png, layers_from_exr
 
 @dataclass(frozen=True)
 class StoredView:
-    """One views/<view_id> folder."""
+    """A views/<view_id> folder."""
 
     folder: Path
     table: dict[str, Any]  # view.json
@@ -39,7 +40,7 @@ class StoredView:
 
     @cached_property
     def recipe(self) -> Recipe | None:
-        """What its root was made with; None where recipe.json is not there or damaged."""
+        """The recipe of its root; None where recipe.json is missing or damaged."""
         file = self.folder.parents[3] / "recipe.json"
         try:
             return recipe_from_json(stored_bytes(file), str(file))
@@ -47,18 +48,16 @@ class StoredView:
             return None
 
     @cached_property
-    def k(self) -> NDArray[np.float64]:
+    def k(self) -> F64:
         """(3, 3) K."""
         return np.array(self.table["K"], np.float64)
 
     @cached_property
     def lens(self) -> StoredLens | None:
-        """What bends the picture's lines, None for a pin-hole."""
+        """The lens, None for a pinhole."""
         return StoredLens.of(self.table["lens"]) if "lens" in self.table else None
 
-    def pixels_and_depths(
-        self, camera: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def pixels_and_depths(self, camera: F64) -> tuple[F64, F64]:
         """(N, 2) pixel coordinates and (N,) depths of points (N, 3) with OpenCV's axes.
 
         NaN where the view does not see the point.
@@ -72,7 +71,7 @@ class StoredView:
         return pixel[:, :2], depth
 
     @cached_property
-    def world_from_camera(self) -> NDArray[np.float64]:
+    def world_from_camera(self) -> F64:
         """(4, 4) pose with OpenCV axes (x right, y down, z forward)."""
         return np.array(self.table["world_from_camera_opencv"], np.float64)
 
@@ -83,7 +82,7 @@ class StoredView:
 
     @cached_property
     def parts(self) -> list[dict[str, Any]]:
-        """The rows of articulation.json; none where it is not there or damaged."""
+        """The rows of articulation.json; [] where it is missing or damaged."""
         try:
             rows = stored_object(self.folder / "articulation.json")["parts"]
         except (BadFile, KeyError):
@@ -91,14 +90,14 @@ class StoredView:
         return list(rows) if isinstance(rows, list) else []
 
     def has(self, file: str) -> bool:
-        """Whether the view has this file."""
+        """True if the view has this file."""
         return (self.folder / file).is_file()
 
     def png(self, file: str) -> NDArray[Any]:
         """Pixels of a PNG; BadInput if it cannot be read."""
         return array_from_png(self._bytes(file), f"{self.place}/{file}")
 
-    def exr(self, file: str) -> dict[str, NDArray[np.float32]]:
+    def exr(self, file: str) -> dict[str, F32]:
         """Channels of an EXR; BadInput if it cannot be read."""
         return layers_from_exr(self._bytes(file), f"{self.place}/{file}")
 
@@ -108,14 +107,17 @@ class StoredView:
         except BadFile as error:
             raise BadInput(f"{self.place}/{file}", "", str(error)) from None
 
-    def rays(
-        self, rows: NDArray[Any], columns: NDArray[Any]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Origin (3,) and directions (N, 3) of unit depth through (column + 0.5, row + 0.5).
+    def ray_grid(self) -> F64:
+        """(H, W, 3) the directions of `rays` through all pixels."""
+        height, width = self.size
+        rows, columns = (g.reshape(-1) for g in np.mgrid[0:height, 0:width])
+        return self.rays(rows, columns)[1].reshape(height, width, 3)
+
+    def rays(self, rows: NDArray[Any], columns: NDArray[Any]) -> tuple[F64, F64]:
+        """Origin (3,) and directions (N, 3) of unit depth through (column + 0.5, row + 0.5), in the world.
 
         Depth is as the view stores it, along the axis or along the ray; (0, 0, 0) is no ray.
         """
-        # Through the middle of each pixel, turned into the world.
         pixel = np.stack([columns + 0.5, rows + 0.5, np.ones(len(rows))], axis=1)
         camera = np.linalg.solve(self.k, pixel.T).T
         if self.lens is not None:

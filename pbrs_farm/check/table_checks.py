@@ -1,4 +1,4 @@
-"""The table's rows of instances against the triangles of house.glb: boxes, shares seen, truncation.
+"""Rows of instances in view.json against the triangles of house.glb: boxes, visible shares, truncation.
 
 Effects: holds Embree scenes of single items.
 """
@@ -10,55 +10,44 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pbrs_farm.check.certificate import Tally
-from pbrs_farm.check.embree_caster import Floats, Rays
+from pbrs_farm.check.axes import into_frame
+from pbrs_farm.check.cases import Pixels, ViewCase
+from pbrs_farm.check.checks import Check
+from pbrs_farm.check.embree_caster import Rays
 from pbrs_farm.check.stored_house import StoredHouse
 from pbrs_farm.check.stored_mesh import Triangles
 from pbrs_farm.check.stored_view import StoredView
+from pbrs_farm.core.arrays import F64
 
-BOX_M = 0.001  # by which a side of a box may differ from its triangles
-BORDER_PX = 0.02  # of the picture: a vertex there is in or out
-MAX_RAYS = 2000  # of an item whose share is judged by a sample
+_BOX_M = 0.001  # tolerance of a box's sides
+_BORDER_PX = 0.02  # within this of the picture's border a vertex is in or out
+_MAX_RAYS = 2000  # of an item whose share is judged by a sample
 _SIGMAS = 5.0  # of a sample's share
-_EDGE = 0.004  # part of an item's pixels whose centres lie on its outline
-_LENS = 0.1  # of the share, where the stored one is resampled from pin-holes (docs/lenses.md)
+_EDGE = 0.004  # share of an item's pixels whose centres are on its outline
+_LENS = 0.1  # tolerance of a share that is resampled from pinholes (docs/lenses.md)
 
 
 class HouseItems:
-    """The items of a house's triangles, each asked for when a view shows it. State: what was asked."""
+    """The items of a house, each prepared for rays when a view first shows it. State: these items."""
 
     def __init__(self, house: StoredHouse, triangles: Triangles) -> None:
         self._house, self._triangles = house, triangles
-        self._alone: dict[int, tuple[Floats, Rays]] = {}
+        self._alone: dict[int, tuple[F64, Rays]] = {}
 
-    def alone(self, instance: int) -> tuple[Floats, Rays]:
-        """Corners (N, 3) of an item's triangles, and rays that meet nothing else.
-
-        Kept for each item once asked, since several views show it. (0, 3) for an instance without
-        triangles.
-        """
+    def alone(self, instance: int) -> tuple[F64, Rays]:
+        """Corners (N, 3) of an item's triangles, and rays that meet nothing else."""
         if instance not in self._alone:
-            t = self._triangles
-            faces = t.faces[t.instance == instance]
-            used, numbers = np.unique(faces, return_inverse=True)
-            n = len(faces)
-            own = Triangles(
-                t.vertices[used], numbers.reshape(-1, 3).astype(np.int64), np.full(n, instance),
-                t.material[t.instance == instance], {}, np.zeros(n, bool), {}, t.uv[used],
-                t.colours, {}, np.zeros(n, np.int64), ("",), np.zeros(n, np.int64), t.kinds, t.normals[used], t.maps,
-            )  # fmt: skip
-            self._alone[instance] = own.vertices.astype(np.float64), Rays(own)
+            item = self._triangles.only(instance)
+            self._alone[instance] = item.vertices.astype(np.float64), Rays(item)
         return self._alone[instance]
 
-    def loose(self, instance: int) -> Floats:
-        """(N, 3) all vertices of an item, also those that no triangle has."""
-        found = self._triangles.loose.get(instance)
-        return np.zeros((0, 3)) if found is None else found.astype(np.float64)
+    def loose(self, instance: int) -> F64:
+        """(N, 3) all vertices of an item, also those of no triangle."""
+        return self._triangles.loose.get(instance, np.zeros((0, 3))).astype(np.float64)
 
     @cached_property
-    def stored_boxes(self) -> dict[int, dict[str, Any]]:
+    def boxes(self) -> dict[int, dict[str, Any]]:
         """Instance id -> the box in house.json, of items that have one; {} without the file."""
         try:
             return {k: row["box"] for k, row in self._house.items.items() if row.get("box")}
@@ -66,38 +55,36 @@ class HouseItems:
             return {}
 
 
-def check_rows(
-    view: StoredView, instance: NDArray[Any], items: HouseItems, n_pixels: int | None, tally: Tally
-) -> None:
-    """Judge box3d, visible_fraction and truncated of every row; n_pixels as of verify.
+def check_rows(case: ViewCase) -> None:
+    """Judge box3d, visible_fraction and truncated of every row.
 
-    instance is (H, W) ids as stored. An item without a triangle in house.glb fails at once;
-    visible_fraction is judged only where the row has one.
+    An item without a triangle in house.glb fails; visible_fraction may be missing.
     """
-    for row in view.table["instances"]:
+    items = case.now.shared(HouseItems)
+    for row in case.view.table["instances"]:
         number = int(row["id"])
-        place = f"{view.place} instance {number}"
+        place = f"{case.place} instance {number}"
         corners, rays = items.alone(number)
         if not len(corners):
-            tally.expect("box3d", place, False, "house.glb has no triangle of it")
+            case.tally.expect("box3d", place, False, "house.glb has no triangle of it")
             continue
         fault = _box_fault(row["box3d"], corners, items, number)
-        tally.expect("box3d", place, fault == "", fault)
-        answers = {_reaches_out(view, points) for points in (corners, items.loose(number))}
+        case.tally.expect("box3d", place, fault == "", fault)
+        answers = {_is_truncated(case.view, points) for points in (corners, items.loose(number))}
         fits = None in answers or bool(row["truncated"]) in answers
-        tally.expect("truncated", place, fits, f"is {row['truncated']}")
+        case.tally.expect("truncated", place, fits, f"is {row['truncated']}")
         if row["visible_fraction"] is not None:
-            fault = _share_fault(view, row, instance, corners, rays, n_pixels)
-            tally.expect("visible_fraction", place, fault == "", fault)
+            fault = _share_fault(case, row, corners, rays)
+            case.tally.expect("visible_fraction", place, fault == "", fault)
 
 
-def _box_fault(box: dict[str, Any], corners: Floats, items: HouseItems, number: int) -> str:
-    """What is wrong with a box; "" where nothing is."""
+def _box_fault(box: dict[str, Any], corners: F64, items: HouseItems, number: int) -> str:
+    """The fault of a box, "" if it has none."""
     axes, centre, half = (np.array(box[k], np.float64) for k in ("axes", "centre", "half"))
     if axes.shape != (3, 3) or np.abs(axes @ axes.T - np.eye(3)).max() > 1e-6:
         return "its axes are no frame"
-    # Rows here are columns in house.json.
-    stored = items.stored_boxes.get(number)
+    # Rows are columns in house.json.
+    stored = items.boxes.get(number)
     if stored is not None and np.abs(axes - np.array(stored["axes"], np.float64).T).max() > 1e-6:
         return "its axes are not those of house.json"
     off = np.inf
@@ -105,70 +92,62 @@ def _box_fault(box: dict[str, Any], corners: Floats, items: HouseItems, number: 
         local = points @ axes.T
         low, high = axes @ centre - half, axes @ centre + half
         off = min(off, float(np.abs([local.min(0) - low, local.max(0) - high]).max()))
-    return "" if off <= BOX_M else f"differs by {off * 1000:.1f} mm from its triangles"
+    return "" if off <= _BOX_M else f"differs by {off * 1000:.1f} mm from its triangles"
 
 
-def _reaches_out(view: StoredView, points: Floats) -> bool | None:
-    """Whether a vertex lies outside the picture; None where one is on its border."""
+def _is_truncated(view: StoredView, points: F64) -> bool | None:
+    """True if a vertex is outside the picture; None if one is on its border."""
     if view.lens is not None and view.lens.model in ("equirect", "cubemap"):
         return False
-    local = (points - view.world_from_camera[:3, 3]) @ view.world_from_camera[:3, :3]
-    pixel, _depth = view.pixels_and_depths(local)
-    height, width = view.size
-    margin = np.minimum(pixel, np.array([width, height]) - pixel).min(axis=1)
+    pixel, _depth = view.pixels_and_depths(into_frame(view.world_from_camera, points))
+    margin = np.minimum(pixel, np.array(view.size[::-1]) - pixel).min(axis=1)
     if not np.isfinite(margin).all():
         return True
-    return None if abs(margin.min()) <= BORDER_PX else bool(margin.min() < 0)
+    return None if abs(margin.min()) <= _BORDER_PX else bool(margin.min() < 0)
 
 
-def _share_fault(
-    view: StoredView,
-    row: dict[str, Any],
-    instance: NDArray[Any],
-    corners: Floats,
-    rays: Rays,
-    n_pixels: int | None,
-) -> str:
-    """What is wrong with visible_fraction; "" where nothing is."""
-    seen, share = int((instance == int(row["id"])).sum()), float(row["visible_fraction"])
+def _share_fault(case: ViewCase, row: dict[str, Any], corners: F64, rays: Rays) -> str:
+    """The fault of visible_fraction, "" if it has none."""
+    view, instance, n_pixels = case.view, case.arrays["instance"], case.n_pixels
+    visible, share = int((instance == int(row["id"])).sum()), float(row["visible_fraction"])
     if not 0 < share <= 1:
         return f"{share:g} is no share"
-    # Where it might be seen alone, beside where it is seen.
+    # Pixels where the item alone might be visible, beside those where it is.
     rows, columns = _reach(view, corners)
     other = instance[rows, columns] != int(row["id"])
     rows, columns = rows[other], columns[other]
     n_all = len(rows)
     rng = np.random.default_rng(zlib.crc32(f"{view.place} {row['id']}".encode()))
-    most = MAX_RAYS if n_pixels is None else min(MAX_RAYS, n_pixels)
+    most = _MAX_RAYS if n_pixels is None else min(_MAX_RAYS, n_pixels)
     if n_pixels is not None and n_all > most:
         chosen = rng.choice(n_all, most, replace=False)
         rows, columns = rows[chosen], columns[chosen]
-    hits = 0
-    if len(rows):
-        origin, directions = view.rays(rows, columns)
-        hits = int((rays.first(origin, directions) >= 0).sum())
-    hidden = hits * n_all / max(len(rows), 1)
-    # Compare counts of pixels: what a sample of so many may miss, and what lies on the outline.
-    stated = seen / share - seen
-    part = max(min(stated / n_all, 1.0), 1 / len(rows)) if len(rows) else 0.0
-    spread = n_all * np.sqrt(part * (1 - part) / len(rows)) if 0 < len(rows) < n_all else 0.0
-    slack = _SIGMAS * spread + 2 + _EDGE * (seen + hidden)
+    n = len(rows)
+    hits = int((rays.first(*view.rays(rows, columns)) >= 0).sum()) if n else 0
+    hidden = hits * n_all / max(n, 1)
+    # Compare counts of pixels, within the error of the sample and of the outline.
+    stored = visible / share - visible
+    part = max(min(stored / n_all, 1.0), 1 / n) if n else 0.0
+    spread = n_all * np.sqrt(part * (1 - part) / n) if 0 < n < n_all else 0.0
+    slack = _SIGMAS * spread + 2 + _EDGE * (visible + hidden)
     if view.lens is not None:
-        slack += _LENS * (seen + hidden) + 4 * np.sqrt(seen)
-    if abs(stated - hidden) <= slack:
+        slack += _LENS * (visible + hidden) + 4 * np.sqrt(visible)
+    if abs(stored - hidden) <= slack:
         return ""
-    return f"is {share:.4f}, here {seen / (seen + hidden):.4f}"
+    return f"is {share:.4f}, here {visible / (visible + hidden):.4f}"
 
 
-def _reach(view: StoredView, corners: Floats) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _reach(view: StoredView, corners: F64) -> Pixels:
     """Rows and columns of the pixels that an item's triangles may cover."""
-    height, width = view.size
-    local = (corners - view.world_from_camera[:3, 3]) @ view.world_from_camera[:3, :3]
-    low, high = np.zeros(2, int), np.array([width, height])
-    # Before a pin-hole, the triangles lie within the rectangle of their corners.
+    local = into_frame(view.world_from_camera, corners)
+    low, high = np.zeros(2, int), np.array(view.size[::-1])
+    # In front of a pinhole, the triangles are within the rectangle of their corners.
     if view.lens is None and local[:, 2].min() > 1e-3:
         pixel, _depth = view.pixels_and_depths(local)
         low = np.clip(np.floor(pixel.min(0)) - 1, 0, high).astype(int)
         high = np.clip(np.ceil(pixel.max(0)) + 1, 0, high).astype(int)
     rows, columns = np.mgrid[low[1] : high[1], low[0] : high[0]]
     return rows.reshape(-1), columns.reshape(-1)
+
+
+CHECKS = (Check(name="table of items", of="view", function=check_rows, cost=80),)

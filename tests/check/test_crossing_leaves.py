@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from pbrs_farm.check.cases import Scene
 from pbrs_farm.check.embree_caster import Rays
 from pbrs_farm.check.pixel_checks import of_another_part
 
@@ -23,6 +24,6 @@ def test_of_two_that_cross_the_other_is_found_on_their_line_alone() -> None:
     rays = Rays(triangles)
     directions = np.array([[1e-5, 0.1, -1], [0.1, 0.1, -1], [-0.1, 0.1, -1], [0.9, 0.9, -1]])
     first = rays.first(np.zeros(3), directions)
-    found = of_another_part(first, np.zeros(3), directions, (triangles, rays))
+    found = of_another_part(first, np.zeros(3), directions, Scene(triangles, rays))
     assert first.tolist() == [1, 1, 0, -1]
     assert found.tolist() == [0, -1, -1, -1]

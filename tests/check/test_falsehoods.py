@@ -127,13 +127,13 @@ def test_a_doubt_at_half_the_size_is_settled_as_the_light_stands(
     finished_root: Root, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # As where a median turns on which half of the pixels is lit: gains that no halved light gives.
-    halved = light_checks._white_balance
+    halved = light_checks.white_balance
 
     def elsewhere(total: NDArray[Any], *words: Any, **named: Any) -> Any:
         gains = halved(total, *words, **named)
         return gains + 0.3 if total.shape[0] < 130 else gains
 
-    monkeypatch.setattr(light_checks, "_white_balance", elsewhere)
+    monkeypatch.setattr(light_checks, "white_balance", elsewhere)
     certificate = verify(finished_root("dark"), sample=10)
     assert certificate.is_clean, certificate.text()
 

@@ -1,0 +1,193 @@
+"""What a check is given: a root, a house with its scenes, or a view of it. No effects."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any, NamedTuple, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.check.certificate import Expect, Tally
+from pbrs_farm.check.embree_caster import Hits, Rays
+from pbrs_farm.check.moved_house import MovedHouse, house_at
+from pbrs_farm.check.stored_house import StoredHouse
+from pbrs_farm.check.stored_mesh import Triangles
+from pbrs_farm.check.stored_view import StoredView
+from pbrs_farm.core.arrays import F32, I64, Bools
+
+SAMPLE = 2000  # pixels of each view that are recomputed by default
+_MOST_TIMES = 4  # cached scenes of a moving house: at rest, a frame and its neighbours
+Layers = Mapping[str, NDArray[Any]]  # name -> (H, W) or (H, W, C)
+Channels = Mapping[str, F32]  # of radiance.exr
+Pixels = tuple[I64, I64]  # rows and columns, each (N,)
+
+_T = TypeVar("_T")
+
+
+class Scene(NamedTuple):
+    """Triangles, and rays among them."""
+
+    triangles: Triangles
+    rays: Hits
+
+
+@dataclass(frozen=True, eq=False)
+class Scenes:
+    """A house at a time, ready for rays."""
+
+    moved: MovedHouse
+    _shared: dict[Any, Any] = field(default_factory=dict)
+
+    @property
+    def house(self) -> StoredHouse:
+        """Its documents, with items where they are at that time."""
+        return self.moved.house
+
+    @property
+    def triangles(self) -> Triangles:
+        """All its triangles."""
+        return self.moved.triangles
+
+    @cached_property
+    def rays(self) -> Rays:
+        """Rays among all triangles."""
+        return Rays(self.triangles)
+
+    @cached_property
+    def opaque(self) -> Rays:
+        """Rays among all triangles but glass and panes."""
+        return Rays(self.triangles, ~self.triangles.see_through)
+
+    def shared(self, kind: Callable[[StoredHouse, Triangles], _T]) -> _T:
+        """A value made of the house once, for all views at that time."""
+        if kind not in self._shared:
+            self._shared[kind] = kind(self.house, self.triangles)
+        value: _T = self._shared[kind]
+        return value
+
+
+class ScenesInTime:
+    """The scenes of a house at one time after another. State: those of the last times."""
+
+    def __init__(self, house: StoredHouse, triangles: Triangles) -> None:
+        self._house, self._triangles = house, triangles
+        self._cache: dict[float | None, Scenes] = {}
+
+    def at(self, time_s: float | None) -> Scenes:
+        """The scenes at a time in seconds, None: at rest; a house in which nothing moves has one."""
+        time_s = time_s if self._house.house.get("motions") else None
+        if time_s not in self._cache:
+            while len(self._cache) >= _MOST_TIMES:
+                del self._cache[next(iter(self._cache))]
+            self._cache[time_s] = Scenes(house_at(self._house, self._triangles, time_s))
+        return self._cache[time_s]
+
+
+@dataclass(frozen=True, slots=True)
+class RootCase:
+    """A root, with all of its house folders or one of them."""
+
+    root: Path
+    houses: tuple[Path, ...]
+    tally: Tally
+
+    def has(self, file: str) -> bool:
+        """True if the root has the file."""
+        return (self.root / file).is_file()
+
+
+class SeenView(NamedTuple):
+    """A checked view with the layers that reprojection needs."""
+
+    view: StoredView
+    depth: NDArray[Any]  # as depth.png stores it
+    normal: NDArray[Any]  # as normal.png stores it
+    moves: Bools  # (H, W) shows an item that may be elsewhere in other views
+
+
+@dataclass(frozen=True)
+class HouseCase:
+    """The documents of a house, and its views once they are checked."""
+
+    house: StoredHouse
+    glb: bytes
+    times: ScenesInTime
+    tally: Tally
+    seen: tuple[SeenView, ...] = ()
+
+    @cached_property
+    def rest(self) -> Scenes:
+        """The house at rest."""
+        return self.times.at(None)
+
+    def has(self, file: str) -> bool:
+        """True if the house's folder has the file."""
+        return (self.house.folder / file).is_file()
+
+    def expect(self, check: str, place: str = "") -> Expect:
+        """Reports facts of a check, at a place of the house."""
+        return self.tally.at(check, f"{self.house.id} {place}".rstrip())
+
+
+@dataclass(frozen=True)
+class ViewCase:
+    """A view, with the house at its time."""
+
+    view: StoredView
+    now: Scenes
+    times: ScenesInTime
+    n_pixels: int | None  # to recompute by rays; None = all
+    tally: Tally
+    radiance: Callable[[], Channels]  # reads radiance.exr once
+    is_halved: bool  # denoised light is recomputed at half the picture's size
+    arrays: Layers = field(default_factory=dict)
+
+    @property
+    def house(self) -> StoredHouse:
+        """The house at the view's time."""
+        return self.now.house
+
+    @property
+    def place(self) -> str:
+        """House and view, as messages name them."""
+        return self.view.place
+
+    @property
+    def scene(self) -> Scene:
+        """All triangles at the view's time."""
+        return Scene(self.now.triangles, self.now.rays)
+
+    @property
+    def light(self) -> Channels:
+        """The channels of radiance.exr; none if the view has none or it cannot be read."""
+        return self.radiance()
+
+    @cached_property
+    def pixels(self) -> Pixels:
+        """The pixels to recompute."""
+        return self.sample(self.n_pixels)
+
+    def has(self, name: str) -> bool:
+        """True if the view has the layer or file; radiance that can be read."""
+        if name == "radiance":
+            return bool(self.light)
+        return name in self.arrays or ("." in name and self.view.has(name))
+
+    def expect(self, check: str, file: str = "") -> Expect:
+        """Reports facts of a check, about the view or a file of it."""
+        return self.tally.at(check, f"{self.place}/{file}".rstrip("/"))
+
+    def sample(self, n_pixels: int | None) -> Pixels:
+        """Rows and columns of all pixels, or of a sample that the view's name fixes."""
+        height, width = self.view.size
+        if n_pixels is None or n_pixels >= height * width:
+            index = np.arange(height * width)
+        else:
+            rng = np.random.default_rng(zlib.crc32(self.place.encode()))
+            index = rng.choice(height * width, n_pixels, replace=False)
+        return index // width, index % width

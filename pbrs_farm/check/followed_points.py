@@ -1,0 +1,141 @@
+"""Points of a view followed into its partner's picture; no effects.
+
+Rays are Embree's, points and cameras those of view.json.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from pbrs_farm.check.axes import into_frame
+from pbrs_farm.check.cases import Pixels
+from pbrs_farm.check.embree_caster import Hits
+from pbrs_farm.check.lens_rays import StoredLens
+from pbrs_farm.check.stored_view import StoredView
+from pbrs_farm.core.arrays import F64, I64, Bools
+
+SEEN, OUTSIDE, HIDDEN = 0, 128, 255
+BORDER_PX = 0.01  # within this of the other picture's border a point is in or out
+_REACH = 1e-5  # tolerance of a ray's end before a point, as a share of the distance, and in metres
+_JITTER_PX = 0.02  # around a point: if its surroundings differ, either state is right
+
+Carry = Callable[[F64], F64]
+"""Positions (N, 3) at the partner's time of points (N, 3)."""
+
+
+def stay(points: F64) -> F64:
+    """Static points."""
+    return points
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OtherView:
+    """The partner's camera, by the view's own table."""
+
+    k: F64  # (3, 3)
+    world_from_camera: F64  # (4, 4), OpenCV axes
+    size: tuple[int, int]  # height, width
+    lens: StoredLens | None = None  # the same for all views of a run
+
+    @staticmethod
+    def of(view: StoredView, relation: str) -> OtherView | None:
+        """The partner of that relation in view.json, None without one.
+
+        Its size and lens are those of the view. KeyError or ValueError for a damaged row.
+        """
+        row = view.table.get("partners", {}).get(relation)
+        if row is None:
+            return None
+        pose = np.array(row["world_from_camera_opencv"], np.float64)
+        return OtherView(np.array(row["K"], np.float64), pose, view.size, view.lens)
+
+    @property
+    def eye(self) -> F64:
+        """(3,) the camera's position."""
+        return self.world_from_camera[:3, 3]
+
+    def pixels(self, points: F64) -> tuple[F64, F64]:
+        """(N, 2) px of world points (N, 3), and (N,) their depth; NaN behind the camera.
+
+        Depth is z for a pinhole, else as the lens's layers store it. A point less than 1 mm
+        before a pinhole counts as behind.
+        """
+        local = into_frame(self.world_from_camera, points)
+        if self.lens is not None:
+            plane, depth = self.lens.plane_and_depth(local)
+            return plane * self.k[[0, 1], [0, 1]] + self.k[:2, 2], depth
+        z = local[:, 2]
+        homogeneous = local @ self.k.T
+        with np.errstate(divide="ignore", invalid="ignore"):
+            px = homogeneous[:, :2] / homogeneous[:, 2:]
+        return np.where(z[:, None] > 1e-3, px, np.nan), z
+
+    def margin(self, px: F64) -> F64:
+        """(N,) distance in px of points (N, 2) inside the picture's border."""
+        with np.errstate(invalid="ignore"):
+            return np.asarray(np.minimum(px, np.array(self.size[::-1]) - px).min(axis=1))
+
+
+def is_seen(points: F64, other: OtherView, rays: Hits, slack_m: float = 0) -> Bools:
+    """(N,) True if nothing is between the other eye and a point, beyond the error of 32-bit rays."""
+    to = points - other.eye
+    face = rays.first(other.eye, to)
+    t = rays.distance(face, other.eye, to)
+    distance = np.linalg.norm(to, axis=1)
+    with np.errstate(invalid="ignore"):
+        is_near = (1 - t) * distance <= slack_m + _REACH * (1 + distance)
+    return np.asarray((face < 0) | is_near, bool)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Followed:
+    """N points of a view in its partner's picture."""
+
+    motion: F64  # (N, 2) px right and down; NaN behind the other camera
+    state: I64  # (N,) SEEN, OUTSIDE or HIDDEN
+
+
+def follow_points(
+    view: StoredView, other: OtherView, pixels: Pixels, z: F64, rays: Hits, carry: Carry = stay
+) -> Followed:
+    """Follow the surfaces at depth z (N,) metres behind pixels' centres into the other picture.
+
+    rays: of the house at the other view's time. Motion is in px from the pixel's centre.
+    """
+    rows, columns = pixels
+    points, px, margin = _points_of(view, other, pixels, z, carry)
+    state = np.full(len(rows), OUTSIDE, np.int64)
+    inside = np.nonzero(margin >= 0)[0]
+    state[inside] = np.where(is_seen(points[inside], other, rays), SEEN, HIDDEN)
+    return Followed(px - np.stack([columns + 0.5, rows + 0.5], axis=1), state)
+
+
+def near_edge(
+    view: StoredView, other: OtherView, pixels: Pixels, z: F64, rays: Hits, carry: Carry = stay
+) -> Bools:
+    """(N,) True if another state is right, too: on the other picture's border, or beside an obstacle.
+
+    Only for points whose stored state differs from `follow_points`: it casts rays five times.
+    """
+    rows, columns = pixels
+    points, _px, margin = _points_of(view, other, pixels, z, carry)
+    is_tie = np.asarray(np.abs(margin) <= BORDER_PX, bool)
+    visible = is_seen(points, other, rays, slack_m=0.01)
+    for dx, dy in ((1, 0), (-1, 0), (0, 1), (0, -1)):
+        origin, beside = view.rays(rows + _JITTER_PX * dy, columns + _JITTER_PX * dx)
+        moved = carry(origin + beside * z[:, None])
+        is_tie |= is_seen(moved, other, rays, slack_m=0.01) != visible
+    return is_tie
+
+
+def _points_of(
+    view: StoredView, other: OtherView, pixels: Pixels, z: F64, carry: Carry
+) -> tuple[F64, F64, F64]:
+    """(N, 3) surface points, their (N, 2) px in the other picture, (N,) px inside its border."""
+    origin, directions = view.rays(*pixels)
+    points = carry(origin + directions * z[:, None])
+    px, _depth = other.pixels(points)
+    return points, px, other.margin(px)
