@@ -1,4 +1,4 @@
-"""What a check is given: a root, a house with its scenes, or a view of it. No effects."""
+"""The argument of a check: a root, a house with its scenes, or a view of it. No effects."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from pbrs_farm.check.stored_mesh import Triangles
 from pbrs_farm.check.stored_view import StoredView
 from pbrs_farm.core.arrays import F32, I64, Bools
 
-SAMPLE = 2000  # pixels of each view that are recomputed by default
+SAMPLE = 2000  # pixels of each view to recompute by default
 _MOST_TIMES = 4  # cached scenes of a moving house: at rest, a frame and its neighbours
 Layers = Mapping[str, NDArray[Any]]  # name -> (H, W) or (H, W, C)
 Channels = Mapping[str, F32]  # of radiance.exr
@@ -118,7 +118,7 @@ class HouseCase:
     glb: bytes
     times: ScenesInTime
     tally: Tally
-    seen: tuple[SeenView, ...] = ()
+    views: tuple[SeenView, ...] = ()
 
     @cached_property
     def rest(self) -> Scenes:
@@ -164,7 +164,7 @@ class ViewCase:
 
     @property
     def light(self) -> Channels:
-        """The channels of radiance.exr; none if the view has none or it cannot be read."""
+        """The channels of radiance.exr; {} if it is missing or cannot be read."""
         return self.radiance()
 
     @cached_property

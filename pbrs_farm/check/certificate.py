@@ -1,4 +1,4 @@
-"""What `verify` found: how much was checked, how much failed, and where; no effects."""
+"""The outcome of `verify`: how much was checked, how much failed, and where; no effects."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from pbrs_farm.core.arrays import Bools
 from pbrs_farm.core.record import Record
 from pbrs_farm.core.shown_text import MAX_MESSAGE, MAX_PLACE, shown
 
-MAX_LISTED = 20  # failures of a check that are listed by place; all are counted
+MAX_LISTED = 20  # failures of a check that the certificate lists; all are counted
 
 Expect = Callable[[bool | np.bool_, str], bool]
 """Counts a fact, reports a failure with the text unless it holds, and returns whether it holds."""
 
 
 class Count(Record):
-    """How one check ended."""
+    """The result of one check."""
 
-    checked: int = 0  # pixels, files or facts that were looked at
+    checked: int = 0  # pixels, files or facts
     failed: int = 0
-    ties: int = 0  # right by another of two right answers
+    ties: int = 0  # with another right answer
 
 
 class Coincidence(Record):
@@ -30,7 +30,7 @@ class Coincidence(Record):
 
     house: str
     items: tuple[str, str]  # ids, in order; twice the same for an item's own surfaces
-    pixels: int  # where the stored one is the other than the one that a ray met here
+    pixels: int  # where the stored item is not the one that the ray hit
 
 
 class Certificate(Record):
@@ -42,28 +42,25 @@ class Certificate(Record):
     n_views: int
     counts: dict[str, Count]  # check -> its count
     failures: tuple[str, ...]  # "check: place: what", at most MAX_LISTED per check
-    notes: tuple[str, ...] = ()  # what is odd but no failure
+    notes: tuple[str, ...] = ()  # oddities that are no failure
     coincident: tuple[Coincidence, ...] = ()  # most pixels first
     looked_at: tuple[str, ...] = ()  # "file (views): how"
-    not_looked_at: tuple[str, ...] = ()  # the same, and what no file tells
+    not_looked_at: tuple[str, ...] = ()  # the same, and facts that no file holds
 
     @property
     def is_clean(self) -> bool:
-        """Nothing failed, and there was something to check.
-
-        Ties and notes do not count against it; a folder without a finished view is not clean.
-        """
+        """True if nothing failed and there is a finished view; ties and notes are allowed."""
         return self.n_views > 0 and not any(c.failed for c in self.counts.values())
 
     def text(self) -> str:
         """The certificate as lines for a terminal.
 
-        A table of all checks, what was and was not looked at, the failures that were kept, and
-        CLEAN or NOT CLEAN as the last line, which scripts may look for.
+        A table of all checks, the files with and without checks, the listed failures, and CLEAN or
+        NOT CLEAN as the last line, which scripts may look for.
         """
-        what = "every pixel" if self.all_pixels else "a sample of pixels"
+        pixels = "every pixel" if self.all_pixels else "a sample of pixels"
         lines = [
-            f"{self.folder}: {self.n_houses} houses, {self.n_views} views, {what}",
+            f"{self.folder}: {self.n_houses} houses, {self.n_views} views, {pixels}",
             f"{'check':<22}{'checked':>12}{'failed':>9}{'ties':>9}",
         ]
         lines += [
@@ -106,37 +103,36 @@ class Tally:
         self._coincident: dict[tuple[str, str, str], int] = {}  # house and two items -> pixels
 
     def add(self, check: str, checked: int, *, ties: int = 0) -> None:
-        """checked more things were looked at, of which ties are ties.
+        """Count more pixels, files or facts as checked, and some of these as ties.
 
-        Ties are things of which two answers are right; they are part of checked. Report failures
-        with `fail`, after adding: it does not add to what was looked at.
+        Ties have two right answers. Failures are reported by `fail`, after adding: it does not count
+        them as checked.
         """
         row = self._counts.setdefault(check, [0, 0, 0])
         row[0] += int(checked)
         row[2] += int(ties)
 
     def coincide(self, house: str, items: tuple[str, str]) -> None:
-        """One more pixel of a house shows either of two coincident surfaces of these items.
+        """Count a pixel that shows either of two coincident surfaces of these items, in any order.
 
-        The order of the two items is no matter. Such pixels are listed in the certificate, not
-        counted as failures.
+        The certificate lists such pixels; they are no failures.
         """
         a, b = sorted(shown(item) for item in items)
         self._coincident[house, a, b] = self._coincident.get((house, a, b), 0) + 1
 
-    def fail(self, check: str, place: str, what: str, n_failed: int = 1) -> None:
-        """n_failed of the things already added failed at place.
+    def fail(self, check: str, place: str, fault: str, n_failed: int = 1) -> None:
+        """Count failures among the checked pixels, files or facts.
 
-        All failures are counted; of each check only the first MAX_LISTED are listed with their
-        place. Text from files is made printable here.
+        Of each check only the first MAX_LISTED are listed with their place. Text from files is made
+        printable here.
         """
         self._counts.setdefault(check, [0, 0, 0])[1] += int(n_failed)
         listed = self._listed.setdefault(check, [])
         if len(listed) < MAX_LISTED:
-            listed.append(f"{check}: {shown(place, MAX_PLACE)}: {shown(what, MAX_MESSAGE)}")
+            listed.append(f"{check}: {shown(place, MAX_PLACE)}: {shown(fault, MAX_MESSAGE)}")
 
     def note(self, text: str) -> None:
-        """Something is odd, but no failure."""
+        """Report an oddity that is no failure."""
         self.notes.append(shown(text, MAX_MESSAGE))
 
     def expect(self, check: str, place: str, holds: bool | np.bool_, fault: str) -> bool:
@@ -163,7 +159,7 @@ class Tally:
     def tolerate(
         self, check: str, place: str, n: int, n_wrong: int, most: float, fault: str
     ) -> None:
-        """Count n things, of which a few wrong ones are ties and more are failures."""
+        """Count n pixels or points, of which wrong ones are ties up to a number, and failures beyond it."""
         is_few = n_wrong <= most
         self.add(check, n, ties=n_wrong if is_few else 0)
         if not is_few:
@@ -171,18 +167,18 @@ class Tally:
 
     @property
     def n_failed(self) -> int:
-        """Things that failed so far, of all checks."""
+        """Number of failures so far, of all checks."""
         return sum(failed for _checked, failed, _ties in self._counts.values())
 
     def take(self, other: Tally) -> None:
-        """Count what another tally counted without a failure; its notes, too."""
+        """Add the counts and notes of another tally without a failure."""
         assert not other.n_failed
         for check, (checked, _failed, ties) in other._counts.items():
             self.add(check, checked, ties=ties)
         self.notes += other.notes
 
     def totals(self, check: str) -> tuple[int, int]:
-        """(things looked at, ties) of a check so far."""
+        """(checked, ties) of a check so far."""
         row = self._counts.get(check, [0, 0, 0])
         return row[0], row[2]
 
@@ -196,11 +192,7 @@ class Tally:
         looked_at: tuple[str, ...] = (),
         not_looked_at: tuple[str, ...] = (),
     ) -> Certificate:
-        """What was collected.
-
-        The tally may go on afterwards; the certificate does not change. Checks appear in the order
-        in which they first looked at something.
-        """
+        """The certificate of everything counted so far, with checks in the order of their first count."""
         return Certificate(
             folder=folder,
             all_pixels=all_pixels,

@@ -125,7 +125,7 @@ def _check_view(case: HouseCase, row: Mapping[str, Any]) -> None:
 
 
 def _counts(case: HouseCase, row: Mapping[str, Any], pose: F64) -> np.ndarray[Any, Any] | None:
-    """Pixels of each instance at the size at which a view was judged; None if that is unknown."""
+    """Pixels of each instance at the size at which a view was judged; None if unknown."""
     intrinsics = row["intrinsics"]
     full_width, full_height = width, height = intrinsics["width_px"], intrinsics["height_px"]
     fx, fy, cx, cy = (intrinsics[name] for name in ("fx", "fy", "cx", "cy"))
@@ -222,8 +222,8 @@ def _check_rig(case: HouseCase, row: Mapping[str, Any], place: str) -> None:
             judge("rig camera", place, case.tally, rig=rig, pose=pose)
         stereo = bool(house.recipe["cameras"]["stereo_m"])
         name = "stereo" if stereo else (house.recipe.get("rig") or {}).get("name", "rig")
-        left = instant if stereo and row["id"] != instant else None
-        judge("rig", place, case.tally, row=row, name=name, left=left)
+        left_eye = instant if stereo and row["id"] != instant else None
+        judge("rig", place, case.tally, row=row, name=name, left=left_eye)
         _check_rig_lens(row, first, cameras, expect)
     poses = [_world_from_rig(view) for view in (row, first)]
     judge("rig instant", place, case.tally, row=row, first=first, poses=poses)

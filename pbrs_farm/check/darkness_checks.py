@@ -1,4 +1,4 @@
-"""Views without light: black pictures, and rooms that were measured dark. Effects: reads files."""
+"""Views without light: black pictures, and dark rooms. Effects: reads files."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _TILES = 8  # of a picture, across and down
 
 
 def check_darkness(case: ViewCase) -> None:
-    """A picture that is black by all light together fails; a dark room is noted.
+    """A picture fails if all light together leaves it black; a dark room is noted.
 
     A black picture shows nothing, so nobody can want it. A room below 1 lx may be a fact of the
     house: its labels and its light are right.

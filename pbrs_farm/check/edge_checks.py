@@ -94,15 +94,15 @@ def _gaps(a: _Sides, b: _Sides) -> tuple[Bools, Bools]:
 
 def _miss(side: _Sides, other: _Sides) -> tuple[F64, F64]:
     """Distance of the other's depth from the plane here, and its rounding error; metres."""
-    here = np.einsum("...i,...i->...", side.normal, side.ray)
-    there = np.einsum("...i,...i->...", side.normal, other.ray)
+    cosine = np.einsum("...i,...i->...", side.normal, side.ray)
+    other_cosine = np.einsum("...i,...i->...", side.normal, other.ray)
     with np.errstate(divide="ignore", invalid="ignore"):
-        predicted = side.z * here / there
+        predicted = side.z * cosine / other_cosine
         size = np.abs(predicted)
         slack = _ROUNDING_M * (1 + np.abs(predicted / np.maximum(side.z, 1e-6)))
-        slack += _NORMAL_ERROR * size * (2 / np.abs(there) + 1)
+        slack += _NORMAL_ERROR * size * (2 / np.abs(other_cosine) + 1)
     # A plane that grazes the ray may be met in front of the eye or far behind.
-    graze = ~(np.abs(there) > 4 * _NORMAL_ERROR)
+    graze = ~(np.abs(other_cosine) > 4 * _NORMAL_ERROR)
     ahead = np.where(predicted > 0, predicted, np.inf)
     miss = np.nan_to_num(ahead - other.z, nan=0.0, posinf=1e9)
     return miss, np.where(graze, np.inf, np.nan_to_num(slack, nan=np.inf, posinf=np.inf))

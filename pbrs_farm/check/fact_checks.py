@@ -1,7 +1,7 @@
 """Facts of view.json against the files that repeat them: house.json, cameras.json, illuminance.json, recipe, markers.
 
-Effects: reads files. Casts no ray: names, classes, poses, corners of rooms, facts of light. A document that is missing
-is not compared.
+Effects: reads files. Casts no ray: names, classes, poses, corners of rooms, facts of light. A missing
+document is not compared.
 """
 
 from __future__ import annotations

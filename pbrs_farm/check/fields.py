@@ -1,6 +1,6 @@
-"""Which check looks at each field of a root's JSON files: the table fields.csv against what is stored.
+"""The check of each field of a root's JSON files: the table fields.csv against the stored files.
 
-Effects: reads files. A field that the table does not know is told of by its name, so that none slips through.
+Effects: reads files. A field without a row is listed by its name, so that no field is overlooked.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ UNOWNED = "no check knows it"
 
 
 class FieldRow(Record):
-    """A field of a file: the check that looks at it, or why none does."""
+    """A field of a file: its check, or the reason why it has no check."""
 
     file: str
     field: str
@@ -28,7 +28,7 @@ class FieldRow(Record):
 
 @functools.cache
 def field_rows() -> tuple[FieldRow, ...]:
-    """The table, fields.csv: the first row that fits a field is its own."""
+    """The table, fields.csv, in which the first row that fits a field counts."""
     return read_csv(Path(__file__).parent / "fields.csv", FieldRow)
 
 
@@ -40,7 +40,7 @@ def fields_of(value: Any, path: str = "") -> Iterator[str]:
     """
     if isinstance(value, dict) and value:
         for key, below in value.items():
-            # A dot in a key is no step down.
+            # Dots in a key are escaped.
             yield from fields_of(below, f"{path}.{_word(key)}" if path else _word(key))
     elif isinstance(value, list) and any(isinstance(entry, dict) for entry in value):
         for entry in value:
@@ -54,7 +54,7 @@ def _word(key: str) -> str:
 
 
 def owner_of(file: str, field: str) -> FieldRow | None:
-    """The row of the table that a field has; None for one that no check knows."""
+    """The row of a field; None for an unknown field."""
     return _owner(file, tuple(field.split(".")))
 
 
@@ -75,8 +75,8 @@ def _fits(pattern: tuple[str, ...], parts: tuple[str, ...]) -> bool:
 
 
 def stored_fields(root: Path, houses: Iterable[Path]) -> Counter[tuple[str, str]]:
-    """(File, field) -> in how many files of a root it is; files that are no JSON have none."""
-    found: Counter[tuple[str, str]] = Counter()
+    """(File, field) -> number of files of a root that have it; files without JSON are skipped."""
+    counts: Counter[tuple[str, str]] = Counter()
     for name, file in _documents(root, houses):
         try:
             data = stored_bytes(file)
@@ -84,12 +84,12 @@ def stored_fields(root: Path, houses: Iterable[Path]) -> Counter[tuple[str, str]
             paths = {path for line in lines for path in fields_of(object_from_json(line))}
         except BadFile:
             continue
-        found.update((name, path) for path in paths)
-    return found
+        counts.update((name, path) for path in paths)
+    return counts
 
 
 def _documents(root: Path, houses: Iterable[Path]) -> Iterator[tuple[str, Path]]:
-    """Every JSON file of a root, with the name that the table has for it."""
+    """Every JSON file of a root, with its name in the table."""
     yield from ((f.name, f) for f in sorted(root.glob("*.json*")) if f.is_file())
     for house in houses:
         yield from ((f.name, f) for f in sorted(house.glob("*.json*")) if f.is_file())
@@ -98,12 +98,12 @@ def _documents(root: Path, houses: Iterable[Path]) -> Iterator[tuple[str, Path]]
 
 
 def unowned(fields: Iterable[tuple[str, str]]) -> list[tuple[str, str]]:
-    """Those of (file, field) that the table does not know, in order."""
+    """The pairs (file, field) without a row in the table, in order."""
     return sorted(pair for pair in fields if owner_of(*pair) is None)
 
 
 def field_lines(fields: Counter[tuple[str, str]]) -> tuple[list[str], list[str]]:
-    """Lines of the certificate: fields that are looked at, by file; those that are not, by reason."""
+    """Lines of the certificate: numbers of fields with a check, by file; fields without, by reason."""
     owned: dict[str, set[str]] = {}
     reasons: dict[tuple[str, str], set[str]] = {}
     for file, field in sorted(fields):
@@ -114,6 +114,6 @@ def field_lines(fields: Counter[tuple[str, str]]) -> tuple[list[str], list[str]]
             why = UNOWNED if row is None else row.why
             reasons.setdefault((file, why), set()).add(field if row is None else row.field)
     looked = [f"{file}: {len(names)} kinds of fields" for file, names in owned.items()]
-    # What no check knows stands first, and by name.
+    # Unknown fields come first.
     order = sorted(reasons, key=lambda pair: (pair[1] != UNOWNED, pair))
     return looked, [f"{file} {', '.join(sorted(reasons[file, why]))}: {why}" for file, why in order]

@@ -38,7 +38,7 @@ def check_files(case: RootCase) -> None:
 
 
 def _credit(house: Path) -> str | None:
-    """The credit line of a house; None where house.json has none."""
+    """The credit line of a house; None if house.json lacks it."""
     try:
         return str(stored_object(house / "house.json")["source"]["attribution"])
     except (BadFile, KeyError, TypeError):

@@ -206,7 +206,7 @@ def _check_openings(house: StoredHouse, tally: Tally) -> None:
 
 
 def _is_derived(house: StoredHouse) -> bool:
-    """True if a plugin made the house of another one, with its source and repair but an id of its own."""
+    """True if a plugin made the house of another one, with the same source and repair but a new id."""
     name = str(house.repair.get("house_id", ""))
     digest = house.house["source"]["sha256"][:8]
     return bool(name) and digest in name.split("-") and digest not in house.id.split("-")

@@ -173,7 +173,7 @@ def _check_shading(judge: _Judge, raw: Mapping[str, F64]) -> None:
 def _check_surfaces(case: ViewCase, raw: Mapping[str, F64], *, noise: float) -> None:
     """Mirrors and glass have no shading, matte surfaces no residual.
 
-    At pixels amid one surface, by independent rays. noise: of light that was denoised.
+    At pixels amid one surface, by independent rays. noise: of denoised light.
     """
     view, arrays, (triangles, rays) = case.view, case.arrays, case.scene
     if view.recipe is None or view.recipe.materials.preset != "physical":

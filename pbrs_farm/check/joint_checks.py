@@ -70,8 +70,8 @@ def check_articulation(case: ViewCase) -> None:
     visible = {int(k) for k in np.nonzero(counts)[0]} - {0}
     expect(rows.keys() == visible, f"ids {sorted(rows.keys() ^ visible)[:5]}")
     # Parts are numbered through the house, in the order of its items and their joints.
-    every = ((k, item, j) for k, item in sorted(case.house.items.items()) for j in item.get("joints", []))  # fmt: skip
-    joints = dict(enumerate(every, start=1))
+    triples = ((k, item, j) for k, item in sorted(case.house.items.items()) for j in item.get("joints", []))  # fmt: skip
+    joints = dict(enumerate(triples, start=1))
     boxes = ndimage.find_objects(parts.astype(np.int32))
     pose = case.view.world_from_camera
     for number in sorted(rows.keys() & visible & joints.keys()):

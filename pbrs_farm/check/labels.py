@@ -33,7 +33,7 @@ def read_labels(view: StoredView, tally: Tally) -> dict[str, NDArray[Any]] | Non
 
 
 def read_radiance(view: StoredView, tally: Tally) -> dict[str, F32]:
-    """The channels of radiance.exr; {} if the view has none, or it cannot be read."""
+    """The channels of radiance.exr; {} if it is missing or cannot be read."""
     if not view.has("radiance.exr"):
         return {}
     try:

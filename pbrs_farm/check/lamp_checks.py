@@ -65,7 +65,7 @@ def _check_rows(case: ViewCase, rows: list[dict[str, Any]]) -> None:
         )
     }
     released = house.recipe.get("emission", {}).get("preset") == "released"
-    # Shades of the published lamps are luminous, and lamps of their own.
+    # Shades of the published lamps are luminous, and separate lamps.
     rows = [row for row in rows if not (released and row["item"].endswith("/shade"))]
     same = [row["item"] for row in rows] == list(lit)
     case.expect("lamps")(same, "its lamps are not those of house.json")

@@ -1,7 +1,7 @@
 """Rays and projections of lenses, written again for `verify` from the published formulas; no effects.
 
-Nothing is shared with what made the pictures. OpenCV's documentation gives radtan and fisheye; both
-are inverted by bisection, of the radius alone, and by fixed-point steps for the tangential part.
+Shares no code with the stages. OpenCV's documentation gives radtan and fisheye; both are inverted by
+bisection of the radius and by fixed-point steps for the tangential part.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 from pbrs_farm.core.arrays import F64
 
 _HALVINGS = 60
-_STEPS = 200  # of the fixed point, which a third of a pixel of tangential part needs few of
+_STEPS = 200  # of the fixed point; a third of a pixel of tangential part needs few
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,11 +28,7 @@ class StoredLens:
 
     @staticmethod
     def of(table: dict[str, Any]) -> StoredLens:
-        """From view.json; KeyError or ValueError for a lens there is not.
-
-        Written apart from core.lenses, so that a fault there is not confirmed by itself. A pinhole
-        has no table: its views have no StoredLens.
-        """
+        """From view.json; KeyError or ValueError for an unknown lens. Views of a pinhole have no table."""
         model = table["model"]
         if model not in ("radtan", "fisheye", "equirect", "cubemap"):
             raise ValueError(f"no lens model {model!r}")
@@ -42,10 +38,10 @@ class StoredLens:
         return StoredLens(model, k, p, float(table.get("max_angle_rad", np.pi)))
 
     def rays(self, plane: F64) -> F64:
-        """(N, 3) directions with OpenCV's axes, of unit depth, of points (N, 2) of the plane.
+        """(N, 3) directions with OpenCV's axes of points (N, 2) of the plane.
 
-        Of unit depth for radtan; of unit length for fisheye and equirect, whose depth is the
-        distance. (0, 0, 0) beyond the image circle of a fisheye.
+        Of unit depth for radtan; of unit length for the others, whose depth is the distance.
+        (0, 0, 0) beyond the image circle of a fisheye.
         """
         if self.model == "equirect":
             longitude, latitude = plane.T
@@ -67,14 +63,13 @@ class StoredLens:
         angle = self._inverse(radius, most)
         turn = np.arctan2(plane[:, 1], plane[:, 0])
         parts = [np.sin(angle) * np.cos(turn), np.sin(angle) * np.sin(turn), np.cos(angle)]
-        seen = radius <= self._radial(np.array([most]))[0]
-        return np.where(seen[:, None], np.stack(parts, axis=1), 0.0)
+        visible = radius <= self._radial(np.array([most]))[0]
+        return np.where(visible[:, None], np.stack(parts, axis=1), 0.0)
 
     def plane_and_depth(self, points: F64) -> tuple[F64, F64]:
-        """(N, 2) of the plane and (N,) depth of points (N, 3), OpenCV's axes; NaN = unseen.
+        """(N, 2) of the plane and (N,) depth of points (N, 3) in the camera's frame; NaN = not visible.
 
-        Points are in the camera's frame, metres. Depth is z for radtan and the distance for the
-        others, as the layers store it.
+        Depth is z for radtan and the distance for the others, as the layers store it.
         """
         x, y, z = points.T
         distance = np.sqrt(x * x + y * y + z * z)
@@ -128,8 +123,8 @@ class StoredLens:
         for _ in range(_STEPS):
             target = plane - self._tangential(ideal[:, 0], ideal[:, 1])
             radius = np.hypot(target[:, 0], target[:, 1])
-            found = self._inverse(radius, most)
-            scale = np.divide(found, radius, out=np.ones_like(radius), where=radius > 0)
+            inverse = self._inverse(radius, most)
+            scale = np.divide(inverse, radius, out=np.ones_like(radius), where=radius > 0)
             before, ideal = ideal, target * scale[:, None]
             if np.abs(ideal - before).max(initial=0.0) < 1e-12:
                 break
@@ -138,13 +133,20 @@ class StoredLens:
 
 def _cube_rays(plane: F64) -> F64:
     number = np.clip(np.floor((plane[:, 0] + 1) / 2), 0, 5).astype(np.int64)
-    u, v, one = plane[:, 0] - 2 * number, plane[:, 1], np.ones(len(plane))
-    # Front, right, back, left, up, down: what the face's right, down and forward are.
-    faces = [(u, v, one), (one, v, -u), (-u, v, -one), (-one, v, u), (u, -one, v), (u, one, -v)]
-    found = np.zeros((len(plane), 3))
+    u, v, ones = plane[:, 0] - 2 * number, plane[:, 1], np.ones(len(plane))
+    # Right, down and forward of the faces front, right, back, left, up and down.
+    faces = [
+        (u, v, ones),
+        (ones, v, -u),
+        (-u, v, -ones),
+        (-ones, v, u),
+        (u, -ones, v),
+        (u, ones, -v),
+    ]
+    rays = np.zeros((len(plane), 3))
     for k, parts in enumerate(faces):
-        found[number == k] = np.stack(parts, axis=1)[number == k]
-    return np.asarray(found / np.linalg.norm(found, axis=1, keepdims=True))
+        rays[number == k] = np.stack(parts, axis=1)[number == k]
+    return np.asarray(rays / np.linalg.norm(rays, axis=1, keepdims=True))
 
 
 def _cube_plane(points: F64) -> F64:

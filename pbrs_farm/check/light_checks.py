@@ -90,11 +90,11 @@ def _camera_of(view: StoredView, recipe: Recipe, variant: int) -> PictureCamera:
 def _check_variants(case: ViewCase, recipe: Recipe, rows: Any, light: Planes) -> None:
     """Each further picture is present, is stated, and is taken by the camera drawn for it."""
     rows = rows if isinstance(rows, list) else []
-    wanted = [f"mlt_il_ol.{n}.png" for n in range(1, recipe.tone.variants + 1)]
+    by_recipe = [f"mlt_il_ol.{n}.png" for n in range(1, recipe.tone.variants + 1)]
     stated = [row.get("file") if isinstance(row, dict) else None for row in rows]
     files = sorted(path.name for path in case.view.folder.glob("mlt_il_ol.*.png"))
-    fault = f"view.json tells of the variants {stated}, the recipe asks for {wanted}, there are {files}"  # fmt: skip
-    if not case.expect("light developed")(stated == wanted == files, fault):
+    fault = f"view.json tells of the variants {stated}, the recipe asks for {by_recipe}, there are {files}"  # fmt: skip
+    if not case.expect("light developed")(stated == by_recipe == files, fault):
         return
     for n, row in enumerate(rows, 1):
         camera = _camera_of(case.view, recipe, n)
@@ -178,10 +178,12 @@ class _Shot:
         off = abs(float(stated["exposure"]) - product) / max(product, 1e-9)
         if sensor.lag_s > 0 and self.case.view.table.get("time_s") is not None:
             return off  # it lags behind that of the frames before
-        wanted = exposure * 2**sensor.compensation_ev / unit
+        product_s = exposure * 2**sensor.compensation_ev / unit
         longest = max(sensor.shutter_max_s, sensor.shutter_min_s)
-        own_shutter = sensor.shutter_s or np.clip(wanted / sensor.iso_min, sensor.shutter_min_s, longest)  # fmt: skip
-        own_iso = np.clip(wanted / own_shutter, sensor.iso_min, max(sensor.iso_max, sensor.iso_min))
+        own_shutter = sensor.shutter_s or np.clip(product_s / sensor.iso_min, sensor.shutter_min_s, longest)  # fmt: skip
+        own_iso = np.clip(
+            product_s / own_shutter, sensor.iso_min, max(sensor.iso_max, sensor.iso_min)
+        )
         return float(np.max([off, abs(shutter / own_shutter - 1), abs(iso / own_iso - 1)]))
 
     def _compare_pixels(

@@ -43,10 +43,10 @@ _FLOOR_M = 0.1  # height above a floor that still counts as the floor
 _UPRIGHT = 0.9  # least cosine of a floor's normal
 _BULB_SHARE = 0.05  # relative error of a bulb's radiance
 _GREY = 0.02  # range of the colours of a light without one
-_WARM_K = 4000.0  # of lamps that are redder than any day
+_WARM_K = 4000.0  # lamps below this are redder than any day
 _DAY_LX = 1000.0  # of the sky, above which windows outshine lamps that they mirror
 _WINDOW_RAYS = 3000  # of a view, that look for windows
-_MOST_BULB_PX = 400  # that are looked at
+_MOST_BULB_PX = 400  # of a bulb, to look at
 _BULB_GRID = 15  # places a side of such a pixel and those around it, a fifth of a pixel apart
 _FEW_BULB_PX = 4  # fewer pixels amid a bulb are not judged
 _SUN_RAD = math.radians(0.6)  # around the sun's middle, twice its disc: its shadow has soft edges
@@ -130,7 +130,7 @@ class _Places:
         return len(self.rows)
 
     def returned(self, cosine: F64) -> F64:
-        """(N,) least share of a matte surface's light that is sent to the camera; cosine: to the light.
+        """(N,) least share of a matte surface's light sent to the camera; cosine: to the light.
 
         Under a coat slanting light does not reach the paint, nor leave it (Ashikhmin and Shirley 2000).
         """

@@ -1,4 +1,4 @@
-"""How `verify` recomputes each file of a root, and what it does not recompute; no effects.
+"""The method by which `verify` recomputes each file of a root, and the files that it does not recompute; no effects.
 
 A file without a row is compared with its hash and, if it is a layer, its size and type.
 """
@@ -73,7 +73,7 @@ def how_of_files() -> dict[str, str]:
 
 
 def looked_at(views: list[StoredView], fields: Counter[tuple[str, str]]) -> tuple[str, ...]:
-    """A line for each kind of file that was recomputed: its name, the number of views, the method.
+    """A line for each kind of recomputed file: its name, the number of views, the method.
 
     Then the number of kinds of fields of each JSON file that have a check (fields: as of
     `fields.stored_fields`).
@@ -140,7 +140,7 @@ def _file_counts(views: list[StoredView]) -> Counter[str]:
 
 
 def _light_fault(view: StoredView) -> str:
-    """Why a view's light modes were not compared by pixels; "" if they were, or if it has none."""
+    """Why a view's light modes were not compared by pixels; "" if they were, or if there are no such modes."""
     if not (view.has("mlt_ol.png") or view.has("mlt_il_ol.png")):
         return ""
     if view.recipe is None:

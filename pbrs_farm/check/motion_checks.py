@@ -1,7 +1,7 @@
-"""Flow, disparity and occlusion against points that are followed from one stored view to another.
+"""Flow, disparity and occlusion against points followed from one stored view to another.
 
 Effects: none. A pixel with another depth than its ray's (an edge that two casters see differently) is left to the
-checks of its own layers.
+checks of that layer.
 """
 
 from __future__ import annotations
@@ -178,7 +178,7 @@ def check_partners(case: HouseCase) -> None:
 
     Its name follows from the view's own. A view may be rendered alone.
     """
-    views = {seen.view.folder.name: seen.view for seen in case.seen}
+    views = {v.view.folder.name: v.view for v in case.views}
     for view in views.values():
         for relation, row in sorted(view.table.get("partners", {}).items()):
             name = _name_of_partner(view, relation, case.house.camera_rows)

@@ -1,4 +1,4 @@
-"""pairs.parquet against points that are followed from one stored camera to the other, by Embree.
+"""pairs.parquet against points followed from one stored camera to the other, by Embree.
 
 Effects: reads files.
 """

@@ -105,9 +105,9 @@ def _note_glitter(case: ViewCase, verdict: PixelVerdict) -> None:
     """Report the pixels that show either of two colours, if a pair of items has more than a few."""
     instance = case.now.triangles.instance
     origin, directions = case.view.rays(*case.pixels)
-    other = of_another_colour(verdict.first, origin, directions, case.scene)
-    shown = np.nonzero((other >= 0) & ~verdict.coincident)[0]
-    first, second = verdict.first[shown], other[shown]
+    faces = of_another_colour(verdict.first, origin, directions, case.scene)
+    shown = np.nonzero((faces >= 0) & ~verdict.coincident)[0]
+    first, second = verdict.first[shown], faces[shown]
     pairs = np.sort(np.stack([instance[first], instance[second]], 1), axis=1)
     _, number, n = np.unique(pairs, axis=0, return_inverse=True, return_counts=True)
     many = n[number.reshape(-1)] > _MOST_COINCIDENT
@@ -127,7 +127,7 @@ def judge_pixels(view: StoredView, labels: Labels, pixels: Pixels, scene: Scene)
     right = _explain(view, labels, face, directions, scene)
     tied = np.zeros(len(rows), bool)
 
-    # Try other triangles where the first one does not explain everything.
+    # Try other triangles where the first triangle does not explain every label.
     open_ = np.nonzero(~np.logical_and.reduce(list(right.values())))[0]
     open_labels = {name: array[open_] for name, array in labels.items()}
     candidates = [
@@ -156,9 +156,9 @@ def _fill_one_place(
     """(N,) of the chosen pixels, those whose ray pierces two parallel triangles in one place."""
     triangles, rays = scene
     fill = np.zeros(len(first), bool)
-    both = np.nonzero(chosen & (first >= 0) & (second >= 0) & (first != second))[0]
-    starts, legs, _way = rays.last_leg(origin, directions[both])
-    for k, start, leg in zip(both, starts, legs, strict=True):
+    pixels = np.nonzero(chosen & (first >= 0) & (second >= 0) & (first != second))[0]
+    starts, legs, _way = rays.last_leg(origin, directions[pixels])
+    for k, start, leg in zip(pixels, starts, legs, strict=True):
         pair, ray = np.array([first[k], second[k]]), directions[k]
         normals = rays.normal(pair, np.stack([ray, ray]))
         t = distances_pierced(triangles, pair, start, leg)

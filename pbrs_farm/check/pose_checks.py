@@ -53,17 +53,17 @@ def check_reprojection(case: HouseCase) -> None:
     _MAX_WRONG of a pair's points may still be wrong, and are counted as ties. Every view is compared
     with every other, or with _MAX_PARTNERS of them.
     """
-    views = case.seen
-    points = [_points_of(seen) for seen in views]
-    nearest = [_nearest(seen.depth) for seen in views]
+    views = case.views
+    points = [_points_of(view) for view in views]
+    nearest = [_nearest(view.depth) for view in views]
     rng = np.random.default_rng(0)
-    for a, seen in enumerate(views):
+    for a, first in enumerate(views):
         others = np.array([b for b in range(len(views)) if b != a], np.int64)
         if len(others) > _MAX_PARTNERS:
             others = rng.choice(others, _MAX_PARTNERS, replace=False)
         for b in others:
             n, wrong = _count_in_front(points[a], views[b].view, nearest[b])
-            place = f"{seen.view.place} in {views[b].view.place}"
+            place = f"{first.view.place} in {views[b].view.place}"
             fault = f"{wrong} of {n} points lie before what is seen there"
             case.tally.tolerate("reprojection", place, n, wrong, max(2, _MAX_WRONG * n), fault)
 

@@ -136,7 +136,7 @@ def _is_released(house: StoredHouse) -> bool:
 
 
 def coated_materials(house: StoredHouse) -> Bools:
-    """(M,) materials with a coat, however rough (docs/light_methods.md); the published ones have none."""
+    """(M,) materials with a coat, however rough (docs/light_methods.md); without the published ones."""
     rows = house.house["materials"]
     if _is_released(house):
         return np.zeros(len(rows), bool)
@@ -210,9 +210,9 @@ def check_fit(case: ViewCase) -> None:
         slopes |= {word: _slopes(copy, surface)[0] for word, copy in moved_copies(logs).items()}
         slack = (_TIE_SIGMAS if name == "all light" else _GROUP_SIGMAS) * error
         expect = case.expect("light edges", "radiance.exr")
-        for word, other in slopes.items():
-            fault = f"{name} fits the albedo better {word} ({other:.2f}) than as it is ({slope:.2f})"  # fmt: skip
-            expect(other <= slope + slack, fault)
+        for word, moved_slope in slopes.items():
+            fault = f"{name} fits the albedo better {word} ({moved_slope:.2f}) than as it is ({slope:.2f})"  # fmt: skip
+            expect(moved_slope <= slope + slack, fault)
         if name == "all light":
             fault = f"{name} does not follow the albedo: {slope:.2f} +- {error:.2f}"
             expect(slope >= max(_LEAST_SIGMAS * error, _LEAST_SLOPE), fault)

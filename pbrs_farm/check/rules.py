@@ -49,7 +49,7 @@ def rules_by_scope() -> dict[str, tuple[Rule, ...]]:
 def judge(scope: str, place: str, tally: Tally, **names: Any) -> None:
     """Expect every rule of a scope to hold, each as one fact of its check.
 
-    names: the objects that paths begin with. Raises KeyError for a field that is missing and may not be.
+    names: the objects that paths begin with. Raises KeyError for a missing field without `?`.
     """
     for rule in rules_by_scope()[scope]:
         field, equals = _value(rule.field, names), _value(rule.equals, names)

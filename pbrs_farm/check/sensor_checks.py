@@ -142,7 +142,7 @@ def _tof_sigma_m(name: str, z: F64, angle: F64) -> F64:
 
 
 def _extremes(values: F64) -> tuple[F64, F64]:
-    """(H, W) least and largest value around each pixel; NaN if there is none."""
+    """(H, W) least and largest value around each pixel; NaN without values."""
     is_value = np.isfinite(values)
     low = ndimage.minimum_filter(np.where(is_value, values, np.inf), _REACH_PX, mode="nearest")
     high = ndimage.maximum_filter(np.where(is_value, values, -np.inf), _REACH_PX, mode="nearest")

@@ -19,8 +19,8 @@ from pbrs_farm.core.house import FLOATING
 
 _MODEL_M = 1e-4  # between two instances of a model in its frame: float32 precision in the world
 _BOX_M = 0.001  # tolerance of a box's sides
-_FLOOR_M = 0.05  # height above a floor that clears items lying on it; tolerance below it
-_FLOOR_SHARE = 0.5  # least share of a floor that is met: the rest may be covered, or a stairwell
+_FLOOR_M = 0.05  # height of rays above a floor, clear of carpets; tolerance below it
+_FLOOR_SHARE = 0.5  # least share of a floor that rays meet: the rest may be covered, or a stairwell
 _LIGHT_M = (
     0.05  # between a light and its surfaces beside its radius, as of a shade's ring about a bulb
 )

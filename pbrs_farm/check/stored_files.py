@@ -1,6 +1,6 @@
-"""Stored files that a stranger may have put there: bytes, digests and JSON of regular ones. Effects: reads files.
+"""Bytes, digests and JSON of stored files, which may come from a stranger. Effects: reads files.
 
-Every fault is a BadFile whose text says what is wrong with it.
+Every fault is a BadFile whose text gives the reason.
 """
 
 from __future__ import annotations
@@ -15,15 +15,11 @@ MAX_BYTES = 2 * 2**30  # of a house's geometry; every other stored file is small
 
 
 class BadFile(ValueError):
-    """A stored file cannot be read; the text says why."""
+    """A stored file cannot be read; the text gives the reason."""
 
 
 def stored_bytes(file: Path) -> bytes:
-    """The file's bytes.
-
-    Raises BadFile, whose text says why, for what is missing, no regular file, or above MAX_BYTES: a
-    stranger may have put it there.
-    """
+    """The file's bytes; raises BadFile if it is missing, no regular file, or above MAX_BYTES."""
     try:
         return read_regular(file, MAX_BYTES)
     except OSError as error:
@@ -31,10 +27,7 @@ def stored_bytes(file: Path) -> bytes:
 
 
 def stored_digest(file: Path) -> str:
-    """Hex sha256 of the file, whatever its size; raises BadFile.
-
-    Reads it piece by piece. BadFile for what is no regular file or cannot be read.
-    """
+    """Hex sha256 of a file of any size; raises BadFile if it is no regular file or cannot be read."""
     try:
         return digest_of_regular(file)
     except OSError as error:
@@ -42,16 +35,12 @@ def stored_digest(file: Path) -> str:
 
 
 def stored_object(file: Path) -> dict[str, Any]:
-    """The JSON object in the file; raises BadFile.
-
-    BadFile for a file that cannot be read, is no JSON, or holds another value than an object.
-    Nothing of its content is checked.
-    """
+    """The JSON object in the file; raises BadFile if it cannot be read or holds another value."""
     return object_from_json(stored_bytes(file))
 
 
 def object_from_json(data: bytes | str) -> dict[str, Any]:
-    """The JSON object that data says; raises BadFile."""
+    """The JSON object in data; raises BadFile."""
     try:
         value = json.loads(data)
     except (ValueError, RecursionError):

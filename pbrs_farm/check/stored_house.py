@@ -1,6 +1,6 @@
 """The documents and markers of a house's folder. Effects: reads files.
 
-Uses no House. A document that is missing or damaged is empty here: the checks of files report that.
+Uses no House. A missing or damaged document is empty here: the checks of files report that.
 """
 
 from __future__ import annotations
@@ -95,7 +95,7 @@ class StoredHouse:
         return row
 
     def marker_facts(self, step: str, view: str = "") -> dict[str, Any]:
-        """The facts that the marker of a step holds; {} if there are none."""
+        """The facts that the marker of a step holds; {} without them."""
         name = f"{step}.{view}.json" if view else f"{step}.json"
         facts = _document(self.folder / "done" / name).get("facts", {})
         return facts if isinstance(facts, dict) else {}

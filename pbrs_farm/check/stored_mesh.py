@@ -302,8 +302,8 @@ def _materials(glb: _Glb) -> Materials:
     for row in rows:
         # Glass with holes, for which glTF has no mode, has its cutoff among its extras.
         is_mask = row.get("alphaMode") == "MASK"
-        given = row if is_mask else row.get("extras", {})
-        cutoffs.append(float(given.get("alphaCutoff", 0.5 if is_mask else 0.0)))
+        holder = row if is_mask else row.get("extras", {})
+        cutoffs.append(float(holder.get("alphaCutoff", 0.5 if is_mask else 0.0)))
     return Materials(
         tuple(str(row.get("extras", {}).get("kind", "opaque")) for row in rows),
         np.array([p["baseColorFactor"][:3] for p in pbr], np.float64).reshape(-1, 3),

@@ -25,7 +25,7 @@ _BORDER_PX = 0.02  # within this of the picture's border a vertex is in or out
 _MAX_RAYS = 2000  # of an item whose share is judged by a sample
 _SIGMAS = 5.0  # of a sample's share
 _EDGE = 0.004  # share of an item's pixels whose centres are on its outline
-_LENS = 0.1  # tolerance of a share that is resampled from pinholes (docs/lenses.md)
+_LENS = 0.1  # tolerance of a share resampled from pinholes (docs/lenses.md)
 
 
 class HouseItems:
@@ -79,7 +79,7 @@ def check_rows(case: ViewCase) -> None:
 
 
 def _box_fault(box: dict[str, Any], corners: F64, items: HouseItems, number: int) -> str:
-    """The fault of a box, "" if it has none."""
+    """The fault of a box; "" if it is right."""
     axes, centre, half = (np.array(box[k], np.float64) for k in ("axes", "centre", "half"))
     if axes.shape != (3, 3) or np.abs(axes @ axes.T - np.eye(3)).max() > 1e-6:
         return "its axes are no frame"
@@ -107,15 +107,15 @@ def _is_truncated(view: StoredView, points: F64) -> bool | None:
 
 
 def _share_fault(case: ViewCase, row: dict[str, Any], corners: F64, rays: Rays) -> str:
-    """The fault of visible_fraction, "" if it has none."""
+    """The fault of visible_fraction; "" if it is right."""
     view, instance, n_pixels = case.view, case.arrays["instance"], case.n_pixels
     visible, share = int((instance == int(row["id"])).sum()), float(row["visible_fraction"])
     if not 0 < share <= 1:
         return f"{share:g} is no share"
     # Pixels where the item alone might be visible, beside those where it is.
     rows, columns = _reach(view, corners)
-    other = instance[rows, columns] != int(row["id"])
-    rows, columns = rows[other], columns[other]
+    beside = instance[rows, columns] != int(row["id"])
+    rows, columns = rows[beside], columns[beside]
     n_all = len(rows)
     rng = np.random.default_rng(zlib.crc32(f"{view.place} {row['id']}".encode()))
     most = _MAX_RAYS if n_pixels is None else min(_MAX_RAYS, n_pixels)

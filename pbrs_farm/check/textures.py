@@ -25,7 +25,7 @@ class Textures:
     _decoded: dict[int, Pixels | None] = field(default_factory=dict)
 
     def of(self, material: int) -> Pixels | None:
-        """(H, W, C) pixels of a material's picture; None if it has none or it cannot be decoded."""
+        """(H, W, C) pixels of a material's picture; None if it is missing or cannot be decoded."""
         if material not in self._decoded:
             self._decoded[material] = self._decode(material)
         return self._decoded[material]

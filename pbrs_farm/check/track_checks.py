@@ -1,4 +1,4 @@
-"""tracks.npz against points that are followed again, from the frame in which each was chosen through the stored frames.
+"""tracks.npz against points followed again, from the frame in which each was chosen through the stored frames.
 
 Effects: reads the file. Rays are Embree's, cameras those of view.json; faces move as house.json's motions say.
 """
@@ -30,7 +30,7 @@ _VERTEX_M = 1e-6  # precision of vertices in 32-bit floats
 _DEPTH = 1e-4  # tolerance as a share of the depth, and in metres
 _BESIDE_M = 0.002  # around a point: if visibility differs there, either answer is right
 _EDGE_ON = 0.01  # cosine of a face's normal to the ray
-_MOST_LISTED = 20  # wrong points of a frame that are reported
+_MOST_LISTED = 20  # reported points of a frame
 _SHAPES = {"points": 3, "occluded": 2, "depth_m": 2, "query_frame": 1, "instance": 1}
 
 
@@ -85,7 +85,7 @@ def check_tracks(case: HouseCase) -> None:
     query = tracks["query_frame"]
     if not expect(((query >= 0) & (query < t)).all(), "begins nowhere"):
         return
-    stored = {seen.view.folder.name: seen.view for seen in case.seen}
+    stored = {v.view.folder.name: v.view for v in case.views}
     views = {k: stored[name] for k, name in enumerate(film) if name in stored}
     # Views come by name, which need not be the order of frames.
     chosen = {film.index(v.folder.name) for v in _spread([*views.values()])}
@@ -102,7 +102,7 @@ def _spread(views: list[StoredView]) -> list[StoredView]:
 
 
 def _check_group(film: _Film, frame: int, index: I64) -> None:
-    """The points (N,) that were chosen in one frame, in all frames to look at."""
+    """The points (N,) chosen in one frame, in all frames to look at."""
     tracks, view, scenes = film.tracks, film.views[frame], film.scenes(frame)
     px = tracks["points"][index, frame].astype(np.float64)
     columns, rows = np.floor(px).T.astype(np.int64)

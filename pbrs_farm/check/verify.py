@@ -45,7 +45,7 @@ def verify(
 ) -> Certificate:
     """Check every house and view below folder (an output root) and report how much was checked.
 
-    sample: pixels of each view that are recomputed by rays (SAMPLE when None); all_pixels: every
+    sample: pixels of each view to recompute by rays (SAMPLE when None); all_pixels: every
     one. Checks on files, tables and whole pictures are always complete. tell: called after each
     view with the number of views checked and their total. Raises BadInput if folder is no output root.
     """
@@ -117,15 +117,15 @@ def _check_house(
     case = HouseCase(house, glb, ScenesInTime(house, triangles), tally)
     _run_each("house", case, "layers")
     # A damaged view fails and the next ones go on.
-    seen: list[SeenView] = []
+    checked: list[SeenView] = []
     halved = {view.place for view in views[1:] if _is_halved(view, n_pixels)}
     for view in views:
         try:
-            seen += _check_view(view, case, n_pixels, is_halved=view.place in halved)
+            checked += _check_view(view, case, n_pixels, is_halved=view.place in halved)
         except FAULTS as error:
             tally.expect("layers", f"{view.place}/view.json", False, _fault(error))
         tell()
-    _run_each("views", replace(case, seen=tuple(seen)))
+    _run_each("views", replace(case, views=tuple(checked)))
     return views, len(halved)
 
 

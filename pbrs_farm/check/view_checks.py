@@ -123,12 +123,12 @@ def check_planes(case: ViewCase) -> None:
     facing = camera_normals(normal)
 
     # Pair each pixel with its right neighbour, where both show one surface.
-    left, right = np.s_[:, :-1], np.s_[:, 1:]
-    same = (normal[left] == normal[right]).all(-1) & (instance[left] == instance[right])
-    same &= (depth[left] > 0) & (depth[right] > 0)
-    first = np.einsum("ni,ni->n", facing[left][same], rays[left][same])
-    second = np.einsum("ni,ni->n", facing[left][same], rays[right][same])
-    near, far = depth[left][same], depth[right][same]
+    west, east = np.s_[:, :-1], np.s_[:, 1:]
+    same = (normal[west] == normal[east]).all(-1) & (instance[west] == instance[east])
+    same &= (depth[west] > 0) & (depth[east] > 0)
+    first = np.einsum("ni,ni->n", facing[west][same], rays[west][same])
+    second = np.einsum("ni,ni->n", facing[west][same], rays[east][same])
+    near, far = depth[west][same], depth[east][same]
     # Follow the plane through the first to the ray of the second.
     with np.errstate(divide="ignore", invalid="ignore"):
         predicted = near * first / second
