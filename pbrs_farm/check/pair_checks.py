@@ -50,9 +50,13 @@ def check_pairs(case: HouseCase) -> None:
     if not expect(names <= views.keys(), "names views that are none"):
         return
     rng = np.random.default_rng(zlib.crc32(case.house.id.encode()))
-    chosen = set(rng.permutation(len(rows))[:_MOST_PAIRS].tolist())
-    for k, row in enumerate(rows):
-        _check_row(case, row, views, is_followed=k in chosen)
+    chosen = rng.permutation(len(rows))[:_MOST_PAIRS]
+    for row in (rows[int(k)] for k in sorted(chosen)):
+        a, b = (_Camera(views[row[key]]) for key in ("view_a", "view_b"))
+        shares = {"a_in_b": _share(a, b, case.rest.rays), "b_in_a": _share(b, a, case.rest.rays)}
+        judge("pair shares", _place(case, row), case.tally, row=row, shares=shares)
+    for row in rows:
+        _check_row(case, row, [views[row["view_a"]], views[row["view_b"]]])
     # Each pair of views of a room has a row.
     counts = Counter(view["room"] for view in views.values())
     n_pairs = sum(n * (n - 1) // 2 for n in counts.values())
@@ -60,23 +64,20 @@ def check_pairs(case: HouseCase) -> None:
     expect(len(rows) == n_pairs, fault)
 
 
-def _check_row(
-    case: HouseCase, row: dict[str, Any], views: dict[str, dict[str, Any]], *, is_followed: bool
-) -> None:
-    """Rooms and shares of a pair, and what follows from these and from the cameras."""
-    place = f"{case.house.id}: {row['view_a']}, {row['view_b']}"
-    rows = [views[row["view_a"]], views[row["view_b"]]]
-    a, b = (_Camera(view) for view in rows)
-    if is_followed:
-        shares = {"a_in_b": _share(a, b, case.rest.rays), "b_in_a": _share(b, a, case.rest.rays)}
-        judge("pair shares", place, case.tally, row=row, shares=shares)
+def _place(case: HouseCase, row: dict[str, Any]) -> str:
+    return f"{case.house.id}: {row['view_a']}, {row['view_b']}"
+
+
+def _check_row(case: HouseCase, row: dict[str, Any], views: list[dict[str, Any]]) -> None:
+    """Rooms of a pair, and the columns that follow from its shares and cameras."""
+    a, b = (_Camera(view) for view in views)
     cosine = float(np.clip(a.rotation[:, 2] @ b.rotation[:, 2], -1, 1))
     facts = {
         "common": (row["a_in_b"] + row["b_in_a"]) / 2,
         "baseline_m": float(np.linalg.norm(a.eye - b.eye)),
         "angle_deg": float(np.degrees(np.arccos(cosine))),
     }
-    judge("pair", place, case.tally, row=row, views=rows, facts=facts)
+    judge("pair", _place(case, row), case.tally, row=row, views=views, facts=facts)
 
 
 class _Camera:
