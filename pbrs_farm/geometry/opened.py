@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-from scipy import ndimage
 
 from pbrs_farm.core.arrays import F64, Bools, Matrix4
 from pbrs_farm.core.classes import FLOOR_MAT
@@ -160,6 +159,9 @@ class _Track:
         cell = np.floor((plane - low) / _CELL_M).astype(np.int64)
         front = np.full(tuple(cell.max(0) + 3), -np.inf)
         np.maximum.at(front, (cell[:, 0], cell[:, 1]), way)
+        # Imported here: every process of a run imports this module, few call this function.
+        from scipy import ndimage
+
         covered = ndimage.binary_closing(np.isfinite(front))
         inner = ndimage.binary_erosion(covered) & np.isfinite(front)
         return cls(joint, axes, low, front, inner, zero)

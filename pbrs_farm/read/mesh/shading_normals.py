@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from pbrs_farm.core.arrays import F64, I32, I64
 from pbrs_farm.core.mesh import numbered_points, unit_normals
@@ -35,6 +33,10 @@ def _normal_of_corner(points: F64, faces: I64, unit: F64, min_cos: float) -> tup
     # Number of normals, and the index for each of the 3 F corners.
     _, welded = numbered_points(points[faces.ravel()])
     first, second = _smooth_links(welded.reshape(-1, 3), unit, min_cos)
+    # Imported here: every process of a run imports this module, few call this function.
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
     # Corners that smooth edges join, directly or through others, share one normal.
     shape = (faces.size, faces.size)
     links = coo_array((np.ones(len(first), np.int8), (first, second)), shape=shape)
