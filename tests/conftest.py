@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from hypothesis import HealthCheck, settings
-
+import tests.hypothesis_profiles  # noqa: F401  loads a profile before tests are imported
+from tests.cpu_times import pytest_runtest_setup, pytest_runtest_teardown, pytest_terminal_summary
+from tests.long_tests import pytest_collection_modifyitems
 from tests.no_skips import pytest_make_collect_report, pytest_runtest_makereport
 
-__all__ = ["pytest_make_collect_report", "pytest_runtest_makereport"]
-
-# How long an example takes says how loaded the machine is, not whether the code is right.
-settings.register_profile("suite", deadline=None, suppress_health_check=[HealthCheck.too_slow])
-settings.load_profile("suite")
+__all__ = [
+    "pytest_collection_modifyitems",
+    "pytest_make_collect_report",
+    "pytest_runtest_makereport",
+    "pytest_runtest_setup",
+    "pytest_runtest_teardown",
+    "pytest_terminal_summary",
+]

@@ -57,6 +57,7 @@ def test_a_scene_has_rooms_cameras_and_counts_and_leaves_out_what_is_damaged(
         assert "Traceback" not in answer.text
 
 
+@pytest.mark.long
 def test_the_candidates_are_those_that_the_run_refused() -> None:
     recipe = recipe_from_name(
         "preview",

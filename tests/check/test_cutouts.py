@@ -68,6 +68,7 @@ MATERIALS = {
 }
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize("name", MATERIALS)
 def test_every_layer_of_a_home_with_holes_is_as_its_own_rays_find_it(
     tmp_path: Path, name: str
@@ -77,6 +78,7 @@ def test_every_layer_of_a_home_with_holes_is_as_its_own_rays_find_it(
     assert failed(tmp_path) == set()
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize("wrong", ["solid", "other cutoff"])
 def test_labels_of_a_solid_surface_or_of_another_cutoff_are_caught(
     tmp_path: Path, wrong: str

@@ -21,6 +21,8 @@ from tests.check.roots import house_of, sign
 from tests.check.sorts_of_roots import ROOTS
 
 Root = Callable[[str], Path]
+QUICK_SORTS = ("finished", "opened")
+"""Sorts of roots that `make test` renders; `make test-all` renders every sort."""
 KINDS = [(sort, kind) for sort, kinds in FALSEHOODS.items() for kind in kinds]
 
 
@@ -30,6 +32,13 @@ def _one_a_check() -> list[tuple[str, str]]:
     for sort, kind in KINDS:
         first.setdefault((sort, FALSEHOODS[sort][kind][1]), kind)
     return [(sort, kind) for (sort, _check), kind in first.items()]
+
+
+def _marked(sort: str) -> list[pytest.MarkDecorator]:
+    return [] if sort in QUICK_SORTS else [pytest.mark.long]
+
+
+SORTS = [pytest.param(sort, marks=_marked(sort)) for sort in FALSEHOODS]
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +55,7 @@ def finished_root(tmp_path_factory: pytest.TempPathFactory) -> Root:
     return root
 
 
-@pytest.mark.parametrize("sort", FALSEHOODS)
+@pytest.mark.parametrize("sort", SORTS)
 def test_a_true_root_is_clean(finished_root: Root, sort: str) -> None:
     certificate = verify(finished_root(sort), all_pixels=True)
     assert certificate.is_clean, certificate.text()
@@ -65,7 +74,10 @@ def test_a_certificate_says_what_was_looked_at(finished_root: Root) -> None:
     assert all(str(f.relative_to(view)) in told for f in view.rglob("*") if f.is_file())
 
 
-@pytest.mark.parametrize(("sort", "kind"), _one_a_check())
+@pytest.mark.quick(18)
+@pytest.mark.parametrize(
+    ("sort", "kind"), [pytest.param(*pair, marks=_marked(pair[0])) for pair in _one_a_check()]
+)
 def test_a_falsehood_with_all_hashes_mended_is_found(
     finished_root: Root, tmp_path: Path, sort: str, kind: str
 ) -> None:
@@ -86,6 +98,7 @@ def test_at_least_ninety_kinds_of_falsehood_are_planted() -> None:
     assert len(KINDS) >= 90
 
 
+@pytest.mark.long
 def test_further_pictures_by_other_cameras_are_developed_again(finished_root: Root) -> None:
     root = finished_root("cameras")
     certificate = verify(root, sample=10)
@@ -95,6 +108,7 @@ def test_further_pictures_by_other_cameras_are_developed_again(finished_root: Ro
     assert all((picture != frame.colour).any() for picture in frame.variants)
 
 
+@pytest.mark.long
 def test_a_true_root_of_dark_pictures_is_clean_by_its_tiles(finished_root: Root) -> None:
     certificate = verify(finished_root("dark"), sample=10)
     assert certificate.is_clean, certificate.text()
@@ -105,6 +119,7 @@ def test_a_true_root_of_dark_pictures_is_clean_by_its_tiles(finished_root: Root)
     )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("file", ["mlt_ol.png", "mlt_il_ol.png", "mlt_il_ol.1.png"])
 def test_a_patch_is_found_where_light_is_denoised_at_half_its_size(
     finished_root: Root, tmp_path: Path, file: str
@@ -123,6 +138,7 @@ def test_a_patch_is_found_where_light_is_denoised_at_half_its_size(
     assert "from radiance.exr" in fault
 
 
+@pytest.mark.long
 def test_a_doubt_at_half_the_size_is_settled_as_the_light_stands(
     finished_root: Root, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -138,6 +154,7 @@ def test_a_doubt_at_half_the_size_is_settled_as_the_light_stands(
     assert certificate.is_clean, certificate.text()
 
 
+@pytest.mark.long
 def test_a_damaged_variant_is_one_fault_and_the_rest_goes_on(
     finished_root: Root, tmp_path: Path
 ) -> None:
@@ -151,7 +168,7 @@ def test_a_damaged_variant_is_one_fault_and_the_rest_goes_on(
     assert "mlt_il_ol.1.png" in fault
 
 
-@pytest.mark.parametrize("sort", FALSEHOODS)
+@pytest.mark.parametrize("sort", SORTS)
 def test_every_stored_field_and_layer_has_an_owner(finished_root: Root, sort: str) -> None:
     root = finished_root(sort)
     houses = list(root.glob("houses/*"))

@@ -59,6 +59,7 @@ def test_what_mirrors_show_is_recomputed_to_the_last_pixel(mirrored):
     assert certificate.is_clean, certificate.text()
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize("name", ["depth", "normal", "semantic", "instance"])
 def test_a_changed_pixel_behind_a_mirror_is_caught(mirrored, tmp_path, name):
     shutil.copytree(mirrored, tmp_path / "root")

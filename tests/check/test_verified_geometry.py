@@ -123,6 +123,7 @@ def with_frame_in_wall(by_m: float) -> House:
     return home.with_items([*frames, *home.items])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("by_m", [0.0, 2e-5])
 def test_coincident_surfaces_of_the_source_are_told_by_pairs_and_no_failure(tmp_path, by_m):
     make_root(tmp_path, with_frame_in_wall(by_m), with_optional=True)
@@ -144,6 +145,7 @@ def test_a_wrong_item_on_a_surface_of_its_own_still_fails(root):
     assert verify(root, all_pixels=True).coincident == ()
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize(("by_m", "coincide"), [(0.0, True), (5e-4, False)])
 def test_parts_of_one_thing_in_one_plane_and_two_colours_are_told(tmp_path, by_m, coincide):
     home = builtin_home()

@@ -24,6 +24,7 @@ def test_a_sample_checks_as_many_pixels_as_asked(clean):
     assert verify(clean, sample=100).counts["ray: normal"].checked == 200
 
 
+@pytest.mark.quick(3)
 @pytest.mark.parametrize(
     ("file", "by", "check"),
     [
@@ -76,6 +77,7 @@ def test_optional_layers_are_checked_where_they_exist(rich):
     assert names | {"nyu13", "class_source", "boundary_semantic"} <= certificate.counts.keys()
 
 
+@pytest.mark.quick(4)
 @pytest.mark.parametrize(
     ("file", "check"),
     [

@@ -60,6 +60,7 @@ def test_wrong_words_are_told(
     assert says.replace("{out}", out) in error_of(capsys, *(w.replace("{out}", out) for w in words))
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize(
     ("name", "content", "says"),
     [

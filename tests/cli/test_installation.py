@@ -148,6 +148,7 @@ def test_what_is_needed_and_missing_is_named_with_its_extra(
         need("mitsuba", "drjit", "av")
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize("words", ["run builtin --out x", "cameras builtin", "verify x", "layers"])
 def test_a_broken_installation_says_in_one_line_what_a_verb_needs(
     words: str, tmp_path: Path

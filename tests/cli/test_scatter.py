@@ -16,6 +16,7 @@ from tests.scene.homes import SMALL, can, crate, small_home
 FIELDS = [word for name, value in SMALL.items() for word in ("--set", f"{name}={value}")]
 
 
+@pytest.mark.long
 def test_scattered_models_are_seen_and_kept(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -39,6 +39,7 @@ print(title_of("slope"), shown_pixels("slope", file.read_bytes(), "").max())
 """
 
 
+@pytest.mark.long
 @pytest.mark.kinds("layer")
 def test_a_file_is_all_that_a_new_layer_takes(tmp_path: Path) -> None:
     (tmp_path / "slope.py").write_text(SLOPE)

@@ -21,7 +21,7 @@ def test_the_examples_of_cameras_and_recipes_run(tmp_path: Path) -> None:
     assert [fault for _name, fault in found if fault] == []
 
 
-@pytest.mark.slow
+@pytest.mark.pages
 def test_the_examples_of_homes_and_frames_run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -48,7 +48,7 @@ def test_the_queues_code_is_called_by_its_installed_name(build_script: ModuleTyp
     )
 
 
-@pytest.mark.slow
+@pytest.mark.pages
 def test_two_builds_of_a_tree_are_the_same_bytes_and_an_index_takes_them(tmp_path: Path) -> None:
     pytest.importorskip("build")
     pytest.importorskip("twine")

@@ -29,7 +29,7 @@ from tests.docs.test_manual import name_of
 from tests.hostile.sound_inputs import archive
 from tests.scene.homes import SMALL
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.pages
 
 AS_THEY_STAND = ("researcher", "python")  # test_tutorials.py runs these
 ONE_SESSION = ("data",)  # a block of Python takes names of those before it

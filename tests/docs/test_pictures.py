@@ -63,7 +63,7 @@ def test_each_home_of_the_gallery_is_shown_by_its_number_and_has_a_camera() -> N
         assert {"world_from_camera", "hfov_rad", "room"} == set(camera)
 
 
-@pytest.mark.slow
+@pytest.mark.pages
 def test_the_gallery_shows_homes_as_they_are_made_now() -> None:
     """Its cameras stand in other rooms otherwise: scripts/gallery_pictures.py makes it anew."""
     text = (REPO / "docs/gallery.md").read_text(encoding="utf-8")
@@ -73,7 +73,7 @@ def test_the_gallery_shows_homes_as_they_are_made_now() -> None:
     )
 
 
-@pytest.mark.slow
+@pytest.mark.pages
 @pytest.mark.parametrize("row", ROWS, ids=name_of)
 def test_a_command_makes_the_views_that_its_picture_shows(row: dict[str, str]) -> None:
     assert views_of(_MAKE.get(row["command"], row["command"])) == row["views"].split()

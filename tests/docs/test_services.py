@@ -65,7 +65,7 @@ def wait_for_redis(port: int) -> None:
     raise AssertionError("redis-server does not answer")
 
 
-@pytest.mark.slow
+@pytest.mark.pages
 def test_the_operators_job_runs_to_its_end_and_what_the_table_says_works(
     services: None, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -97,7 +97,7 @@ def test_a_tutorial_names_only_verbs_that_exist(page: str) -> None:
     assert set(re.findall(r"`pbrs-farm ([a-z][a-z-]*)", text)) <= known
 
 
-@pytest.mark.slow
+@pytest.mark.pages
 def test_the_packagers_wheel_is_built_installed_and_runs(tmp_path: Path) -> None:
     source = tmp_path / "source"
     for name in ("pbrs_farm", "workers"):

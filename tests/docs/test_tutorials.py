@@ -22,7 +22,7 @@ def blocks(page: str) -> list[tuple[str, str]]:
     return [(b.language, b.text) for b in found if b.language in COMMANDS]
 
 
-@pytest.mark.slow
+@pytest.mark.pages
 def test_every_line_of_the_researchers_tutorial_runs(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -42,7 +42,7 @@ def test_every_line_of_the_researchers_tutorial_runs(
     assert n_run >= 12
 
 
-@pytest.mark.slow
+@pytest.mark.pages
 def test_every_block_of_the_python_page_runs(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

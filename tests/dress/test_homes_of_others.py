@@ -55,6 +55,7 @@ def test_a_scene_of_planar_walls_is_dressed_and_repaired() -> None:
     assert [r.enclosure for r in repairs.rooms] == ["closed", "closed"]
 
 
+@pytest.mark.long
 def test_a_suncg_house_is_dressed_and_repaired(suncg: House) -> None:
     house, report = _dressed(suncg)
     _assert_lived_in(suncg, house, report)

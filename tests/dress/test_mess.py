@@ -113,6 +113,7 @@ def _bedroom(width: float) -> House:
     return house(boards("Bed", parts, BED), name="Bedroom")
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize(("width", "n"), [(1.6, 2), (1.12, 2), (0.9, 1)])
 def test_a_bed_has_a_duvet_and_as_many_pillows_as_people_sleep_there(width: float, n: int) -> None:
     for seed in range(3):

@@ -48,6 +48,7 @@ def test_a_home_read_back_is_repaired_without_a_leak_or_a_lost_wall(tmp_path: Pa
     assert n[0] == n[1] > 0
 
 
+@pytest.mark.long
 def test_a_turned_piece_has_its_turn_in_its_node_and_its_box_back() -> None:
     house = repaired_home()
     index = next(k for k, i in enumerate(house.items) if i.kind is ItemKind.OBJECT)
@@ -86,6 +87,7 @@ def test_what_lies_before_the_windows_is_no_part_of_an_exported_home() -> None:
     assert len(exported_home(with_street).pieces) == len(house.items)
 
 
+@pytest.mark.long
 def test_things_have_parts_to_collide_with_and_the_floor_between_them_is_walkable() -> None:
     home = exported_home(repaired_home())
     for piece in home.things:

@@ -17,6 +17,7 @@ from pbrs_farm.prepare.source import resolve
 from tests.export.homes import differences, repaired_home, stored
 
 
+@pytest.mark.long
 def test_a_home_reads_back_equal_from_its_data_set(tmp_path: Path) -> None:
     house = repaired_home()
     root = stored(tmp_path / "root", house)

@@ -124,6 +124,7 @@ def test_what_stands_in_each_other_is_parted_and_lies_still(tmp_path: Path) -> N
     assert model.nv == 12
 
 
+@pytest.mark.long
 def test_the_built_in_home_loads_with_its_textures_and_free_bodies(tmp_path: Path) -> None:
     house = repaired_home()
     model = model_of(house, tmp_path)

@@ -38,6 +38,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     return {form: folder / f"{home.house.id}.{form}" for form in ("usdc", "usdz")}
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize("form", ["usdc", "usdz"])
 def test_a_written_home_is_read_back_equal(written: dict[str, Path], form: str) -> None:
     got = read_house(resolve(str(written[form])), ReadFields())
@@ -55,6 +56,7 @@ HOLED: tuple[dict[str, Any], ...] = (
 )
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize("change", HOLED)
 def test_a_cut_out_keeps_its_cutoff_and_glass_its_holes(
     tmp_path: Path, change: dict[str, Any]

@@ -236,6 +236,7 @@ def scattered(seed: int) -> Clip:
     ))  # fmt: skip
 
 
+@pytest.mark.long
 def test_no_answer_and_no_letter_is_the_usual_one():
     questions = Asker().asked([scattered(seed) for seed in range(16)])
     scores = blind_scores(questions)
@@ -293,6 +294,7 @@ def test_a_phrase_names_the_colour_of_what_has_one(kind, rgb, colour):
     assert phrases == {"the cabinet"} | ({f"the {colour} cabinet"} if colour else set())
 
 
+@pytest.mark.long
 def test_questions_of_a_real_view_are_right_by_a_checker_that_shares_no_code(tmp_path):
     home = small_home()
     frames = pf.render(home, home.cameras(n=3), modes=["opengl_dl"], layers=["albedo"])

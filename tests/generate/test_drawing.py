@@ -26,6 +26,7 @@ def test_the_same_seed_gives_the_same_plan() -> None:
     assert drawn_plan(np.random.default_rng(3)) == drawn_plan(np.random.default_rng(3))
 
 
+@pytest.mark.quick(4)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_rooms_overlap_neither_another_nor_a_wall(seed: int) -> None:
     rooms = [Polygon(room.polygon) for room in plan(seed).rooms]
@@ -39,6 +40,7 @@ def test_rooms_overlap_neither_another_nor_a_wall(seed: int) -> None:
     assert unary_union(rooms).intersection(walls).area < (3e-4 if has_slants else 1e-6)
 
 
+@pytest.mark.quick(4)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_every_room_is_reached_from_the_entrance(seed: int) -> None:
     drawn = plan(seed)
@@ -59,6 +61,7 @@ def test_every_room_is_reached_from_the_entrance(seed: int) -> None:
     assert reached == set(range(len(drawn.rooms)))
 
 
+@pytest.mark.quick(4)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_rooms_to_live_in_have_daylight(seed: int) -> None:
     drawn = plan(seed)
@@ -72,6 +75,7 @@ def test_rooms_to_live_in_have_daylight(seed: int) -> None:
             assert glass >= room.area / 8 * 0.95, room.name
 
 
+@pytest.mark.quick(4)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_openings_lie_in_their_walls_and_apart(seed: int) -> None:
     drawn = plan(seed)

@@ -15,6 +15,7 @@ from pbrs_farm.generate.programme import Wishes
 from tests.generate.furnish.shelves import plain_catalogue
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize("seed", [9, 12, 29])
 def test_a_drawn_home_breaks_no_gate(seed: int) -> None:
     home = drawn_home(np.random.default_rng(seed), plain_catalogue())
@@ -36,6 +37,7 @@ def _rooms(home: DrawnHome) -> list[tuple[PlanRoom, set[str]]]:
     ]
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize("storeys", [1, 2])
 def test_an_office_is_a_small_bedroom_with_a_desk_for_a_bed(storeys: int) -> None:
     wishes = Wishes((3, 3), storeys=storeys, offices=1)

@@ -65,10 +65,12 @@ def lamp_catalogue() -> Catalogue:
     return Catalogue((LAMP,), lambda _piece: shape, "test")
 
 
+@pytest.mark.long
 def test_the_same_plan_gives_the_same_bytes() -> None:
     assert written(1) == written(1)
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize("seed", range(4))
 def test_a_home_is_read_without_a_note_and_with_its_rooms(seed: int) -> None:
     house = read(written(seed))
@@ -78,6 +80,7 @@ def test_a_home_is_read_without_a_note_and_with_its_rooms(seed: int) -> None:
         assert Polygon(room.polygon).area == pytest.approx(drawn.area, rel=1e-3)
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize("seed", range(4))
 def test_every_door_and_window_cuts_a_hole(seed: int) -> None:
     house = read(written(seed))
@@ -87,6 +90,7 @@ def test_every_door_and_window_cuts_a_hole(seed: int) -> None:
     )
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize("seed", range(2))
 def test_repair_finds_closed_rooms_and_no_leak(seed: int) -> None:
     house = read(written(seed))

@@ -68,6 +68,7 @@ def plan(folder: Path, value: object) -> Plan:
     return plan_from_file(path).plan
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize("value", [TOUCHING, APART, SKEWED], ids=["touching", "apart", "skewed"])
 def test_the_home_of_a_plan_is_closed(tmp_path: Path, value: object) -> None:
     upright = turned_upright(plan(tmp_path, value))

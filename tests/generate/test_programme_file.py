@@ -95,6 +95,7 @@ def test_a_programme_has_an_office_of_the_size_of_its_wish(tmp_path: Path) -> No
     assert not plan_faults(plan)
 
 
+@pytest.mark.long
 def test_a_programme_without_a_plan_says_what_to_leave_out(tmp_path: Path) -> None:
     # Five rooms on a page cannot all lie beside each other: these four and the hall.
     four = ("living", "Ada", "Ben", "store")

@@ -55,6 +55,7 @@ def assert_whole(new: Plan, old: Plan) -> None:
         assert face == pytest.approx(wall.thickness / 2, abs=2e-3)
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize("seed", range(4))
 def test_a_slanted_side_is_one_line_and_every_room_reaches_it(seed: int) -> None:
     old, new = plain(seed), slanted(seed, slanted=1.0)
@@ -83,6 +84,7 @@ def test_homes_without_either_stay_as_they_are_and_so_do_those_without_the_room_
     assert slanted(2, bay=1.0) is plain(2)
 
 
+@pytest.mark.long
 def test_a_fifth_of_homes_and_more_have_a_wall_that_is_not_at_right_angles() -> None:
     families = [plan_families()[name] for name in PLANS]
     wanted = [f.weight * (1 - (1 - f.slanted) * (1 - f.bay)) for f in families]

@@ -42,6 +42,7 @@ def house(seed: int) -> House:
     return read_home(home_file(storeys, EMPTY, np.random.default_rng(seed), stair), "home.sh3d")
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_both_storeys_have_one_outline(seed: int) -> None:
     grounds: list[Any] = [
@@ -51,6 +52,7 @@ def test_both_storeys_have_one_outline(seed: int) -> None:
     assert outlines[0].symmetric_difference(outlines[1]).area < 1e-6
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_every_room_is_reached_and_has_daylight(seed: int) -> None:
     lower, upper = home(seed)[0]
@@ -60,6 +62,7 @@ def test_every_room_is_reached_and_has_daylight(seed: int) -> None:
     assert OpeningKind.ENTRANCE not in kinds[1]
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_the_stairs_lie_free_in_both_storeys_and_before_them_the_hall(seed: int) -> None:
     plans, stair = home(seed)
@@ -73,6 +76,7 @@ def test_the_stairs_lie_free_in_both_storeys_and_before_them_the_hall(seed: int)
         assert all(hall.contains(point) for point in before)
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_the_upper_floor_has_a_hole_over_the_stairs_alone(seed: int) -> None:
     assert not house(seed).notes
@@ -96,6 +100,7 @@ def _area(triangles: np.ndarray) -> float:
     return float(np.linalg.norm(np.cross(a, b), axis=1).sum() / 2)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", SEEDS[:1])
 def test_repair_finds_no_leak_between_the_storeys(seed: int) -> None:
     _repaired, report = repair(

@@ -56,6 +56,7 @@ def test_every_format_of_the_table_is_tried_here() -> None:
     assert {one.title for one in formats()} == set(WRITERS)
 
 
+@pytest.mark.quick(8)
 @each_format
 def test_a_file_is_known_by_its_own_format_and_read(tmp_path: Path, title: str) -> None:
     path = WRITERS[title](tmp_path)
@@ -102,6 +103,7 @@ def test_a_file_travels_to_a_farm_or_is_left_in_place(tmp_path: Path, title: str
         assert store.get(placed.location) == path.read_bytes()
 
 
+@pytest.mark.quick(6)
 @each_format
 def test_run_and_a_worker_of_a_farm_make_the_house_of_a_file(
     tmp_path: Path, title: str, monkeypatch: pytest.MonkeyPatch
@@ -131,6 +133,7 @@ def _declared_repaired(house: House, **_given: object) -> tuple[House, RepairRep
     return replace(house, is_repaired=True), RepairReport(house_id=house.id)
 
 
+@pytest.mark.quick(6)
 @each_format
 def test_a_byte_order_mark_before_a_text_changes_nothing(tmp_path: Path, title: str) -> None:
     path = WRITERS[title](tmp_path)

@@ -105,6 +105,7 @@ def test_a_room_whose_use_is_not_known_is_left_and_noted() -> None:
     assert not any("sink" in i.name for i in furnished.items)
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize(("use", "has"), [("Office", "desk"), ("Dining room", "dining_table")])
 def test_an_office_gets_a_desk_and_a_dining_room_a_table(use: str, has: str) -> None:
     house = renamed(empty_house(), "Bedroom 1", use)
@@ -114,6 +115,7 @@ def test_an_office_gets_a_desk_and_a_dining_room_a_table(use: str, has: str) -> 
     assert "bed" not in names
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize("name", ["", "Room 3"])
 def test_a_room_whose_name_says_no_use_is_what_the_home_lacks(name: str) -> None:
     house = empty_house()
@@ -141,6 +143,7 @@ def test_a_sparse_room_keeps_what_it_has_and_gets_what_it_lacks() -> None:
     assert names_in(sparse, room.id) > names_in(start, room.id)
 
 
+@pytest.mark.long
 def test_the_same_seed_furnishes_alike_and_another_one_otherwise() -> None:
     bounds = [
         np.concatenate([i.bounds for i in furnish_rooms(empty_house(), boxes(), s).items])

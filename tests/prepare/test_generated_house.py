@@ -30,6 +30,7 @@ def both_ways(contents: HomeContents, fields: ReadFields = FIELDS) -> tuple[Hous
     return direct, filed
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", [1, 4])
 def test_it_is_the_house_of_its_file_bit_by_bit(seed: int) -> None:
     direct, filed = both_ways(generate_home(MadeHome(seed), with_families(EMPTY)).contents)
@@ -62,6 +63,7 @@ def random_surface(dtype: type[np.floating]) -> Surface:
     return Surface("random", positions, faces, 0, uvs, normals.astype(dtype))
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 @pytest.mark.parametrize("left_out", ["", "uvs", "normals", "both"])
 def test_numbers_are_those_that_a_file_would_hold(dtype: type[np.floating], left_out: str) -> None:
@@ -75,6 +77,7 @@ def test_numbers_are_those_that_a_file_would_hold(dtype: type[np.floating], left
     assert bundle_from_house(direct) == bundle_from_house(filed)
 
 
+@pytest.mark.long
 def test_a_model_of_too_many_triangles_is_refused_as_from_a_file() -> None:
     contents = with_one_piece(random_surface(np.float32))
     fields = ReadFields(max_model_triangles=99)

@@ -27,6 +27,7 @@ from workers.house_files import entries_from_arguments, upload
 formats = pytest.mark.parametrize("name", ["swiss", "procthor", "roomplan", "cubicasa"])
 
 
+@pytest.mark.quick(1)
 @formats
 def test_the_house_of_a_plan_is_closed_in_every_format(tmp_path: Path, name: str) -> None:
     house = read_house(resolve(str(WRITERS[name](tmp_path))), ReadFields())

@@ -82,6 +82,7 @@ def test_a_picture_that_cannot_be_used_is_one_note_and_strictly_an_error(
         repaired_house(source, STRICT_RECIPE)
 
 
+@pytest.mark.quick(4)
 @formats
 def test_what_the_reader_accepts_strictly_the_house_step_accepts(tmp_path: Path, kind: str) -> None:
     source = FORMATS[kind](tmp_path, picture())

@@ -14,6 +14,7 @@ from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.formats import glb
 from pbrs_farm.formats.house_bundle import bundle_from_house, house_from_bundle
 from pbrs_farm.read.gltf.scene import read_gltf
+from tests.hypothesis_profiles import examples
 from tests.read.gltf.gltf_scenes import two_rooms
 from tests.read.small_houses import full_house
 from tests.read.suncg.test_suncg_bad import outcome, paths_of, values
@@ -27,7 +28,7 @@ BINARY = glb.gltf_from_glb(BYTES, "x").buffers[0]
 BUNDLE = bundle_from_house(full_house())
 
 
-@settings(max_examples=150, deadline=10_000, suppress_health_check=list(HealthCheck))
+@settings(max_examples=examples(150), deadline=10_000, suppress_health_check=list(HealthCheck))
 @given(
     st.lists(
         st.tuples(st.integers(0, 10**7), st.binary(max_size=5), st.integers(0, 9)),
@@ -47,7 +48,7 @@ def test_whatever_the_bytes_of_a_glb_the_outcome_is_a_house_or_a_bad_house(
     assert file in ("", "scene.glb")
 
 
-@settings(max_examples=200, deadline=10_000, suppress_health_check=list(HealthCheck))
+@settings(max_examples=examples(200), deadline=10_000, suppress_health_check=list(HealthCheck))
 @given(st.sampled_from(paths_of(DOCUMENT)), values)
 def test_any_value_anywhere_in_a_scene_gives_a_house_or_a_bad_house(
     path: tuple[Any, ...], value: Any
@@ -69,7 +70,7 @@ def test_any_value_anywhere_in_a_scene_gives_a_house_or_a_bad_house(
     assert file in ("", "scene.glb")
 
 
-@settings(max_examples=150, deadline=10_000, suppress_health_check=list(HealthCheck))
+@settings(max_examples=examples(150), deadline=10_000, suppress_health_check=list(HealthCheck))
 @given(st.sampled_from(paths_of(json.loads(BUNDLE[1]))), values)
 def test_any_value_anywhere_in_house_json_gives_a_house_or_a_bad_house(
     path: tuple[Any, ...], value: Any
@@ -83,7 +84,7 @@ def test_any_value_anywhere_in_house_json_gives_a_house_or_a_bad_house(
     assert file in ("", "house.json", "house.glb")
 
 
-@settings(max_examples=100, deadline=10_000)
+@settings(max_examples=examples(100), deadline=10_000)
 @given(st.binary(max_size=400))
 def test_random_bytes_are_refused(data: bytes) -> None:
     for one, other in ((data, BUNDLE[1]), (BUNDLE[0], data)):

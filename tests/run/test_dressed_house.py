@@ -72,6 +72,7 @@ def test_a_share_outside_0_to_1_is_refused(value):
         recipe_from_name("fast", {"dress.clutter": value})
 
 
+@pytest.mark.long
 def test_the_house_step_writes_what_dressing_did_beside_what_repair_did():
     store = MemoryStore()
     recipe = recipe_from_name("preview", GENERATED | FEW)
@@ -158,6 +159,7 @@ def test_the_report_tells_in_plain_words_what_came_in_and_which_gate_broke():
     assert not report.is_sound
 
 
+@pytest.mark.long
 def test_the_verb_writes_the_bundle_the_report_and_a_picture(tmp_path: Path, capsys):
     words = ["dress", "builtin", "--seed", "2", "--out", str(tmp_path), "--catalogue", "generated",
              "--recipe", "preview", "--size", "96x72", "--set", "light.spp=1",

@@ -45,6 +45,7 @@ def test_what_is_made_of_light_is_refused_where_there_is_none(tmp_path, capsys):
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.long
 def test_layers_of_light_are_added_to_a_view_and_stay(tmp_path):
     run(tmp_path)
     (view,) = tmp_path.glob("houses/*/views/*")

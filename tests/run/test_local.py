@@ -119,6 +119,7 @@ def test_views_of_a_room_measured_dark_are_left_out_and_told(tmp_path: Path) -> 
     assert summary.without_views[0][1].startswith(line)
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize("fields", [{"selection.min_room_lx": "0"}, {"cameras.source": "stored"}])
 def test_views_of_a_dark_room_are_made_where_the_recipe_or_the_user_asks_for_them(
     tmp_path: Path, fields: dict[str, str]
@@ -155,6 +156,7 @@ def test_leaks_notes_and_lost_walls_are_told_also_by_a_run_that_finds_them_done(
         assert "4 notes (3 missing-texture, 1 wall-lost): `notes` in" in told.out.splitlines()[-1]
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize(("name", "code"), [("spoilt", 1), ("plain", 0)])
 def test_a_lost_wall_is_an_error_of_the_run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, code: int
@@ -279,6 +281,7 @@ def test_several_houses_follow_one_another_through_both_processes(tmp_path: Path
     assert told == ["house", "house", "planned"] * 4  # begun, done, its views known
 
 
+@pytest.mark.quick(1)
 @pytest.mark.usefixtures("two_cores")
 @pytest.mark.parametrize("wrong", ["refuse", "crash"])
 def test_a_house_that_fails_costs_itself_alone(tmp_path: Path, wrong: str) -> None:

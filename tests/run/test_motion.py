@@ -22,6 +22,8 @@ from pbrs_farm.run.local_run import Run, Summary
 from pbrs_farm.run.plan import wanted
 from tests.check.roots import sign
 
+pytestmark = pytest.mark.long
+
 BETWEEN = [x.name for x in LAYERS if x.partner]
 FIELDS = {
     "image.width_px": "96",

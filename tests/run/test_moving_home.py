@@ -54,6 +54,7 @@ def table(root: Path, number: int) -> dict:
     return json.loads((view(root, number) / "view.json").read_text())
 
 
+@pytest.mark.long
 def test_every_pixel_and_every_table_is_right(certificate: Certificate) -> None:
     assert certificate.is_clean, certificate.text()
     for name in ("flow_forward", "flow_backward", "occlusion_forward", "scene_flow"):
@@ -64,6 +65,7 @@ def test_every_pixel_and_every_table_is_right(certificate: Certificate) -> None:
     assert certificate.counts["tracks"].ties <= 20
 
 
+@pytest.mark.long
 def test_each_view_tells_the_time_and_how_far_doors_are_open(made: Path, moving: pf.Home) -> None:
     for number, share in enumerate((0.1, 0.4, 0.7, 1.0)):
         told = table(made, number)
@@ -73,6 +75,7 @@ def test_each_view_tells_the_time_and_how_far_doors_are_open(made: Path, moving:
         assert values == pytest.approx(expected)
 
 
+@pytest.mark.long
 def test_a_door_that_is_seen_flows_and_its_frame_does_not(made: Path) -> None:
     moved = {
         k: np.stack([layers_from_exr((view(made, k) / "scene_flow.exr").read_bytes())[c] for c in "XYZ"])
@@ -85,6 +88,7 @@ def test_a_door_that_is_seen_flows_and_its_frame_does_not(made: Path) -> None:
     assert max(np.abs(m[1]).max() for m in moved.values()) < 1e-6
 
 
+@pytest.mark.long
 def test_ids_of_instances_stay_over_time(made: Path) -> None:
     names = [{row["id"]: row["item"] for row in table(made, k)["instances"]} for k in range(4)]
     for a, b in pairwise(names):
@@ -156,6 +160,7 @@ FALSEHOODS = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", FALSEHOODS)
 def test_a_falsehood_about_motion_is_found(made: Path, tmp_path: Path, name: str) -> None:
     plant, check = FALSEHOODS[name]
@@ -221,6 +226,7 @@ def test_a_rig_films_each_frame_by_all_its_cameras(moving: pf.Home) -> None:
         pf.film(moving, camera, fps=2, seconds=1, rig={"cameras": [{"name": "a", "yaw": 3}]})
 
 
+@pytest.mark.long
 def test_a_film_that_was_killed_goes_on_where_it_was(
     made: Path, moving: pf.Home, tmp_path: Path
 ) -> None:

@@ -117,6 +117,7 @@ def test_a_second_run_renders_nothing(made: tuple[Path, Summary]) -> None:
     assert again.failures == []
 
 
+@pytest.mark.long
 def test_a_view_made_again_has_the_same_bytes(made: tuple[Path, Summary], tmp_path: Path) -> None:
     root = tmp_path / "again"
     shutil.copytree(made[0], root)

@@ -19,9 +19,12 @@ from pbrs_farm.run.local_run import Run
 from pbrs_farm.run.plan import wanted
 from pbrs_farm.run.relight import LampFactor, unlit_lamps
 
-pytestmark = pytest.mark.skipif(
-    choose_variant().startswith("scalar"), reason="the kernels need LLVM or CUDA"
-)
+pytestmark = [
+    pytest.mark.long,
+    pytest.mark.skipif(
+        choose_variant().startswith("scalar"), reason="the kernels need LLVM or CUDA"
+    ),
+]
 
 
 def small(**light: str) -> Recipe:

@@ -93,11 +93,13 @@ def table(root: Path, view: str) -> dict[str, Any]:
     return found
 
 
+@pytest.mark.long
 def test_each_instant_has_a_view_of_every_camera(root: Path) -> None:
     views = {p.name for p in house(root).glob("views/*")}
     assert views == {f"frame_{k:05d}{eye}" for k in range(3) for eye in EYES}
 
 
+@pytest.mark.long
 def test_a_view_tells_rig_camera_instant_and_transform(root: Path) -> None:
     told = table(root, "frame_00001_left")["rig"]
     assert (told["name"], told["camera"], told["instant"]) == ("head", "left", "frame_00001")
@@ -107,6 +109,7 @@ def test_a_view_tells_rig_camera_instant_and_transform(root: Path) -> None:
     np.testing.assert_allclose(told["rig_from_camera_opencv"], expected, atol=1e-12)
 
 
+@pytest.mark.long
 def test_the_cameras_of_an_instant_stand_as_the_rig_says(root: Path) -> None:
     poses = {
         eye: np.array(table(root, f"frame_00002{eye}")["world_from_camera_opencv"]) for eye in EYES
@@ -120,6 +123,7 @@ def test_the_cameras_of_an_instant_stand_as_the_rig_says(root: Path) -> None:
     np.testing.assert_allclose(back[:3, :3], turn, atol=1e-9)
 
 
+@pytest.mark.long
 def test_each_camera_has_its_lens(root: Path) -> None:
     left, back = table(root, "frame_00000_left"), table(root, "frame_00000_back")
     assert left["K"][0][0] == pytest.approx(32 / math.tan(math.radians(50)))
@@ -127,11 +131,13 @@ def test_each_camera_has_its_lens(root: Path) -> None:
     assert table(root, "frame_00000")["K"] == table(root, "frame_00000_beside")["K"]
 
 
+@pytest.mark.long
 def test_verify_finds_a_rig_right(certificate: Certificate) -> None:
     assert certificate.is_clean, certificate.text()
     assert certificate.counts["motion: flow_forward"].checked > 500
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "change",
     [
@@ -154,6 +160,7 @@ def test_verify_finds_a_rig_that_is_not_the_recipes(
     assert verify(tmp_path / "root", sample=2).counts["sequence"].failed > 0
 
 
+@pytest.mark.long
 def test_verify_finds_a_camera_that_left_its_rig(root: Path, tmp_path: Path) -> None:
     shutil.copytree(root, tmp_path / "root", ignore=lambda *_: ["views"])
     file = house(tmp_path / "root") / "cameras.json"
@@ -164,6 +171,7 @@ def test_verify_finds_a_camera_that_left_its_rig(root: Path, tmp_path: Path) -> 
     assert verify(tmp_path / "root", sample=2).counts["sequence"].failed == 1
 
 
+@pytest.mark.long
 def test_two_cameras_side_by_side_are_a_stereo_pair(tmp_path: Path) -> None:
     pair = RIG[: RIG.index('[[cameras]]\nname = "left"')]
     recipe = recipe_of(rig_file(tmp_path, pair), **{"cameras.walk_frames": "2"})
@@ -180,6 +188,7 @@ def test_two_cameras_side_by_side_are_a_stereo_pair(tmp_path: Path) -> None:
     assert "P3" in (tmp_path / "kitti/calib/000000.txt").read_text()
 
 
+@pytest.mark.long
 def test_colmap_has_the_rig_and_its_frames(root: Path, tmp_path: Path) -> None:
     from scipy.spatial.transform import Rotation
 
@@ -213,6 +222,7 @@ def test_colmap_has_the_rig_and_its_frames(root: Path, tmp_path: Path) -> None:
     assert seen == set(poses)
 
 
+@pytest.mark.long
 def test_tum_has_a_trajectory_of_each_camera(root: Path, tmp_path: Path) -> None:
     export(root, tmp_path / "x", "tum")
     names = {p.name for p in (tmp_path / "x").glob("*/groundtruth*.txt")}

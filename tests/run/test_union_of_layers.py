@@ -58,6 +58,7 @@ def test_layers_stay_whatever_later_runs_ask_for(tmp_path: Path, mode: str) -> N
         assert path.name in ("view.json", "histogram.json") or path.read_bytes() == data, path
 
 
+@pytest.mark.long
 def test_a_layer_that_cannot_be_made_costs_none_that_is_there(tmp_path: Path) -> None:
     fisheye = {"lens.preset": "tum_vi", "image.width_px": "48"}
     made(tmp_path, ("albedo",), **fisheye)

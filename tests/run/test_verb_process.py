@@ -90,6 +90,7 @@ def test_ctrl_c_means_afterwards_what_it_did_before() -> None:
     assert signal.getsignal(signal.SIGINT) is before
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize(
     ("words", "line"),
     [

@@ -6,10 +6,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pbrs_farm.sample.clearance import near_any_triangle
+from tests.hypothesis_profiles import examples
 from tests.raycast.scenes import geometry, soup
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=examples(15), deadline=None)
 @given(seed=st.integers(0, 10_000), reach=st.floats(0.01, 0.5))
 def test_points_are_near_exactly_when_the_nearest_triangle_is(seed: int, reach: float) -> None:
     g = soup(40, seed)

@@ -17,6 +17,7 @@ from pbrs_farm.read.builtin.builtin_home import builtin_home
 from pbrs_farm.sample.camera_report import Verdict
 from pbrs_farm.sample.eye_probes import enclosed
 from pbrs_farm.sample.house_sampler import sample_cameras
+from tests.hypothesis_profiles import examples
 from tests.sample.sampled_rooms import (
     QUICK,
     IndependentLook,
@@ -58,7 +59,7 @@ def test_winners_of_the_builtin_home_keep_every_rule() -> None:
     assert hold_the_rules(builtin_home(), QUICK, 0) >= 8
 
 
-@settings(max_examples=6, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=examples(6), deadline=None, suppress_health_check=list(HealthCheck))
 @given(width=st.floats(2.5, 6), depth=st.floats(4, 6), seed=st.integers(0, 2**32 - 1))
 def test_winners_of_any_furnished_room_keep_every_rule(
     width: float, depth: float, seed: int

@@ -32,6 +32,7 @@ def differing(house: House, fields: CameraFields, seeds: range) -> tuple[int, in
     return n_differ, n_sectors
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "rules",
     [

@@ -29,6 +29,7 @@ def repaired(name: str) -> House:
     )[0]
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize(
     "name",
     [

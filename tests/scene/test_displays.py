@@ -114,6 +114,7 @@ def test_a_repair_report_is_shown_in_words(home: pf.Home) -> None:
     assert len(repr(home.report)) < 100
 
 
+@pytest.mark.long
 def test_progress_is_told_in_lines_where_there_is_no_terminal(
     home: pf.Home, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

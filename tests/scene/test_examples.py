@@ -13,8 +13,8 @@ import pbrs_farm as pf
 from tests.scene.homes import SMALL
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.py"))
-# Run by `make test`; the others by `make test-slow`.
-QUICK = ("first_picture", "object_poses", "bop_dataset", "floor_plan")
+# Run by `make test`; the others by `make test-all`.
+QUICK = ("first_picture", "floor_plan")
 
 
 @pytest.mark.filterwarnings("ignore:.*is in no room")

@@ -74,6 +74,7 @@ def test_a_fall_travels_with_the_home(falling: pf.Home, held: pf.Home) -> None:
     assert falling.motions.column("from_s") == [0.5]
 
 
+@pytest.mark.long
 def test_what_does_not_rest_flies_off_or_begins_inside_is_named(
     held: pf.Home, tmp_path: Path
 ) -> None:
@@ -88,6 +89,7 @@ def test_what_does_not_rest_flies_off_or_begins_inside_is_named(
         inside.drop("can 1")
 
 
+@pytest.mark.long
 def test_a_film_of_a_fall_has_labels_that_verify_finds_right(
     falling: pf.Home, tmp_path: Path
 ) -> None:

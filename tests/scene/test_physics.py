@@ -11,6 +11,7 @@ from pbrs_farm.core.errors import BadInput
 from tests.scene.homes import can, crate, small_home
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize("on", ["dining table", "Bedroom"])
 def test_dropped_things_lie_on_their_support(on: str, tmp_path: Path) -> None:
     home, models = small_home(), [can(tmp_path), crate(tmp_path)]

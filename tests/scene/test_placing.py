@@ -18,6 +18,7 @@ from pbrs_farm.geometry.solids import quads_surface
 from pbrs_farm.scene.physics import settled_poses
 from pbrs_farm.scene.placing import Target, free_pose, scattered_poses
 from tests.dress.furniture import DEPTH, WIDTH, boards, house, room, solid
+from tests.hypothesis_profiles import examples
 
 EDGES_M = {"small": 0.04, "middle": 0.25, "large": 0.95}
 """Cubes by name. A stool takes the small one, a table the middle one, the floor all three."""
@@ -75,7 +76,7 @@ targets = st.lists(st.sampled_from(sorted(LARGEST)), min_size=1, max_size=5, uni
 
 @given(names=names, on=targets, n=st.integers(1, 2), seed=st.integers(0, 1000))
 @settings(
-    max_examples=60,
+    max_examples=examples(60),
     deadline=None,
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
 )
@@ -108,7 +109,7 @@ def test_every_model_that_fits_somewhere_is_placed_there(
 
 @given(name=st.sampled_from(sorted(EDGES_M)), on=targets, seed=st.integers(0, 1000))
 @settings(
-    max_examples=40,
+    max_examples=examples(40),
     deadline=None,
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
 )

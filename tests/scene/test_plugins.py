@@ -71,6 +71,7 @@ def done(env: dict[str, str], folder: Path, *words: str) -> str:
     return finished.stdout
 
 
+@pytest.mark.long
 def test_homes_of_a_plugin_are_words(installed: dict[str, str], tmp_path: Path) -> None:
     words = ["run", "plugin:still_life,1..2,count=2", "--views", "1", "--out", "o", *FEW]
     done(installed, tmp_path, *words)

@@ -30,6 +30,7 @@ def files(root: Path) -> dict[str, bytes]:
     return {str(p.relative_to(root)): p.read_bytes() for p in every}
 
 
+@pytest.mark.long
 def test_a_saved_frame_has_the_bytes_of_a_run(home: pf.Home, tmp_path: Path) -> None:
     frames = pf.render(home, home.cameras(n=2), modes=["opengl_dl", "mlt_il_ol"], layers=["albedo"])
     frames.save(tmp_path / "mine")
@@ -102,6 +103,7 @@ def test_k_and_opencv_poses_are_kept(home: pf.Home) -> None:
     assert (pf.render(home, same, modes=[]).depth == frame.depth).all()
 
 
+@pytest.mark.long
 def test_a_homes_edits_reach_the_pool_and_verify(home: pf.Home, tmp_path: Path) -> None:
     edited = home.without("sofa").scatter([can(tmp_path)], 3, on="dining table")
     frames = pf.render_homes([edited], tmp_path / "out", views=1, modes=["opengl_dl"])
@@ -143,6 +145,7 @@ os.waitpid(pid, 0)
 """
 
 
+@pytest.mark.long
 def test_a_forked_child_is_told(tmp_path: Path) -> None:
     done = subprocess.run(
         [sys.executable, "-c", _FORK], capture_output=True, text=True, timeout=120, cwd=Path.cwd()

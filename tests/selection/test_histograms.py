@@ -23,6 +23,7 @@ from pbrs_farm.selection.histograms import (
     depth_counts,
     normalised,
 )
+from tests.hypothesis_profiles import examples
 
 RNG = np.random.default_rng(5)
 PICTURE = RNG.integers(0, 256, (30, 40, 3), np.uint8)
@@ -107,7 +108,7 @@ def test_wrong_pictures_are_rejected() -> None:
         HistogramFields(depth_min_m=3, depth_max_m=2)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=examples(30), deadline=None)
 @given(st.lists(st.integers(0, 3), min_size=1, max_size=64))
 def test_sparse_counts_give_back_the_dense_ones(counts: list[int]) -> None:
     dense = np.array(counts, np.uint32)

@@ -28,6 +28,7 @@ from pbrs_farm.selection.reference_set import (
     reference_from_histograms,
 )
 from pbrs_farm.selection.similarity import intersection
+from tests.hypothesis_profiles import examples
 from tests.selection.histogram_sets import random_histogram, reference
 
 FINE = HistogramFields()
@@ -76,7 +77,7 @@ def test_left_one_out_table_is_what_a_double_loop_gives() -> None:
             assert passing == pytest.approx(np.mean(np.array(best) > limit))
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=examples(25), deadline=None)
 @given(st.integers(0, 10**6))
 def test_coarser_bins_never_lower_a_score(seed: int) -> None:
     rng = np.random.default_rng(seed)

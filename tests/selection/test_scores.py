@@ -19,6 +19,7 @@ from pbrs_farm.selection.histogram_pack import (
 from pbrs_farm.selection.histograms import coarser_colour, coarser_depth, normalised
 from pbrs_farm.selection.scores import SCORES, Scorer, merge_tables, score
 from pbrs_farm.selection.similarity import best_match, intersection
+from tests.hypothesis_profiles import examples
 from tests.selection.histogram_sets import FIELDS, pack, record, reference
 
 
@@ -51,7 +52,7 @@ def test_scores_agree_with_ten_lines_of_python(library: str) -> None:
     assert np.abs(table["depth_score"].to_numpy() - expected_depth[order]).max() < 1e-6
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=examples(40), deadline=None)
 @given(st.integers(1, 40), st.integers(2, 30), st.integers(2, 70), st.integers(0, 10**6))
 @example(3, 2, 2, 0)  # one reference is empty
 def test_faiss_and_numpy_find_the_same_best(n: int, m: int, bins: int, seed: int) -> None:

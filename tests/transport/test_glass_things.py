@@ -76,6 +76,7 @@ def fresnel(cos: F64) -> F64:
     return np.asarray(2 * r / (1 + r))
 
 
+@pytest.mark.long
 def test_the_outline_of_a_jar_is_darker_than_its_middle_and_both_than_the_wall() -> None:
     # A ball of one thin wall before a wall of radiance L under a sky of radiance L: what it mirrors is
     # as bright as what it hides, so that it loses its own colour alone, twice, by the way through its wall.

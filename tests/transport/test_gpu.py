@@ -24,6 +24,7 @@ MAX_LAUNCHES = 200
 DENOISER = find_spec("pyoidn") is not None
 
 
+@pytest.mark.long
 @needs_kernels
 def test_one_scene_for_all_rays_makes_the_same_picture() -> None:
     # What a GPU needs (OptiX traces one scene in a kernel), proved where it can be run.

@@ -90,6 +90,7 @@ def test_a_lamps_layer_is_the_room_with_the_other_lamps_out_to_the_bit() -> None
         np.testing.assert_allclose(plain.indoor, both.lamps[number], rtol=1e-5, atol=1e-9)
 
 
+@pytest.mark.long
 @needs_kernels
 def test_the_pilot_moves_samples_between_lamps_and_no_light() -> None:
     # Significance: 16 blocks, |z| < 4.5 each is missed by chance once in 9000 runs.

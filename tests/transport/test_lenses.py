@@ -57,6 +57,7 @@ def test_light_and_labels_see_the_same_surface_through_a_lens(name: str) -> None
         assert result.indoor[~blind].any(-1).all()
 
 
+@pytest.mark.long
 def test_metropolis_goes_through_the_lens_too() -> None:
     camera = camera_of("equirect").with_size(32, 16)
     path = rendered(camera, FIELDS.model_copy(update={"spp": 64}))

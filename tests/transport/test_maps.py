@@ -134,6 +134,7 @@ def test_the_scale_flattens_the_map_and_no_texture_coordinates_switch_it_off() -
     assert mean_outdoor(*floor(), maps, sky) > 1.1 * plain
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize("roughness", [None, 0.3, 1.0])
 def test_a_furnace_stays_what_it_is_behind_a_flat_map_and_never_gains_by_bumps(
     roughness: float | None,
@@ -167,6 +168,7 @@ def mapped_room(**changes: object) -> tuple[House, Camera]:
 MAPS = {"n": waves(0.35), "r": np.tile(np.linspace(60, 255, 32).astype(np.uint8)[:, None, None], (1, 32, 3))}  # fmt: skip
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize("group", list(Group))
 def test_bumpy_matte_walls_agree_with_mitsubas_normalmap(group: Group) -> None:
     # Significance: 16 blocks, |z| < 4.5 each is missed by chance once in 9000 runs. Two segments:
@@ -186,6 +188,7 @@ def test_bumpy_matte_walls_agree_with_mitsubas_normalmap(group: Group) -> None:
     assert np.abs(z_scores(ours, flat)).max() > 20
 
 
+@pytest.mark.long
 def test_bumpy_metal_of_mapped_roughness_agrees_with_mitsubas_roughconductor() -> None:
     # Theirs shadows and masks each by itself, ours together: a little brighter at grazing angles.
     metal = {"diffuse": (0.0, 0.0, 0.0), "specular": (1.0, 1.0, 1.0), "roughness": 0.8}

@@ -49,6 +49,7 @@ def before_the_door(house: House) -> Camera:
     return Camera.look(Intrinsics.from_hfov(64, 48), eye, middle - eye)
 
 
+@pytest.mark.long
 def test_light_at_a_time_is_that_of_a_home_that_stands_there() -> None:
     moving = home()
     camera = before_the_door(moving)

@@ -54,6 +54,7 @@ def test_a_pane_before_a_black_wall_mirrors_the_sky_by_fresnels_law(cos: float) 
     np.testing.assert_allclose(found, fresnel(cos) * np.array([1.0, 2.0, 3.0]), rtol=0.03)
 
 
+@pytest.mark.quick(3)
 @pytest.mark.parametrize("n_faces", [1, 2, 4])
 @pytest.mark.parametrize(("has_board", "expected"), [(True, fresnel(1.0)), (False, 1.0)])
 def test_a_thing_of_glass_mirrors_by_its_first_face_and_without_noise(
@@ -110,6 +111,7 @@ def test_at_night_a_window_shows_the_room_but_in_released(name: str) -> None:
     assert bool(found.indoor.min() > 0) == (name == "fast")
 
 
+@pytest.mark.long
 def test_metropolis_mirrors_as_path_does() -> None:
     house, _camera = rooms.window_room(0.7, lumen=800, pane=True)
     camera = rooms.camera((2.0, 1.5, 3.0), (2.0, 1.5, 0.0), 12, 12, 0.25)

@@ -203,6 +203,7 @@ def test_thin_glass_dims_a_bulb_by_what_it_reflects_and_no_more() -> None:
     assert glazed.indoor.mean() / clear.indoor.mean() == pytest.approx(0.923, rel=0.01)
 
 
+@pytest.mark.long
 def test_a_cut_out_leaf_lets_light_through_its_holes() -> None:
     half = np.full((8, 8, 4), 255, np.uint8)
     half[:, :4, 3] = 0

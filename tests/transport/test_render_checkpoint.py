@@ -89,6 +89,7 @@ def _short_launches(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(f"{METROPOLIS_VIEW}.chain_rounds_per_launch", lambda: one_round)
 
 
+@pytest.mark.quick(2)
 @pytest.mark.usefixtures("_short_launches")
 @pytest.mark.parametrize(
     "changes",
@@ -106,6 +107,7 @@ def test_path_goes_on_to_the_same_bits(changes: dict[str, object], is_sunny: boo
     assert list(again.lamps) == list(whole.lamps)
 
 
+@pytest.mark.quick(1)
 @pytest.mark.usefixtures("_short_launches")
 @pytest.mark.parametrize("n", [1, 3, 5])  # in direct light, among the chains' first prefixes, later
 def test_metropolis_goes_on_to_the_same_picture(n: int) -> None:
@@ -126,6 +128,7 @@ def test_the_share_that_is_done_grows_to_one() -> None:
     assert len(memory.shares) > 2
 
 
+@pytest.mark.long
 def test_metropolis_leaves_out_mutations_once_the_noise_is_reached() -> None:
     long = METROPOLIS.model_copy(update={"mutations_per_pixel": 1024, "noise": 0.1})
     result = rendered(long, Memory())

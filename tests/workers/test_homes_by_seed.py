@@ -97,6 +97,7 @@ def test_two_workers_of_a_farm_leave_the_bytes_of_a_run(tmp_path: Path) -> None:
     assert ours == theirs
 
 
+@pytest.mark.long
 def test_a_worker_without_the_furniture_takes_it_from_the_store_for_a_made_home(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -127,6 +128,7 @@ def _without_sofa(seed: int) -> pf.Home:
     return pf.load("builtin").without("sofa" if seed == 1 else "bed")
 
 
+@pytest.mark.long
 def test_homes_of_a_plugin_are_made_on_workers(monkeypatch: pytest.MonkeyPatch) -> None:
     own = Plugin("homes", "two", "lab", "1.0", _Entry())  # type: ignore[arg-type]
     monkeypatch.setattr(

@@ -45,6 +45,7 @@ def area_of(item: Item) -> float:
     return sum(float(face_areas(triangle_corners(s.positions, s.faces)).sum()) for s in item.surfaces)  # fmt: skip
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize("seed", range(1, 6))
 def test_every_wall_stays_a_closed_solid_of_its_area(seed: int) -> None:
     source, house = builtin_home(), dressed(seed)

@@ -138,6 +138,7 @@ def test_every_use_of_a_room_has_a_row_of_what_it_gets() -> None:
         assert bool(row.coats) == bool(row.most_coats)
 
 
+@pytest.mark.long
 def test_notes_hang_flat_on_a_wall_at_the_height_of_eyes() -> None:
     found = [(m, item) for m in _houses() for item in _named(m, "Wall notes")]
     assert found

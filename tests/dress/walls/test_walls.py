@@ -51,6 +51,7 @@ def _face_of(item: Item, space: HouseSpace) -> WallFace:
     return min(faces, key=lambda f: abs(float(f.out_of(points).min())))
 
 
+@pytest.mark.quick(2)
 @pytest.mark.parametrize("seed", range(1, 6))
 def test_things_hang_within_a_millimetre_of_the_wall(seed: int) -> None:
     mutable = _dressed(seed)
@@ -62,6 +63,7 @@ def test_things_hang_within_a_millimetre_of_the_wall(seed: int) -> None:
         assert 0.0005 <= out.min() <= 0.001, item.name
 
 
+@pytest.mark.quick(2)
 @pytest.mark.parametrize("seed", range(1, 6))
 def test_nothing_hangs_over_an_opening_or_above_the_ceiling(seed: int) -> None:
     mutable = _dressed(seed)
@@ -78,6 +80,7 @@ def test_nothing_hangs_over_an_opening_or_above_the_ceiling(seed: int) -> None:
             assert (low >= b).any() or (high <= a).any(), (item.name, hole.id)
 
 
+@pytest.mark.quick(2)
 @pytest.mark.parametrize("seed", range(1, 6))
 def test_things_keep_clear_of_furniture_and_of_each_other(seed: int) -> None:
     mutable = _dressed(seed)

@@ -34,6 +34,7 @@ def distances_m(item: Item) -> F64:
     return np.asarray(shapely.distance(walls, shapely.multipoints(corners)))
 
 
+@pytest.mark.quick(2)
 @pytest.mark.parametrize("kind", surroundings.KINDS)
 def test_things_stand_off_the_walls_and_are_no_objects(home: House, kind: str) -> None:
     after = with_surroundings(home, kind, 1)

@@ -138,6 +138,7 @@ def test_each_panel_covers_a_seventh_to_a_quarter_of_its_window_or_drapes_the_wa
     assert 0 < draped < seen
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("low", "high"),
     [
@@ -258,6 +259,7 @@ def test_a_drawn_rug_of_one_colour_gets_a_picture_that_covers_it_once() -> None:
         assert now.uvs.max() <= 1
 
 
+@pytest.mark.long
 def test_curtains_hang_clear_of_what_opens_towards_the_window() -> None:
     # A chest that looks at the window's wall; its drawers come to 5 cm before it.
     space = house_space(MutableHouse(_bare(), 1))

@@ -27,6 +27,7 @@ ALL = [
 ]
 
 
+@pytest.mark.quick(8)
 @pytest.mark.parametrize("pattern", ALL, ids=lambda p: f"{p.family} {p.variant}")
 def test_a_step_over_an_edge_is_no_larger_than_steps_inside(pattern: Pattern) -> None:
     colour = maps_of(pattern).colour.astype(float)
@@ -38,11 +39,13 @@ def test_a_step_over_an_edge_is_no_larger_than_steps_inside(pattern: Pattern) ->
         assert steps[-1] <= max(steps[:-1].max() * 1.05, np.median(steps) * 1.5)
 
 
+@pytest.mark.quick(8)
 @pytest.mark.parametrize("pattern", ALL, ids=lambda p: f"{p.family} {p.variant}")
 def test_the_size_of_a_pattern_is_known_before_it_is_painted(pattern: Pattern) -> None:
     assert size_of(pattern) == maps_of(pattern).size_m
 
 
+@pytest.mark.quick(4)
 @pytest.mark.parametrize("family", FAMILIES)
 def test_equal_patterns_give_equal_pixels_and_other_seeds_others(family: str) -> None:
     a, b, c = (families.maps_of(Pattern(family, s, GREEN, variant="20" if family == "tiles" else "stripes")) for s in (1, 1, 2))  # fmt: skip

@@ -25,6 +25,7 @@ def home(seed: int) -> tuple[Plan, tuple[PlacedPiece, ...]]:
     return drawn.plan, drawn.pieces
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_furnished_home_breaks_no_gate(seed: int) -> None:
     plan, pieces = home(seed)
@@ -40,6 +41,7 @@ def test_the_same_seed_gives_the_same_furniture() -> None:
     assert first == second
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_television_looks_at_the_sofa_from_two_to_three_and_a_half_metres(seed: int) -> None:
     _, pieces = home(seed)
@@ -52,6 +54,7 @@ def test_a_television_looks_at_the_sofa_from_two_to_three_and_a_half_metres(seed
         assert 1.9 <= ahead <= 3.8
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_wall_cabinets_hang_at_a_metre_forty_five_and_lamps_from_the_ceiling(seed: int) -> None:
     plan, pieces = home(seed)
@@ -71,6 +74,7 @@ def test_an_unknown_style_is_refused() -> None:
         furnished(plan, EMPTY, np.random.default_rng(1), "baroque")
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_every_cooker_has_its_hood_above(seed: int) -> None:
     _, pieces = home(seed)
@@ -81,6 +85,7 @@ def test_every_cooker_has_its_hood_above(seed: int) -> None:
         assert np.hypot(hood.x - cooker.x, hood.z - cooker.z) < 0.2
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_the_units_of_a_kitchen_have_their_backs_at_walls(seed: int) -> None:
     plan, pieces = home(seed)

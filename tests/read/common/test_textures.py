@@ -13,6 +13,7 @@ from pbrs_farm.read.common.material_library import (
     picture_with_alpha,
     texture_from_bytes,
 )
+from tests.hypothesis_profiles import examples
 from tests.read.small_houses import png
 
 KINDS = ["PNG", "JPEG", "GIF", "BMP", "TIFF", "WEBP"]
@@ -110,7 +111,7 @@ edits = st.lists(
 )
 
 
-@settings(max_examples=200, deadline=5000)
+@settings(max_examples=examples(200), deadline=5000)
 @given(st.sampled_from(KINDS), edits)
 def test_whatever_the_bytes_the_outcome_is_a_texture_or_a_value_error(
     kind: str, changes: list[tuple[int, bytes, int]]

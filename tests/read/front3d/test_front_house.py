@@ -32,6 +32,7 @@ def written(folder: Path, house: dict[str, Any]) -> Path:
     return path
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize("generation", files.GENERATIONS)
 def test_a_repaired_house_of_each_generation_leaks_no_ray_and_keeps_walls_and_openings(
     tmp_path: Path, generation: files.Generation

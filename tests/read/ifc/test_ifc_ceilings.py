@@ -41,6 +41,7 @@ def leaks_of(house: House) -> tuple[int, float]:
     return report.leaks.n_sky, report.leaks.closed_share
 
 
+@pytest.mark.quick(4)
 @pytest.mark.parametrize("is_box", [True, False])
 @pytest.mark.parametrize("how", ROOFS)
 def test_a_sloped_roof_is_the_ceiling_of_the_attic(tmp_path: Path, how: str, is_box: bool) -> None:
@@ -86,6 +87,7 @@ CEILINGS: dict[str, tuple[str, str, dict[str, Any]]] = {
 }
 
 
+@pytest.mark.quick(2)
 @pytest.mark.parametrize("how", CEILINGS)
 def test_a_room_is_as_high_as_the_ceiling_that_hangs_there(tmp_path: Path, how: str) -> None:
     entity, name, fields = CEILINGS[how]
@@ -102,6 +104,7 @@ def test_a_room_is_as_high_as_the_ceiling_that_hangs_there(tmp_path: Path, how: 
     assert leaks_of(house) == (0, 1.0)
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize("spaces", [True, False])
 @pytest.mark.parametrize(
     ("name", "fields"), [("Basic Roof:Flat", {}), ("S 3", {"PredefinedType": "FLOOR"})]

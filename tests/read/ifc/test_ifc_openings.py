@@ -134,6 +134,7 @@ NAMES = [
 ]
 
 
+@pytest.mark.quick(8)
 @pytest.mark.parametrize(("name", "sill", "height", "entity", "kind"), NAMES)
 @pytest.mark.parametrize("z", [0.0, 450.0])
 def test_names_and_sills_tell_doors_from_windows_that_an_exporter_mixed_up(

@@ -215,6 +215,7 @@ def test_ids_twice_cyclic_parents_and_names_that_lead_out_do_no_harm(tmp_path: P
     assert len(ids) == len(set(ids))
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize("what", ["walls", "slabs", "holes"])
 def test_more_walls_slabs_or_holes_than_a_home_has_are_refused(tmp_path: Path, what: str) -> None:
     scene = files.rent3d_like()

@@ -15,6 +15,7 @@ from pbrs_farm.core.house import House, Item, ItemKind, Surface
 from pbrs_farm.core.recipe import ReadFields, RepairFields
 from pbrs_farm.read.suncg.suncg_house import read_suncg
 from pbrs_farm.repair.repair_house import repair
+from tests.hypothesis_profiles import examples
 from tests.read.suncg import suncg_root
 from tests.read.suncg.suncg_root import HOUSE
 from tests.read.suncg.test_suncg_bad import outcome, paths_of, values
@@ -170,7 +171,7 @@ def test_a_v2_root_without_arch_json_says_what_is_missing(tmp_path: Path) -> Non
         read(tmp_path)
 
 
-@settings(max_examples=20, deadline=20_000, suppress_health_check=list(HealthCheck))
+@settings(max_examples=examples(20), deadline=20_000, suppress_health_check=list(HealthCheck))
 @given(st.sampled_from(paths_of(arch_json())), values)
 def test_any_value_anywhere_in_arch_json_gives_a_house_or_a_bad_house(
     tmp_path_factory: pytest.TempPathFactory, path: tuple[Any, ...], value: Any

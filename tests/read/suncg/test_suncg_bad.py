@@ -19,6 +19,7 @@ from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.formats.house_bundle import bundle_from_house
 from pbrs_farm.prepare.source import resolve
 from pbrs_farm.read.suncg.suncg_house import read_suncg
+from tests.hypothesis_profiles import examples
 from tests.read.suncg import suncg_root
 from tests.read.suncg.suncg_root import HOUSE
 
@@ -322,7 +323,7 @@ edits = st.lists(
 )
 
 
-@settings(max_examples=30, deadline=20_000, suppress_health_check=list(HealthCheck))
+@settings(max_examples=examples(30), deadline=20_000, suppress_health_check=list(HealthCheck))
 @given(edits)
 def test_whatever_the_bytes_the_outcome_is_a_house_or_a_bad_house(
     pristine: Path, changes: list[tuple[str, int, bytes, int]]
@@ -363,7 +364,7 @@ def paths_of(plain: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
 PATHS = paths_of(suncg_root.house_json())
 
 
-@settings(max_examples=30, deadline=20_000, suppress_health_check=list(HealthCheck))
+@settings(max_examples=examples(30), deadline=20_000, suppress_health_check=list(HealthCheck))
 @given(st.sampled_from(PATHS), values)
 def test_any_value_anywhere_in_house_json_gives_a_house_or_a_bad_house(
     pristine: Path, path: tuple[Any, ...], value: Any

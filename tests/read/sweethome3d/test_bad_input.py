@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import io
-import os
 import struct
 import zipfile
 import zlib
@@ -19,9 +18,10 @@ from pbrs_farm.core.house import House
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.read.sweethome3d.home import read_home
 from pbrs_farm.read.sweethome3d.svg_outlines import polygons_from_path
+from tests.hypothesis_profiles import examples
 from tests.read.sweethome3d.sh3d_source import BOX_OBJ, ROOM, WALLS, home_xml, piece, sh3d
 
-EXAMPLES = int(os.environ.get("PBRS_FUZZ", "50"))
+EXAMPLES = examples(50)
 LAMP = "<lightSource x='0.5' y='0.5' z='0.5' color='00FFFFFF' diameter='0.1'/>"
 DOOR = piece(
     "x='200' y='0' depth='20' height='200' cutOutShape='M0,0 v1 h1 v-1 z'", tag="doorOrWindow"

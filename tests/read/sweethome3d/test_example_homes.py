@@ -33,6 +33,7 @@ def example(name: str, fields: ReadFields | None = None) -> House:
     )
 
 
+@pytest.mark.quick(3)
 @pytest.mark.homes
 @pytest.mark.parametrize("name", NAMES)
 def test_an_example_home_is_read_whole(name: str) -> None:

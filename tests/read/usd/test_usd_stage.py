@@ -33,6 +33,7 @@ def item(house: House, name: str) -> Item:
     return next(i for i in house.items if i.name == name)
 
 
+@pytest.mark.quick(6)
 @pytest.mark.parametrize("suffix", ["usda", "usdc", "usd"])
 @pytest.mark.parametrize(("unit", "up"), [(1.0, "Z"), (0.01, "Z"), (1.0, "Y"), (0.0254, "Y")])
 def test_unit_and_axis_give_the_same_house(

@@ -34,6 +34,7 @@ from pbrs_farm.repair.lamps.ceiling_lamp import place_of_lamp
 from pbrs_farm.repair.lamps.lampshades import with_shades
 from pbrs_farm.repair.lamps.room_lighting import GivenLights, with_room_lighting
 from pbrs_farm.repair.structure.plan_geometry import polygon_of_room
+from tests.hypothesis_profiles import examples
 from tests.repair.embree import EmbreeOccluder
 
 FIELDS = RepairFields()
@@ -77,7 +78,7 @@ def test_the_bulb_has_the_sources_radius_where_there_is_room() -> None:
     assert area == pytest.approx(4 * np.pi * 0.03**2, rel=0.03)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=examples(20), deadline=None)
 @given(st.tuples(*[st.floats(-0.05, 0.05)] * 3), st.floats(0.01, 0.06))
 def test_the_bulb_touches_nothing_of_its_lamp(
     centre: tuple[float, float, float], radius: float

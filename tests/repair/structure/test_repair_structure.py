@@ -16,6 +16,7 @@ from pbrs_farm.geometry.solids import box
 from pbrs_farm.repair import RepairReport, repair
 from pbrs_farm.repair.structure.booleans import TagTable
 from pbrs_farm.repair.structure.walls import walls_from_house
+from tests.hypothesis_profiles import examples
 from tests.repair.embree import EmbreeOccluder
 from tests.repair.shells import (
     coinciding_share,
@@ -254,7 +255,7 @@ def test_no_light_passes_a_mitre_above_walls_that_end_below_the_ceiling() -> Non
     assert distance.max() < 0.02
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=examples(12), deadline=None)
 @example(angle=0.0, gaps=(0.0,) * 4, slack=0.03125, thickness=0.03125, lifts=(0.0, 0.03125))
 @example(
     angle=1.375, gaps=(0.0, 0.0, 0.015625, 0.0), slack=0.03125, thickness=0.03125, lifts=(0.0, 0.0)

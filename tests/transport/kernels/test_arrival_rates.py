@@ -97,6 +97,7 @@ def test_a_voxel_counts_with_the_26_around_it() -> None:
     assert near.sum() == 7 * 18
 
 
+@pytest.mark.long
 def test_a_trial_finds_that_no_ray_to_a_hidden_lamp_arrives(
     tried: tuple[LightScene, Camera],
 ) -> None:
@@ -129,6 +130,7 @@ def test_rates_let_more_of_fewer_shadow_rays_arrive(tried: tuple[LightScene, Cam
     assert arrived / cast > 1.1 * arrived_all / cast_all
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("are_random", [False, True])
 def test_rates_leave_the_mean_alone(tried: tuple[LightScene, Camera], are_random: bool) -> None:
     # Significance: 16 blocks of two groups, |z| < 4.5 each is missed by chance once in 4500 runs.

@@ -57,6 +57,7 @@ def test_no_more_light_leaves_than_arrives(model: tuple[float, ...], theta: floa
         assert weight.mean() == pytest.approx(model[0], rel=1e-4)
 
 
+@pytest.mark.quick(8)
 @pytest.mark.parametrize("model", MODELS)
 @pytest.mark.parametrize("theta", ANGLES)
 def test_samples_follow_the_pdf_they_name(model: tuple[float, ...], theta: float) -> None:

@@ -40,6 +40,7 @@ def unguided(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(guide, "_MAX_BOOST", 1.0)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "room", [hard_rooms.open_shade, pytest.param(hard_rooms.covered_cup, marks=pytest.mark.slow)]
 )
@@ -204,6 +205,7 @@ def test_a_lamp_is_chosen_as_often_as_its_pdf_says() -> None:
     assert inverse.mean() == pytest.approx(area_over_d2, rel=0.03)
 
 
+@pytest.mark.long
 def test_each_vertex_and_each_glass_has_random_numbers_of_its_own() -> None:
     import mitsuba as mi
 

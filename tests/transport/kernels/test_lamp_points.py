@@ -63,6 +63,7 @@ def test_every_point_of_a_ball_faces_the_vertex_and_lies_on_the_ball() -> None:
     assert radii.max() < 0.301
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("radius", [0.05, 0.4])
 def test_shadow_rays_to_the_near_side_leave_the_mean_alone_and_cut_the_noise(radius: float) -> None:
     # Significance: 16 blocks, |z| < 4.5 each is missed by chance once in 9000 runs.

@@ -44,6 +44,7 @@ def test_a_vast_home_has_no_more_voxels_than_fit() -> None:
     assert (shape * edge >= (900, 30, 700)).all()
 
 
+@pytest.mark.long
 def test_a_corner_that_is_nowhere_has_no_voxel() -> None:
     # Both a face that is left out of the light and corners of no face.
     surfaces = rooms.shell((4.0, 2.5, 4.0), 0, front=False)
@@ -94,6 +95,7 @@ def test_a_dim_sky_is_chosen_as_a_bright_one() -> None:
     np.testing.assert_allclose(rows[1], rows[0], atol=0.01)
 
 
+@pytest.mark.long
 def test_weights_by_place_leave_the_mean_alone_and_cut_the_noise(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -54,6 +54,7 @@ def test_a_ray_is_cast_by_what_it_is_expected_to_bring_and_one_in_ten_at_least()
         assert is_cast.numpy().mean() == pytest.approx(expected, abs=1e-3)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "room", [lambda: rooms.window_room(0.7, lumen=800), hard_rooms.covered_cup], ids=["sun", "cup"]
 )

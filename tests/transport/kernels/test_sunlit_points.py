@@ -101,6 +101,7 @@ def renders_by_chance(scene: LightScene, camera: Camera, fields: LightFields) ->
         return [scene.render(camera, "-", fields, seed) for seed in range(20, 28)]
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize(
     ("room", "most"),
     [(bare_room, 0.4), (hard_room, 0.8), (shiny_room, 0.44), (seen_all_round, 0.6)],
@@ -121,6 +122,7 @@ def test_sunlit_points_leave_the_mean_alone_and_cut_the_noise(
     assert noises[0] < most * noises[1]
 
 
+@pytest.mark.long
 def test_points_on_bumpy_coats_leave_the_mean_alone() -> None:
     # Significance: 16 blocks, |z| < 4.5 each is missed by chance once in 9000 runs.
     house, camera = bare_room()
@@ -205,6 +207,7 @@ def test_every_cell_that_points_are_said_to_come_from_has_sent_its_rays() -> Non
                 assert stands_for > 0.3 * area
 
 
+@pytest.mark.long
 def test_light_of_lamps_and_a_trial_beside_sunlit_points_leave_the_mean_alone(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -223,6 +226,7 @@ def test_light_of_lamps_and_a_trial_beside_sunlit_points_leave_the_mean_alone(
         assert np.abs(z_scores(*sums)).max() < 4.7
 
 
+@pytest.mark.long
 def test_points_count_from_the_length_of_path_on_that_they_stand_for() -> None:
     # Significance: 16 blocks, |z| < 4.5 each is missed by chance once in 9000 runs.
     house, camera = bare_room()
@@ -239,6 +243,7 @@ def test_points_count_from_the_length_of_path_on_that_they_stand_for() -> None:
     )
 
 
+@pytest.mark.long
 def test_another_view_in_between_changes_no_bit() -> None:
     house, camera = bare_room()
     scene = sunny(house)

@@ -33,6 +33,7 @@ METROPOLIS: LightFields = FIELDS.model_copy(
 )
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize("albedo", [0.3, 0.8])
 def test_a_furnace_room_has_the_radiance_of_the_geometric_series(albedo: float) -> None:
     house, camera = furnace(albedo)
@@ -127,6 +128,7 @@ def test_chains_that_share_nothing_splat_every_step(tail_pixels: int, min_segmen
     assert left == pytest.approx(4 * run.n_chains, rel=1e-3)
 
 
+@pytest.mark.long
 def test_another_size_of_picture_compiles_nothing() -> None:
     import drjit as dr
 
@@ -144,6 +146,7 @@ def test_another_size_of_picture_compiles_nothing() -> None:
     assert [k["operation_count"] for k in kernels if not k["cache_hit"]] == []
 
 
+@pytest.mark.long
 def test_the_rounds_of_a_launch_change_no_picture(monkeypatch: pytest.MonkeyPatch) -> None:
     from pbrs_farm.transport.metropolis import metropolis_view
 

@@ -127,6 +127,7 @@ def shaded_room() -> tuple[House, Camera]:
 
 
 # The tolerance of the mean is above 4 standard deviations of four pictures of each.
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("room", "tolerance"),
     [

@@ -169,6 +169,7 @@ def test_parquet_that_is_not_split_is_a_split_that_datasets_takes(root, tmp_path
     assert file["sha256"] == hashlib.sha256(data).hexdigest()
 
 
+@pytest.mark.long
 def test_the_card_says_what_is_true_of_the_root(tmp_path):
     home = small_home().set(**{"light.spp": 3})
     frames = pbrs_farm.render(home, home.cameras(n=2), modes=["mlt_il_ol"])
