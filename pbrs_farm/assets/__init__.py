@@ -1,1 +1,1 @@
-"""What is fetched to work with: example homes and skies, through Debian packages; effects: network, cache."""
+"""Downloads: example homes and skies, through Debian packages; effects: network, cache."""

@@ -30,9 +30,9 @@ APT_TIMEOUT_S: Final = 600  # of one download
 
 
 def cache_folder() -> Path:
-    """Where downloads and what was read of them are kept: $PBRS_CACHE, else ~/.cache/pbrs_farm.
+    """Folder for downloads and derived files: $PBRS_CACHE, else ~/.cache/pbrs_farm.
 
-    It may not exist yet. Everything in it can be deleted and is fetched or made again.
+    It may not exist yet. Everything in it can be deleted; it is downloaded or computed again.
     """
     given = os.environ.get("PBRS_CACHE", "")
     return Path(given) if given else Path.home() / ".cache" / "pbrs_farm"
@@ -46,13 +46,13 @@ class Deb:
     version: str
     path: Path  # of the .deb
     sha256: str  # of the .deb
-    note: str = ""  # what is odd about it
+    note: str = ""  # irregularities of the package
 
     def members(self, wanted: Callable[[str], bool]) -> dict[str, bytes]:
         """Path in the package -> bytes of every wanted file; MachineFailed if it is damaged.
 
-        wanted: asked with each path, without a leading "./". Held in memory: ask for what is
-        needed. The package is never installed and no script of it runs.
+        wanted: called with each path, without a leading "./". Files are held in memory: request only the
+        necessary ones. The package is never installed and no script of it runs.
         """
         try:
             for name, content in _ar_members(self.path.read_bytes()):
@@ -63,7 +63,7 @@ class Deb:
         raise self.damaged("holds no files")
 
     def damaged(self, why: str) -> MachineFailed:
-        """The error of a package that does not hold what it should."""
+        """The error for a package with missing or invalid contents."""
         return MachineFailed(f"{self.path}: {why}", hint="delete the file and fetch it again")
 
 
@@ -144,7 +144,7 @@ def _sha256(path: Path, size: int, mtime_ns: int) -> str:
         return held[0]
     with path.open("rb") as file:
         sha256 = hashlib.file_digest(file, "sha256").hexdigest()
-    with contextlib.suppress(OSError):  # a cache that cannot be written serves all the same
+    with contextlib.suppress(OSError):  # works without a writable cache
         write_whole(note, f"{sha256} {size} {mtime_ns}\n".encode())
     return sha256
 
@@ -168,10 +168,10 @@ def _download(package: str, scratch: Path) -> None:
 
 
 def write_whole(path: Path, data: bytes) -> None:
-    """Write a file of the cache so that it is there whole or not at all.
+    """Write a file of the cache atomically.
 
-    It is written beside its place and renamed: a process that dies leaves the former file, or none, and
-    two that write at once leave one of theirs.
+    It is written beside its place and renamed: a process that dies leaves the former file, or none, and of
+    two concurrent writers one wins.
     """
     with tempfile.NamedTemporaryFile(dir=path.parent, delete=False) as scratch:
         scratch.write(data)

@@ -25,7 +25,7 @@ class FurniturePackage:
     version: str
     deb_sha256: str
     libraries: tuple[Path, ...]  # .sh3f files, unpacked, in the cache
-    note: str = ""  # what is odd about it
+    note: str = ""  # irregularities of the package
 
 
 def cached(cache: Path | None = None) -> FurniturePackage | None:

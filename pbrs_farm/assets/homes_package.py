@@ -67,7 +67,7 @@ class Package:
     version: str
     deb_sha256: str
     jar: Path  # unpacked, in the cache
-    note: str = ""  # what is odd about it
+    note: str = ""  # irregularities of the package
 
     @property
     def label(self) -> str:
@@ -99,7 +99,7 @@ class JarResources:
         self._zip: zipfile.ZipFile | None = None
 
     def read(self, name: str) -> bytes | None:
-        """The content's bytes, or None if there is none of that name.
+        """The content's bytes, or None for an unknown name.
 
         name: path within the jar. The jar stays open for the next call.
         """

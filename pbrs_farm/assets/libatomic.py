@@ -49,7 +49,7 @@ def _package() -> Deb:
 
 
 def unpacked_library(deb: Deb) -> Path:
-    """The library of a package, beside it in the cache; MachineFailed where the package has none."""
+    """Unpack the library of a package beside it in the cache; MachineFailed if the package has none."""
     from pbrs_farm.assets.debian import write_whole
 
     library = deb.path.parent / f"{PACKAGE}-{deb.sha256[:16]}" / NAME

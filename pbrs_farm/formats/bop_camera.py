@@ -29,9 +29,9 @@ class _BopCamera(BaseModel):
 
 
 def camera_of_bop(path: Path) -> tuple[tuple[int, int], F64]:
-    """((width, height), K (3, 3)) of a camera.json; its K counts from the first pixel's centre.
+    """((width, height), K (3, 3)) of a camera.json; its K is relative to the first pixel's centre.
 
-    Raises BadInput, naming the file and the field, where it is none.
+    Raises BadInput, naming the file and the invalid field.
     """
     try:
         data = read_regular(path, MAX_TEXT_BYTES)

@@ -17,10 +17,10 @@ _RIGHT: Final = ("stereo", "right")  # the rig of --stereo, and its other camera
 
 
 def cameras_document(views: Iterable[View], report: Mapping[str, Any]) -> dict[str, Any]:
-    """What cameras.json says. report: why the other candidates were rejected, as JSON values.
+    """Contents of cameras.json. report: reasons for rejected candidates, as JSON values.
 
-    For a caller that adds to it or prints it; the step `cameras` writes `cameras_json`. The views
-    keep their order.
+    For callers that extend or print it; the step `cameras` writes `cameras_json`. The views keep their
+    order.
     """
     return {"views": [_json_of_view(view) for view in views], "report": report}
 
@@ -86,7 +86,7 @@ def _rig_place(row: Mapping[str, Any] | None) -> RigPlace | None:
 
 
 def _view_from_json(row: dict[str, Any]) -> View:
-    """The view that _json_of_view wrote; KeyError or ValueError when it is none."""
+    """Inverse of _json_of_view; KeyError or ValueError for any other value."""
     pose = np.array(row["world_from_camera_opengl"], np.float64)
     if pose.shape != (4, 4):
         raise ValueError(f"a pose has (4, 4) numbers, got {pose.shape}")
@@ -110,7 +110,7 @@ def _view_from_json(row: dict[str, Any]) -> View:
 def views_from_json(data: bytes, key: str) -> dict[str, View]:
     """View id -> view of a cameras.json, in its order.
 
-    Raises BadInput, naming the key, for a file that is damaged or that another version wrote.
+    Raises BadInput, naming the key, for a damaged file or another version's.
     """
     try:
         return {v["id"]: _view_from_json(v) for v in json.loads(data)["views"]}

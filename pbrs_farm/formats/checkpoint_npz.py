@@ -42,10 +42,10 @@ def checkpoint_npz(kept: KeptParts) -> bytes:
 
 
 def checkpoint_from_npz(data: bytes) -> KeptParts | None:
-    """What checkpoint_npz wrote; None where data is no such file.
+    """Inverse of checkpoint_npz; None for any other data.
 
-    Damage costs the work, not the run: a caller that gets None begins anew. Whether the checkpoint
-    belongs to the present work is not looked at here: compare `digest`.
+    Damage costs the work, not the run: a caller that gets None starts from the beginning. Whether the
+    checkpoint belongs to the current work is not tested here: compare `digest`.
     """
     try:
         with np.load(io.BytesIO(data), allow_pickle=False) as file:

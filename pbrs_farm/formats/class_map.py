@@ -1,4 +1,4 @@
-"""A user's own classes: a CSV table from what pbrs_farm knows of an instance to an id and a name.
+"""A user's class map: a CSV table from properties of an instance to an id and a name.
 
     from,id,name
     chair,1,seat
@@ -7,8 +7,8 @@
     wall,3,background
 
 Effect: reads the table. `from` is a class of NYU40, a kind of item, a source's class, or an item's
-name, where * ? and [] stand for letters as in a shell. The first row that fits an instance wins;
-what no row fits is 0.
+name, with the wildcards * ? and [] as in a shell. The first matching row wins; instances without a row
+get 0.
 """
 
 from __future__ import annotations
@@ -55,10 +55,10 @@ class ClassRule:
     name: str
 
     def fits(self, instance: Mapping[str, Any]) -> bool:
-        """Whether an instance of view.json (class, kind, source_class, name) is meant.
+        """True if an instance of view.json (class, kind, source_class, name) matches.
 
-        Case does not matter. A word with wildcards (`*`, `?`, `[`) is matched as a file name is,
-        against the names alone; a plain one must equal one of the fields.
+        Case-insensitive. A word with wildcards (`*`, `?`, `[`) is matched as a file name, against the names
+        alone; a plain one must equal one of the fields.
         """
         if _WILD.isdisjoint(self.word):
             return any(str(instance.get(f, "")).lower() == self.word for f in _FIELDS)
@@ -114,11 +114,11 @@ class ClassMap:
 
 
 def class_map(table: str | Path | ClassMap) -> ClassMap:
-    """The classes of a CSV file, or those that were read already.
+    """The classes of a CSV file, or of a map already read.
 
-    Raises BadInput, naming file and line, for a file that cannot be read, a missing column, an id
-    that is no whole number of 0..65535, an id with two names or a name with two ids, a `from` that
-    stands twice, and one that is a misspelt NYU40 class.
+    Raises BadInput, naming file and line, for an unreadable file, a missing column, an id that is not an
+    integer in 0..65535, an id with two names or a name with two ids, a repeated `from`, and a misspelt
+    NYU40 class.
     """
     if isinstance(table, ClassMap):
         return table
@@ -147,7 +147,7 @@ def class_map(table: str | Path | ClassMap) -> ClassMap:
 
 
 def _cells(path: Path) -> Iterator[tuple[int, dict[str, str]]]:
-    """Line and cells by column of each row; blank lines and those that begin with # are none."""
+    """Line and cells by column of each row; blank lines and those that begin with # are skipped."""
     text = text_given(path)
     lines = ["" if line.startswith("#") else line for line in text.splitlines()]
     reader = csv.reader(lines, strict=True)
@@ -203,7 +203,7 @@ def _table_row(path: Path, line: int, cells: dict[str, str]) -> ClassRule:
         raise BadInput(path, place, what, hint=f"at most {MAX_NAME} characters")
     known = (*NYU40_NAMES, *_KINDS)
     if _WILD.isdisjoint(word) and word not in known:
-        # A word that is nearly a class is a misspelt one; any other is a source's or an item's.
+        # A word similar to a class is a misspelt one; others are names of a source or an item.
         near = get_close_matches(word[:MAX_NAME], NYU40_NAMES, n=1, cutoff=_MISSPELT)
         if near:
             hint = f"{question(near)} a pattern such as {shown(word)}* says items of that name"

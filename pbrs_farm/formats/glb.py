@@ -46,7 +46,7 @@ class Gltf:
 
 
 class GlbWriter:
-    """Collects buffer views and accessors, then gives the GLB's bytes. State: what was added."""
+    """Collects buffer views and accessors, then returns the GLB's bytes. State: the parts added so far."""
 
     def __init__(self) -> None:
         self._binary = bytearray()  # the one buffer
@@ -70,9 +70,8 @@ class GlbWriter:
     def add_vertices(self, array: F32, *, with_bounds: bool = False) -> int:
         """Index of a new accessor over array (N, 2 or 3) float32, N >= 1.
 
-        with_bounds: for positions, of which glTF wants the least and greatest. Values are written
-        as they are: a number that is not finite must be refused before, since viewers reject the
-        file and `glb` raises on its bounds.
+        with_bounds: for positions, whose minimum and maximum glTF requires. Values are written unchecked:
+        reject non-finite numbers before, since viewers reject the file and `glb` raises on its bounds.
         """
         # Give bounds where glTF asks for them: of positions.
         accessor = {
@@ -104,11 +103,10 @@ class GlbWriter:
         return len(self._accessors) - 1
 
     def glb(self, document: dict[str, Any]) -> bytes:
-        """The file: document (empty lists dropped, as glTF asks) with buffers, and the binary.
+        """The file: document (without empty lists, as glTF requires) with buffers, and the binary.
 
-        document: glTF without accessors, bufferViews and buffers, which come from what was added.
-        Keys are sorted, so equal content gives equal bytes. Raises ValueError for a number that is
-        not finite.
+        document: glTF without accessors, bufferViews and buffers, which are generated. Keys are sorted, so
+        equal content gives equal bytes. Raises ValueError for a non-finite number.
         """
         # Chunks are padded to 4 bytes: JSON with spaces, the binary one with zeros.
         text = json.dumps(
@@ -121,10 +119,10 @@ class GlbWriter:
         return _MAGIC + struct.pack("<II", 2, 12 + len(chunks)) + chunks
 
     def gltf(self, document: dict[str, Any], file: str) -> Gltf:
-        """The same without writing it: what a file of another format shows.
+        """The same in memory, as a parsed document.
 
-        file: the name that messages about it carry. For readers of scenes that were put together in
-        memory: they take a Gltf, whatever its file was.
+        file: name for messages. For scenes assembled by readers of other formats: they take a Gltf, whatever
+        its file.
         """
         return Gltf(self._whole(document), (bytes(self._binary),), file)
 
@@ -180,8 +178,8 @@ def _chunks(data: bytes, length: int, file: str) -> dict[int, bytes]:
 def entry(gltf: Gltf, kind: str, index: Any) -> dict[str, Any]:
     """document[kind][index]; BadHouse if it does not exist.
 
-    index: whatever stands in the file, so of any type; a negative number, a bool or a word is no
-    index. Use it wherever a file of a stranger names another part of itself.
+    index: from the file, so of any type; a negative number, a bool or a word is invalid. Use it for every
+    reference inside an untrusted file.
     """
     entries = gltf.document.get(kind, [])
     fits = isinstance(entries, list) and isinstance(index, int) and not isinstance(index, bool)
@@ -194,8 +192,8 @@ def entry(gltf: Gltf, kind: str, index: Any) -> dict[str, Any]:
 def count(gltf: Gltf, holder: dict[str, Any], key: str, place: str, default: int = 0) -> int:
     """holder[key] as a count >= 0; BadHouse otherwise.
 
-    key missing: the default. A bool, a float or a negative number raises, too; place (as
-    "accessors[3]") and key say in the message where it stands.
+    A missing key gives the default. A bool, a float or a negative number raises too; place (as
+    "accessors[3]") and key locate it in the message.
     """
     value = holder.get(key, default)
     if not isinstance(value, int) or isinstance(value, bool) or value < 0:
@@ -221,7 +219,7 @@ def view_bytes(gltf: Gltf, index: Any) -> bytes:
 
 
 def accessor_array(gltf: Gltf, index: Any) -> NDArray[Any]:
-    """(count, components) array of accessor index in its own dtype, sparse values put in.
+    """(count, components) array of accessor index in its own dtype, with sparse values applied.
 
     Raises BadHouse for an accessor that is damaged or not of geometry.
     """
@@ -249,7 +247,7 @@ def accessor_array(gltf: Gltf, index: Any) -> NDArray[Any]:
     return np.ndarray((n, width), dtype, data, start, (stride, dtype.itemsize)).copy()
 
 
-_MOST_SPARSE: Final = 20_000_000  # elements of an accessor without data of its own
+_MOST_SPARSE: Final = 20_000_000  # maximum elements of an accessor without a buffer view
 
 
 def _sparse_array(
@@ -264,7 +262,7 @@ def _sparse_array(
     n, n_given = count(gltf, accessor, "count", place), count(gltf, sparse, "count", place)
     if n > _MOST_SPARSE or n_given > n:
         raise BadHouse(gltf.file, f"{place}.sparse", "has an impossible number of elements")
-    # Read both lists as accessors of their own.
+    # Read both lists as separate accessors.
     kinds = ("SCALAR", accessor.get("type"))
     types = (parts[0].get("componentType"), accessor.get("componentType"))
     rows = [

@@ -113,9 +113,9 @@ class ViewRecord(Record):
 
 
 def record_from_json(data: bytes, name: str) -> ViewRecord:
-    """The record in a histogram.json; BadInput naming the file when it is none.
+    """The record in a histogram.json; BadInput, naming the file, for any other content.
 
-    name: of the file, for the message alone. A record of another shape (an older version's, or cut
-    short) raises as well, with the advice to render the view again.
+    name: of the file, for the message. A record of another shape (an older version's, or cut short) raises
+    too, with the advice to render the view again.
     """
     return checked(ViewRecord, data, name, hint="render the view again")

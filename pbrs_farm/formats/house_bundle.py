@@ -70,7 +70,7 @@ def _json_of_item(item: Item, instance: int) -> dict[str, Any]:
     data = {
         name: json_from_value(getattr(item, name)) for name in Item.__slots__ if name != "surfaces"
     }
-    # What does not move says nothing of it.
+    # Items without joints have no such entries.
     if not item.joints:
         del data["joints"]
     data["surfaces"] = [
@@ -87,10 +87,10 @@ def _json_of_item(item: Item, instance: int) -> dict[str, Any]:
 
 
 def house_from_bundle(glb_data: bytes, json_data: bytes) -> House:
-    """The House of a bundle, as bundle_from_house was given it.
+    """The House of a bundle; inverse of bundle_from_house.
 
-    Raises BadHouse naming house.json or house.glb and the place that is damaged, and when the
-    two files do not belong together.
+    Raises BadHouse, naming house.json or house.glb and the damaged place, and if the two files do not
+    belong together.
     """
     data = json_from_bytes(json_data, "house.json")
     if not isinstance(data, dict) or data.get("format") != FORMAT:
@@ -116,7 +116,7 @@ def _dicts(data: dict[str, Any], key: str) -> list[dict[str, Any]]:
 
 
 def _item_with_arrays(gltf: glb.Gltf, item: dict[str, Any], index: int) -> dict[str, Any]:
-    # Nodes stand in the order of the items, primitives in that of the surfaces.
+    # Nodes are in the order of the items, primitives in that of the surfaces.
     node = glb.entry(gltf, "nodes", index)
     mesh = glb.entry(gltf, "meshes", node["mesh"]) if "mesh" in node else {}
     primitives = iter(_dicts(mesh, "primitives") if mesh else [])

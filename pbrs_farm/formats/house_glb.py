@@ -83,9 +83,9 @@ def gltf_asset(house: House) -> dict[str, Any]:
 
 
 def item_extras(item: Item, instance: int) -> dict[str, Any]:
-    """extras of an item's node: what it is.
+    """extras of an item's node: kind, class and properties.
 
-    instance: the item's id in instance.png, its number in the house plus one.
+    instance: the item's id in instance.png, its index in the house plus one.
     """
     return {
         "instance": instance,
@@ -99,12 +99,11 @@ def item_extras(item: Item, instance: int) -> dict[str, Any]:
 
 
 def primitive(writer: glb.GlbWriter, house: House, item: Item, s: Surface) -> dict[str, Any]:
-    """A surface as a primitive; BadHouse where a viewer could not open it.
+    """A surface as a primitive; BadHouse if viewers could not open it.
 
-    s: positions, normals and uvs are appended to the writer as they stand; v is turned over, since
-    glTF counts it from the top. A surface without faces becomes a cloud of points, so that its
-    vertices are not lost. BadHouse names item and surface for numbers that are not finite, faces
-    that name no vertex, and materials that do not exist.
+    s: positions, normals and uvs are appended to the writer unchanged, except that v is flipped, since glTF
+    counts it from the top. A surface without faces becomes a point cloud, to keep its vertices. BadHouse
+    names item and surface for non-finite numbers, invalid vertex indices, and unknown materials.
     """
     # Refuse what a viewer could not open.
     place = f"item {item.id}, surface {s.name}"
@@ -151,9 +150,8 @@ def write_textures(
 def gltf_material(material: Material, images: dict[str, int]) -> dict[str, Any]:
     """A material; images: texture id -> index of the glTF texture.
 
-    Colours become linear, as glTF wants them; the kind stands in "extras". Refraction, lamps' power
-    and what else glTF's core has no word for is left out, so a reader takes these from the extras
-    alone.
+    Colours become linear, as glTF requires; the kind is in "extras". Refraction, lamps' power and other
+    properties outside glTF's core are omitted; readers take them from the extras.
     """
     alpha, mode = _alpha(material)
     # Say what glTF knows of the material: colour, metal or not, roughness.

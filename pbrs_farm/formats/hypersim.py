@@ -25,7 +25,7 @@ CAMERAS_CSV: Final = "metadata_camera_parameters.csv"
 WIDTH_PX: Final = 1024
 HEIGHT_PX: Final = 768
 FOCAL_PX: Final = 886.8100134752651
-"""What readers take where they do not read CAMERAS_CSV: 60 degrees across 1024 pixels."""
+"""Default of readers that ignore CAMERAS_CSV: 60 degrees across 1024 pixels."""
 
 Z_UP_FROM_Y_UP: Final[F64] = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]], np.float64)
 """Its world from ours."""
@@ -109,7 +109,7 @@ def write_dataset(file: Path, array: NDArray[Any]) -> None:
 
 
 def read_dataset(file: Path) -> NDArray[Any]:
-    """The array of an HDF5 file's `dataset`; BadInput where it is none, MachineFailed without h5py."""
+    """The array of an HDF5 file's `dataset`; BadInput without one, MachineFailed without h5py."""
     h5py = _h5py()
     try:
         with h5py.File(file, "r") as opened:

@@ -24,7 +24,7 @@ class StoredFile(Record):
 
 
 class Marker(Record):
-    """What a step was done with and what it wrote; itself written last and if-absent."""
+    """Inputs and outputs of a finished step; written last and only if absent."""
 
     step: str
     house_id: str
@@ -45,10 +45,10 @@ class Marker(Record):
 
 
 def read_marker(store: Store, key: str) -> Marker | None:
-    """The marker at key, None if there is none: the step is not done.
+    """The marker at key; None if the step is not done.
 
-    The marker says which files a step wrote, with digests. Raises StoreFailed when it is damaged,
-    which is not the same as absent.
+    The marker lists the step's files with digests. Raises StoreFailed for a damaged marker, which is
+    different from an absent one.
     """
     data = get_or_none(store, key)
     try:
@@ -58,11 +58,10 @@ def read_marker(store: Store, key: str) -> Marker | None:
 
 
 def copy_done(of: Store, to: Store, key: str) -> Marker | None:
-    """Copy what a step made and its marker, which it gives, over what is there; None where there is none.
+    """Copy a step's files and its marker, which is returned, over existing ones; None without a marker.
 
-    key: of the marker; files come along under their own keys. The old marker in `to` is removed
-    first, so that a copy that is cut short does not look done. ObjectMissing where a file that the
-    marker names is gone.
+    key: of the marker; files keep their keys. The old marker in `to` is removed first, so that an
+    interrupted copy does not look finished. ObjectMissing if a file listed in the marker does not exist.
     """
     marker = read_marker(of, key)
     if marker is not None:

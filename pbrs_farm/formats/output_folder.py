@@ -1,4 +1,4 @@
-"""What lies in a finished output folder: its houses and views, as plain values. Effects: reads files.
+"""Houses and views of a finished output folder, as plain values. Effects: reads files.
 
 The layout is that of docs/formats.md; pictures themselves are not opened here.
 """
@@ -25,7 +25,7 @@ from pbrs_farm.store.object_store import LAYOUT
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RoomOutline:
-    """Where a room lies: its floor's polygon and height."""
+    """Floor polygon and height of a room."""
 
     polygon: Points2  # (N, 2) plan (x, z), metres, N >= 3
     floor_y: float  # world, metres
@@ -33,13 +33,13 @@ class RoomOutline:
 
 @dataclass(frozen=True, slots=True)
 class OutputHouse:
-    """A house of the folder; names and attribution can be shown and drawn as they stand."""
+    """A house of the folder; names and attribution are safe for display."""
 
     id: str
     name: str
     attribution: str  # the line to carry, or ""
     rooms: dict[str, str] = field(default_factory=dict)  # id -> name
-    outlines: dict[str, RoomOutline] = field(default_factory=dict)  # id -> where, if it is told
+    outlines: dict[str, RoomOutline] = field(default_factory=dict)  # by room id, if known
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +51,7 @@ class ViewEntry:
     room_id: str
     room_name: str
     folder: Path
-    facts: dict[str, Any] = field(default_factory=dict)  # view.json, {} where there is none yet
+    facts: dict[str, Any] = field(default_factory=dict)  # view.json, {} if not written yet
 
     def file(self, name: str) -> Path | None:
         """The view's file of that name, or None.

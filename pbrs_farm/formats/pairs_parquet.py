@@ -32,10 +32,10 @@ def pairs_parquet(rows: Sequence[Mapping[str, Any]]) -> bytes:
 
 
 def pairs_from_parquet(data: bytes, place: str) -> list[dict[str, Any]]:
-    """The rows that pairs_parquet wrote; BadInput names place when data is no such file.
+    """Inverse of pairs_parquet; BadInput names place for any other data.
 
-    Columns of a later version are passed over; one that is missing is an error. The table is held
-    in memory as dicts: for millions of pairs read the file with pyarrow instead.
+    Columns of a later version are ignored; a missing one is an error. The table is held in memory as dicts:
+    for millions of pairs read the file with pyarrow instead.
     """
     try:
         table = pq.read_table(io.BytesIO(data))

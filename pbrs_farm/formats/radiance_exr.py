@@ -45,10 +45,9 @@ class RadianceExr:
     place: str  # of the file, for messages
 
     def image(self, name: str) -> F32:
-        """(H, W, 3) float32 image of that name; BadInput when the file has none.
+        """(H, W, 3) float32 image of that name; BadInput if the file has none.
 
-        name: "outdoor", "indoor", "albedo", "normal" or "lamp<n>", as they were written. Built anew
-        on each call.
+        name: "outdoor", "indoor", "albedo", "normal" or "lamp<n>", as written. Built anew on each call.
         """
         try:
             return np.stack([self.planes[f"{name}.{c}"] for c in _channels(name)], -1)
@@ -57,9 +56,9 @@ class RadianceExr:
 
 
 def radiance_from_exr(data: bytes, place: str) -> RadianceExr:
-    """What radiance_exr wrote; BadInput names place when data is no EXR.
+    """Inverse of radiance_exr; BadInput names place for data that is not an EXR.
 
-    place: file name or key, for messages. All layers are decoded now; which of them there are is
-    seen when `image` asks for one.
+    place: file name or key, for messages. All layers are decoded at once; missing ones are reported by
+    `image`.
     """
     return RadianceExr(layers_from_exr(data, place), place)

@@ -1,6 +1,6 @@
-"""recipe.toml: a recipe as a file of one's own, for --recipe. Effects: reads a file.
+"""recipe.toml: a user's recipe file, for --recipe. Effects: reads a file.
 
-recipe = "fast"   # the recipe whose values hold where the file says nothing
+recipe = "fast"   # the base recipe, for values that the file does not set
 seed = 3
 
 [light]
@@ -55,14 +55,14 @@ def recipe_from_toml(path: Path, overrides: Mapping[str, str]) -> Recipe:
 
 
 def toml_from_recipe(recipe: Recipe) -> str:
-    """The recipe as a file that recipe_from_toml reads as the same values.
+    """The recipe as a file; inverse of recipe_from_toml.
 
-    Every value is written, also those that are the default of the recipe it starts from, so that a
-    later change of defaults does not change the file's meaning; what is not set is left out.
+    Every value is written, including defaults of its base recipe, so that a later change of defaults does
+    not change the file's meaning; unset values are omitted.
     """
     fields = recipe.model_dump(mode="json", exclude={"name"})
     lines = [f'recipe = "{recipe.name}"']
-    # Values of the recipe itself stand above its groups.
+    # Values of the recipe itself precede its groups.
     groups = {name: value for name, value in fields.items() if isinstance(value, dict)}
     lines += [
         f"{name} = {_toml(value)}"
@@ -71,13 +71,13 @@ def toml_from_recipe(recipe: Recipe) -> str:
     ]
     for name, values in groups.items():
         lines += ["", f"[{name}]"]
-        # TOML has no null: what is not set is left out.
+        # TOML has no null: omit unset values.
         lines += [f"{field} = {_toml(v)}" for field, v in values.items() if v is not None]
     return "\n".join(lines)
 
 
 def _toml(value: Any) -> str:
-    """A JSON value as TOML has it: tables inline, without what is not set."""
+    """A JSON value in TOML syntax: tables inline, without unset values."""
     if isinstance(value, dict):
         return "{" + ", ".join(f"{k} = {_toml(v)}" for k, v in value.items() if v is not None) + "}"
     if isinstance(value, list):

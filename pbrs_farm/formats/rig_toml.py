@@ -49,5 +49,5 @@ def rig_from_toml(path: Path) -> RigFields:
 
 
 def rig_from_table(fields: Mapping[str, Any], place: object) -> RigFields:
-    """The rig that the tables of such a file say; BadInput, naming place and key, where they are none."""
+    """The rig in the tables of such a file; BadInput, naming place and key, for invalid ones."""
     return checked(RigFields, dict(fields), place, hint="docs/motion/rigs.md")

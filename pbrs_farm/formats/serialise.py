@@ -119,9 +119,9 @@ _SCALARS: Final[dict[Any, CoreSchema]] = {
 
 
 def _schema(hint: Any, shape: tuple[int | None, ...] | None = None) -> CoreSchema:
-    """What pydantic checks a value of that type by; shape: of an array."""
+    """pydantic's schema for a type; shape: of an array."""
     origin, args = typing.get_origin(hint), typing.get_args(hint)
-    # Of Python 3.12 on numpy's NDArray is an alias by the `type` statement, which hides what it names.
+    # Since Python 3.12 numpy's NDArray is an alias by the `type` statement, which hides its target.
     if (aliased := getattr(origin, "__value__", None)) is not None:
         return _schema(aliased[args], shape)
     if origin is np.ndarray:
@@ -160,7 +160,7 @@ def _schema_of_dataclass(cls: Any) -> CoreSchema:
 def _array_from_json(
     dtype: Any, shape: tuple[int | None, ...] | None, data: Any
 ) -> np.ndarray[Any, Any]:
-    # Arrays from house.glb stand in the data already.
+    # Arrays from house.glb are in the data already.
     if isinstance(data, np.ndarray):
         if data.dtype != dtype:
             raise ValueError(f"expected {np.dtype(dtype)}, got {data.dtype}")

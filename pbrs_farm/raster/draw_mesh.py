@@ -68,9 +68,9 @@ def mesh_from_house(house: House) -> DrawMesh:
 
 
 def move_item(mesh: DrawMesh, instance: int, item: Item) -> slice:
-    """Put an item that has moved into the mesh, in place, and its boxes; the rows of vertices that are new.
+    """Update a moved item in the mesh, in place, with its boxes; returns the rows of changed vertices.
 
-    item: the one of that instance id when the mesh was made, moved rigidly part by part.
+    item: the item with that instance id, moved rigidly part by part.
     """
     draws = _draws_of_item(item)
     rows = slice(*mesh.item_first[instance - 1 : instance + 1].tolist())

@@ -58,7 +58,7 @@ def texture_from_pixels(context: Any, pixels: NDArray[np.uint8]) -> Any:
     pixels: sRGB bytes; without alpha it is opaque. Larger pictures than OpenGL must accept are
     thinned by whole steps, not filtered. Lives as long as the context: release both.
     """
-    # Take every n-th texel of what is larger than OpenGL must accept.
+    # Subsample textures larger than OpenGL's guaranteed limit.
     step = -(-max(pixels.shape[:2]) // _MAX_TEXTURE_PX)
     thinned = pixels[::step, ::step]
     rgba = np.full((*thinned.shape[:2], 4), 255, np.uint8)

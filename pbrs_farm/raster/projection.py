@@ -7,7 +7,7 @@ import numpy as np
 from pbrs_farm.core.arrays import F64, Bools, Matrix4
 from pbrs_farm.core.camera import Camera
 
-NEAR_PLANE_M = 0.02  # closer than any camera stands to a wall
+NEAR_PLANE_M = 0.02  # closer than any camera to a wall
 
 
 def clip_from_world(camera: Camera, far_m: float) -> Matrix4:
@@ -54,7 +54,7 @@ def boxes_in_view(clip: Matrix4, low: F64, high: F64) -> Bools:
     # Read the six planes off the clip matrix (Gribb and Hartmann 2001).
     planes = np.concatenate([clip[3] + clip[:3], clip[3] - clip[:3]])
     normal, offset = planes[:, :3], planes[:, 3]
-    # Test the corner of each box that lies farthest inwards.
+    # Test the innermost corner of each box.
     farthest = np.where(normal[:, None] > 0, high, low)
     return np.asarray((np.einsum("pk,pnk->pn", normal, farthest) + offset[:, None] >= 0).all(0))
 

@@ -99,7 +99,7 @@ class Rasterizer:
         self._textures = [uploaded.get(m.texture_id or "", white) for m in house.materials]
 
     def draw_house(self, house: House) -> None:
-        """Draw the house as it is at another time from now on: of what moved alone it uploads vertices.
+        """Draw the house at another time from now on; uploads only moved vertices.
 
         house: this renderer's own, whose items may have moved rigidly, part by part (geometry/moving.py).
         """
@@ -171,7 +171,7 @@ class Rasterizer:
         return np.rint(np.clip(srgb_from_linear(found), 0, 1) * 255).astype(np.uint8)
 
     def _render(self, camera: Camera, mode: str, forward: F64) -> Srgb8Image:
-        """forward (3,): where the headlight points; 0 = it stands at the eye."""
+        """forward (3,): direction of the headlight; 0 = at the eye."""
         with self._context:
             target = self._target(camera)
             clip = clip_from_world(camera, far_plane(camera, *self._boxes))

@@ -17,7 +17,7 @@ from pbrs_farm.raster.light_choice import SOFTENING_M
 DL_SCALE = 2 / 3  # a white wall that faces the headlight (0.5) and the key light (1) is just white
 IL_WHITE = 8.0  # w of OpenGL-IL's tone curve x (1 + x / w^2) / (1 + x) (Reinhard et al. 2002)
 IL_HEADLIGHT = 0.06  # faint headlight of OpenGL-IL: what no lamp reaches is dim, not black
-MAX_PANE_OPACITY = 0.08  # most that a window pane hides of what is behind it
+MAX_PANE_OPACITY = 0.08  # maximum opacity of a window pane
 PANE_MIRROR = 0.5  # share of the sky's colour in a pane's reflection
 GLASS_MIRROR = 0.7  # and in that of other glass
 _VERSION = "#version 330\n"
@@ -62,10 +62,10 @@ def _shader_source(name: str) -> str:
 
 
 class Feature(IntFlag):
-    """What a surface's shader must be able to do; the names are the shader's #defines.
+    """Capabilities of a surface's shader; the names are the shader's #defines.
 
-    A software renderer pays for every instruction of a shader at every pixel, so each combination of
-    features gets the smallest program that is right for it.
+    A software renderer pays for every shader instruction at every pixel, so each combination of features
+    gets the smallest correct program.
     """
 
     GLOSSY = 1  # a specular highlight

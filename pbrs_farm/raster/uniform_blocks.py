@@ -26,7 +26,7 @@ def _material_block(material: Material) -> list[float]:
     diffuse = linear_from_srgb(np.array(material.diffuse))
     specular = linear_from_srgb(np.array(material.specular))
     if material.is_metal:
-        diffuse = np.minimum(diffuse + specular, 1.0)  # nothing stands here for it to mirror
+        diffuse = np.minimum(diffuse + specular, 1.0)  # there is no environment to reflect
     emission = _EMISSION.get(material.kind, 0.0) * diffuse
     exponent = material.shininess if specular.any() else 0.0
     is_pane = material.kind is MaterialKind.PANE
@@ -59,8 +59,7 @@ def light_blocks(house: House, n_best: int) -> F32:
 def aligned_rows(rows: F32, alignment_bytes: int) -> F32:
     """Rows padded so that each starts at a multiple of alignment_bytes.
 
-    rows: (N, K) float32; alignment_bytes: what the driver asks of offsets, a multiple of 4. What is
-    added is 0.
+    rows: (N, K) float32; alignment_bytes: the driver's required alignment, a multiple of 4. Padding is 0.
     """
     step = -(-rows.shape[1] * 4 // alignment_bytes) * alignment_bytes // 4
     padded = np.zeros((len(rows), step), np.float32)

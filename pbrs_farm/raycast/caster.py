@@ -71,10 +71,10 @@ class Caster:
         return {}
 
     def at(self, geometry: Geometry, moving: Bools) -> Caster:
-        """The caster of the same faces at another time; what stands still is traced as one mesh, kept.
+        """A caster of the same faces at another time; static faces are traced as one shared mesh.
 
-        geometry: as this caster's own, but that vertices of the moving faces (F,) lie elsewhere by
-        rigid motions. Hits are those of a caster of that geometry, but for ties.
+        geometry: like this caster's own, except that vertices of the moving faces (F,) are moved rigidly. Hits
+        equal those of a caster of that geometry, except for ties.
         """
         other = copy.copy(self)
         other.geometry = geometry
@@ -164,7 +164,7 @@ class Caster:
         return self._without[1]
 
     def _tracer_of(self, keep: Bools) -> RayTracer | None:
-        """The tracer of the faces to keep (F,), None of none."""
+        """The tracer of the faces to keep (F,), None if there are none."""
         build = partial(_tracer, self.variant, self.geometry)
         if self._still is not None:
             build = partial(_tracer_of_both, self.variant, self.geometry, self._still)
@@ -191,7 +191,7 @@ def cut_outs_of_house(house: House) -> dict[int, CutOut]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _StillFaces:
-    """What stands still in a geometry, with tracers of it that were built."""
+    """Static faces of a geometry, with a cache of their tracers."""
 
     faces: Bools  # (F,)
     tracers: dict[bytes, RayTracer | None]  # by the faces kept of them
@@ -200,7 +200,7 @@ class _StillFaces:
 def _tracer_of_both(
     variant: str, geometry: Geometry, still: _StillFaces, keep: Bools
 ) -> RayTracer | None:
-    """The tracer of faces to keep, of which those that stand still may be in one that was built."""
+    """The tracer of faces to keep; static ones may share a cached tracer."""
     standing, moving = keep & still.faces, keep & ~still.faces
     key = np.packbits(standing).tobytes()
     if key not in still.tracers:
@@ -218,7 +218,7 @@ def _tracer(variant: str, geometry: Geometry, keep: Bools) -> RayTracer | None:
         return None
     # Collapse a face that must not be hit to a point, so that all others keep their number.
     faces = np.where(keep[:, None], geometry.faces, geometry.faces[np.argmax(keep), :1])
-    # Put what is not finite at the origin: Embree refuses such bounds.
+    # Move non-finite positions to the origin: Embree rejects such bounds.
     positions = np.where(np.isfinite(geometry.positions), geometry.positions, np.float32(0))
     build = ScalarTracer if variant.startswith("scalar") else JitTracer
     return build(variant, positions, faces)

@@ -19,7 +19,9 @@ from pbrs_farm.core.cutouts import CutOuts, faces_with_holes, pierced_holes
 from pbrs_farm.core.house import Geometry
 from pbrs_farm.raycast.tracer import RayTracer, counted_labels, faces_as_picture, rays_of_pixels
 
-_MOST_SHEETS: Final = 64  # with holes, that a ray passes: behind them it meets what is solid
+_MOST_SHEETS: Final = (
+    64  # maximum sheets with holes that a ray passes; after them only solid faces count
+)
 _STEP: Final = 4e-6  # behind a hole, of the largest coordinate plus 1 m: some 30 float32 steps
 _RAYS_AT_ONCE: Final = 1 << 20  # bounds the memory of counting
 
@@ -27,10 +29,10 @@ Build = Callable[[Bools], RayTracer | None]  # faces to keep (F,) -> their trace
 
 
 class CutOutTracer:
-    """The RayTracer of a mesh some of whose faces have holes.
+    """RayTracer of a mesh with cut-out faces.
 
-    What lies behind a hole is looked for among the solid faces from the ray's own origin, so that a
-    leaf that lies on a wall hides no part of it, and then sheet by sheet among the others.
+    Behind a hole, solid faces are traced from the ray's own origin, so that a leaf on a wall hides no part
+    of it, and the others sheet by sheet.
     """
 
     def __init__(self, geometry: Geometry, cut_outs: CutOuts, keep: Bools, build: Build) -> None:
@@ -71,7 +73,7 @@ class CutOutTracer:
             found = self._past_holes(
                 origins[rays], directions[rays], max_distance[rays], face[rays]
             )
-            # Keep the tracer's own distance of what is no hole.
+            # Keep the tracer's own distance for hits that are not holes.
             t[rays] = np.where(found[1] == face[rays], t[rays], found[0])
             face[rays] = found[1]
         return t, face
@@ -100,7 +102,7 @@ class CutOutTracer:
         return np.flatnonzero((face >= 0) & self._may_have_holes[face])
 
     def _past_holes(self, origins: F32, directions: F32, reach: F32, face: I32) -> tuple[F32, I32]:
-        """(N,) distance and face of the first hits that are no holes; face: what was met first."""
+        """(N,) distance and face of the first hits that are not holes; face: the first hits."""
         o, d = origins.astype(np.float64), directions.astype(np.float64)
         t, hole = pierced_holes(self._geometry, self._cut_outs, face, o, d)
         found_t, found = t.astype(np.float32), face.copy()
@@ -142,7 +144,7 @@ def _hits(tracer: RayTracer | None, origins: F32, directions: F32, reach: F32) -
 
 
 def _batches(cameras: Sequence[Camera], chosen: I64) -> Iterator[list[int]]:
-    """The chosen cameras by and by, as many as bound the rays of a launch."""
+    """The chosen cameras in batches that bound the rays of a launch."""
     batch: list[int] = []
     n_rays = 0
     for k in chosen.tolist():

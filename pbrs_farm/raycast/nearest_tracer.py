@@ -1,6 +1,6 @@
-"""Ray tracers of some faces of a mesh, and the nearer of two: what stands still is traced apart from what moves.
+"""Ray tracers of subsets of a mesh, and the nearer of two: static and moving faces are traced separately.
 
-Effects: holds the tracers that it asks.
+Effects: holds the tracers.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ Build = Callable[[F32, I32], RayTracer]  # positions (V, 3) and faces (F, 3) of 
 
 
 class PartTracer:
-    """The RayTracer of some faces of a geometry, as a mesh of their own; faces keep their numbers."""
+    """RayTracer of some faces of a geometry as a separate mesh; face indices are those of the geometry."""
 
     def __init__(self, geometry: Geometry, keep: Bools, build: Build) -> None:
         """keep: (F,) bool, at least one."""

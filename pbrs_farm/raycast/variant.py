@@ -1,7 +1,7 @@
-"""Choice of the Mitsuba variant that works on this machine, and of LLVM's library for it.
+"""Choice of a working Mitsuba variant for this machine, and of LLVM's library for it.
 
 Effects: sets DRJIT_LIBLLVM_PATH and Mitsuba's variant of this process, and loads the libraries that
-Dr.Jit and LLVM are linked with where the system has none.
+Dr.Jit and LLVM need if the system has none.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def _module(name: str) -> Any:
     try:
         return importlib.import_module(name)
     except (ImportError, NameError) as error:  # NameError: Dr.Jit without a library that it wants
-        load_libatomic()  # says what is missing, where that is it
+        load_libatomic()  # reports a missing library
         text = f"Mitsuba cannot be imported: {error}"
         raise MachineFailed(text, hint=mitsuba_command()) from error
 
@@ -102,10 +102,10 @@ def find_llvm() -> Path | None:
 
 @functools.cache
 def name_libraries() -> Path | None:
-    """Set DRJIT_LIBLLVM_PATH to what `find_llvm` finds, which is returned, and load what it needs.
+    """Set DRJIT_LIBLLVM_PATH to the result of `find_llvm`, which is returned, and load its dependencies.
 
-    Must come before anything imports drjit, which loads LLVM then and never again: a package whose
-    modules begin with `import drjit` calls it. What cannot be loaded is told by what needs it.
+    Must run before anything imports drjit, which loads LLVM once: a package whose modules begin with
+    `import drjit` calls it. A failed load is reported later, by the function that needs the library.
     """
     with contextlib.suppress(MachineFailed):
         load_libatomic()

@@ -34,7 +34,7 @@ class GivenCamera(BaseModel):
     up: Vector = (0.0, 1.0, 0.0)
     world_from_camera: Pose | None = None
     world_from_camera_opencv: Pose | None = None
-    room: str | None = None  # id of the room it belongs to; None = where it stands
+    room: str | None = None  # id of its room; None = the room at its position
     hfov_rad: Annotated[float, Field(gt=0, lt=3.1)] = PAPER_HFOV_RAD  # of the picture's width
     K: Annotated[tuple[Vector, Vector, Vector], exactly(3, "rows")] | None = None
     width_px: Annotated[int, Field(gt=0, le=16384)] | None = None  # of K's picture

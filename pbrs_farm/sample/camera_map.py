@@ -65,7 +65,7 @@ def camera_map_rgb(house: House, sampling: Sampling) -> NDArray[np.uint8]:
 def camera_map(house: House, sampling: Sampling) -> Drawing:
     """The map of a house's sampling; x of the world to the right, z down.
 
-    For other forms than SVG and pixels. Levels stand side by side.
+    For formats other than SVG and pixels. Levels are side by side.
     """
     marks, left, bottom = _levels_to_draw(house, sampling.views, sampling.traces)
     # Write the legend and the reasons to the right of the last level.

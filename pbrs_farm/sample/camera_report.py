@@ -32,7 +32,7 @@ class RoomReport(Record):
 
 
 class CameraReport(Record):
-    """What the sampler did with a house."""
+    """Report of the sampler on a house."""
 
     preset: str
     source: str
@@ -40,7 +40,7 @@ class CameraReport(Record):
     n_candidates: int
     refused: dict[str, int]
     rooms: tuple[RoomReport, ...]
-    notes: tuple[str, ...] = ()  # what is not about one sector
+    notes: tuple[str, ...] = ()  # notes that do not concern a single sector
 
     @property
     def why_none(self) -> str:
@@ -72,7 +72,7 @@ def total_rejected(rooms: tuple[RoomReport, ...]) -> dict[str, int]:
 
 
 class Verdict(IntEnum):
-    """What became of a candidate viewpoint: the first rule that rejected it, or its success.
+    """Outcome of a candidate viewpoint: the first rule that rejected it, or its success.
 
     The numbers are the order in which rules are tried; maps and reports use the label.
     """

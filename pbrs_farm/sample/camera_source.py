@@ -53,7 +53,7 @@ class Sampling:
 
 
 class HouseCaster(Protocol):
-    """The ray caster of a house, as far as sources of cameras use it."""
+    """The ray caster of a house, as used by camera sources."""
 
     @property
     def geometry(self) -> Geometry: ...

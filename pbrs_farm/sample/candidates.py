@@ -36,10 +36,10 @@ class Candidates:
         return len(self.sector)
 
     def cameras(self, which: NDArray[np.intp], intrinsics: Intrinsics) -> list[Camera]:
-        """The candidates numbered by which (M,), as cameras; intrinsics: those of zoom 1.
+        """The candidates with indices which (M,), as cameras; intrinsics: those of zoom 1.
 
-        In the order of which. Each has its own zoom and roll. A camera is an object: make those
-        that are looked at, not all.
+        In the order of which. Each has its own zoom and roll. Cameras are objects: create only those that are
+        needed.
         """
         plain = cameras_looking(
             intrinsics, self.eye[which], self.towards[which], roll=self.roll[which]

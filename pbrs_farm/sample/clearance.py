@@ -1,4 +1,4 @@
-"""Which points have a triangle within a distance of them: cameras keep clear of things; no effects."""
+"""Test points for triangles within a distance, to keep cameras clear of obstacles; no effects."""
 
 from __future__ import annotations
 
@@ -11,17 +11,16 @@ from pbrs_farm.core.arrays import F64, Bools
 from pbrs_farm.core.house import Geometry
 from pbrs_farm.core.mesh import distances_to_triangles
 
-_PAIRS: Final = 1 << 19  # distances computed at once: bounds memory
-_POINTS: Final = 1 << 12  # points asked of the tree at once
+_PAIRS: Final = 1 << 19  # distances per batch, to bound memory
+_POINTS: Final = 1 << 12  # points per query of the tree
 
 
 def near_any_triangle(points: F64, geometry: Geometry, distance_m: float) -> Bools:
-    """(N,) bool: a triangle comes within distance_m of the point (paper section 3.1: 10 cm).
+    """(N,) bool: a triangle is within distance_m of the point (paper section 3.1: 10 cm).
 
-    points: (N, 3) metres. geometry: the whole house's. Computed exactly, point to triangle,
-    in float64; triangles whose box lies farther away are left out by a tree over their plan
-    boxes, and pairs are taken in portions that bound memory. False everywhere for a distance
-    of 0 or less.
+    points: (N, 3) metres. geometry: the whole house's. Exact point-triangle distances in float64; distant
+    triangles are excluded by a tree over their plan boxes, and pairs are processed in batches. False
+    everywhere for a distance of 0 or less.
     """
     near = np.zeros(len(points), np.bool_)
     if distance_m <= 0 or not len(points) or not len(geometry.faces):
@@ -38,7 +37,7 @@ def near_any_triangle(points: F64, geometry: Geometry, distance_m: float) -> Boo
         y = part[point, 1]
         kept = (y >= low[triangle, 1]) & (y <= high[triangle, 1])
         point, triangle = point[kept], triangle[kept]
-        # Compute the exact distances of the pairs that are left.
+        # Compute the exact distances of the remaining pairs.
         for first in range(0, len(point), _PAIRS):
             i, t = point[first : first + _PAIRS], triangle[first : first + _PAIRS]
             near[start + i[distances_to_triangles(part[i], corners[t]) <= distance_m]] = True

@@ -68,7 +68,7 @@ class Drawing:
 
 
 def _draw_mark(root: Element, mark: Mark) -> None:
-    # Points are in pixels of the drawing; the first is where dots and text stand.
+    # Points are in pixels of the drawing; the first is the position of dots and text.
     x, y = (f"{value:.1f}" for value in mark.points[0])
     points = " ".join(f"{x:.1f},{y:.1f}" for x, y in mark.points)
     if mark.shape == "dot":

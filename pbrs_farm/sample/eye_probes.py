@@ -1,6 +1,6 @@
-"""Whether an eye hangs where no person's could: inside something, or not above a floor.
+"""Test for impossible eye positions: inside an object, or not above a floor.
 
-No effects of its own: it looks with the item counter it is given.
+No effects: it renders with the item counter it is given.
 """
 
 from __future__ import annotations
@@ -61,9 +61,9 @@ def count_items(
 
 
 def not_above_floor(house: House, eyes: F64, counter: ItemCounter) -> Bools:
-    """(N,) bool: straight below the eye (N, 3) the first thing is a wall or a ceiling.
+    """(N,) bool: the first surface straight below the eye (N, 3) is a wall or a ceiling.
 
-    So it is above a low or sloped ceiling, above a wall, or inside one.
+    Then the eye is above a low or sloped ceiling, above a wall, or inside one.
     """
     # Look straight down with one pixel.
     pencil = Intrinsics.from_hfov(1, 1, 1e-4)
@@ -77,9 +77,9 @@ def not_above_floor(house: House, eyes: F64, counter: ItemCounter) -> Bools:
 
 
 def _in_standing_wall(house: House, eyes: F64) -> Bools:
-    """(N,) bool: the eye (N, 3) is in a wall whose bottom lies in the floor's plane or above.
+    """(N,) bool: the eye (N, 3) is in a wall whose bottom is in the floor's plane or above.
 
-    Of two faces in one plane, which one a ray meets differs between processors: look no further.
+    Which of two coplanar faces a ray hits differs between processors, so both are accepted.
     """
     plan, inside = eyes[:, [0, 2]], np.zeros(len(eyes), np.bool_)
     floors = [s for item in house.items if item.kind is ItemKind.FLOOR for s in item.surfaces]

@@ -1,6 +1,6 @@
-"""Camera sampling of a house by the paper's rule (section 3.1); no effects of its own.
+"""Camera sampling of a house by the paper's rule (section 3.1); no effects.
 
-The pictures the rule needs come from a counter, an argument: pixels of each item in each camera.
+The counter, an argument, renders the pictures that the rule needs: pixels of each item in each camera.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ def sample_cameras(
             raise ValueError("the preset photo needs depth_of")
         photographer = PhotoSampler(house, fields, seed, counter, depth_of, geometry)
         return _photographed(photographer)
-    # Sample room by room: each has random numbers of its own.
+    # Sample room by room, each with separate random numbers.
     views: list[View] = []
     rooms: list[RoomReport] = []
     traces: list[RoomTrace] = []

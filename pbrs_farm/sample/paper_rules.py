@@ -1,4 +1,4 @@
-"""The paper's rules for where a camera may be (section 3.1); no effects of their own."""
+"""The paper's rules for camera positions (section 3.1); no effects."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from pbrs_farm.sample.candidates import Candidates, Grid
 from pbrs_farm.sample.clearance import near_any_triangle
 from pbrs_farm.sample.eye_probes import EnclosureLimits, ItemCounter, enclosed, not_above_floor
 
-_CHUNK = 4096  # candidates judged at once: bounds memory
+_CHUNK = 4096  # candidates per batch, to bound memory
 
 
 def room_grid(room: Room) -> Grid:

@@ -1,9 +1,9 @@
-"""Which candidates of a home become its views: good ones, no near-duplicates, together like photographs; no effects of its own.
+"""Choose a home's views among candidates: good, without near-duplicates, together like photographs; no effects.
 
-The views of a home maximise the sum of their scores, less what foreground and framing cost, less likeness times
-their number times the distance of their mean class shares to those of photographs: first sector
-by sector, the best first, then by exchange. That distance is the L1 distance of the mean NYU13 pixel shares of
-the views to those published of NYUv2's labelled frames (Silberman et al. 2012), unlabelled pixels left out of both.
+The views of a home maximise the sum of their scores, minus costs of foreground and framing, minus likeness times
+their number times the distance of their mean class shares to those of photographs: first sector by sector, the
+best first, then by exchange. That distance is the L1 distance of the views' mean NYU13 pixel shares to those
+published for NYUv2's labelled frames (Silberman et al. 2012), without unlabelled pixels.
 """
 
 from __future__ import annotations
@@ -38,13 +38,13 @@ MOST_OVERLAP: Final = 0.8
 """A view that shares more than this with a better one is its near-duplicate."""
 
 _TRIES: Final = 12
-"""Candidates of a sector that are tried, best first, before the sector stays without a view."""
+"""Candidates of a sector to try, best first, before it gets no view."""
 
 _ROUNDS: Final = 3
-"""How often every view may be exchanged for another of its sector."""
+"""Maximum exchanges of a view for another one of its sector."""
 
 MOST_WORSE: Final = 0.35
-"""By how much less than its sector's best a view may be worth that is taken for its likeness."""
+"""Maximum difference to its sector's best score for a view chosen by likeness."""
 
 _LIKELY_BY_SCORE: Final = 8
 """Candidates of a sector, best first, whose scores are worth knowing better whatever they add."""
@@ -56,8 +56,7 @@ _Name = tuple[str, int]
 def share_distance(shares: F64) -> F64:
     """(...) L1 distance, 0..2, of NYU13 shares (..., 14) to those of NYUv2's frames.
 
-    shares: means or sums over views, any scale; column 0 is left out. What shows nothing that has
-    a class is as far as can be.
+    shares: means or sums over views, any scale; column 0 is ignored. The maximum if no pixel has a class.
     """
     labelled = shares[..., 1:]
     total = labelled.sum(-1, keepdims=True)
@@ -83,7 +82,7 @@ class RoomCandidates:
     foreground: F64
 
     def worth(self, numbers: NDArray[np.intp]) -> F64:
-        """(M,) scores of candidates less what stands before their lens."""
+        """(M,) scores of candidates minus the cost of objects close to the lens."""
         return np.asarray(self.score[numbers] - self.foreground[numbers])
 
     def ranked(self, sector: int) -> NDArray[np.intp]:
@@ -157,7 +156,7 @@ class PhotoChoice:
             if len(ranked := scored.ranked(number))
         ]
         sectors.sort(key=lambda sector: -sector.scored.score[sector.candidates[0]])
-        # Give each its views, compared with those of all rooms that are taken already.
+        # Choose views for each, compared with those chosen in all rooms so far.
         with_view: set[str] = set()
         for sector in sectors:
             self._leave_out_low_scores(sector, is_first=sector.scored.room.id not in with_view)
@@ -189,7 +188,7 @@ class PhotoChoice:
         for _ in range(_TRIES * self.fields.per_sector):
             if len(sector.taken) == self.fields.per_sector or not len(left):
                 return
-            # Rank again after each: what a view adds depends on those that are taken.
+            # Rank again after each choice: a view's gain depends on those already chosen.
             order = np.argsort(-self._gain(sector.scored, left), kind="stable")
             sector.ahead.update(left[order[:_TRIES]].tolist())
             number, left = int(left[order[0]]), np.delete(left, order[0])
@@ -214,7 +213,7 @@ class PhotoChoice:
         return set(before) != set(sector.taken)
 
     def _gain(self, scored: RoomCandidates, numbers: NDArray[np.intp]) -> F64:
-        """(M,) what candidates would add to the views that are taken."""
+        """(M,) gain of adding each candidate to the chosen views."""
         worth = scored.worth(numbers)
         if self.fields.likeness == 0:
             return worth
@@ -242,7 +241,7 @@ class PhotoChoice:
         return any(self._is_alike(name, other) for other in self._taken)
 
     def _is_alike(self, name: _Name, other: _Name) -> bool:
-        # Every view that is taken was looked at before; rounds ask for the same pairs again.
+        # Every chosen view was compared before; later rounds repeat the same pairs.
         pair = frozenset((name, other))
         if pair not in self._are_alike:
             shared = overlap(*self.looked_at[name], *self.looked_at[other])

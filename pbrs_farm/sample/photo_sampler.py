@@ -1,8 +1,8 @@
-"""Views as a person would photograph a home: the preset `photo`; no effects of its own.
+"""Views as a person would photograph a home: the preset `photo`; no effects.
 
-Candidates are the paper's (one a grid cell and sector), held as people hold cameras. Each gets
-the score of photo_score.py from a tiny picture, and those that may be chosen a better one from a small
-picture; photo_choice.py chooses among those of all rooms.
+Candidates are the paper's (one per grid cell and sector), with hand-held poses. Each is scored by
+photo_score.py from a tiny picture, and the promising ones again from a small picture; photo_choice.py chooses
+among those of all rooms.
 """
 
 from __future__ import annotations
@@ -41,7 +41,9 @@ from pbrs_farm.sample.view_overlap import DEPTH_SIZE, DepthOf
 Size = tuple[int, int]  # width and height of a picture, px
 
 TINY: Final = 0.225  # of the edges of a small picture: a twentieth of its pixels
-_LEAST_TINY_PX: Final = 24  # edge of a picture that tells furniture from walls
+_LEAST_TINY_PX: Final = (
+    24  # minimum edge of a picture in which furniture and walls are distinguishable
+)
 _TINY_DEPTH_SIZE: Final = (DEPTH_SIZE[0] // 2, DEPTH_SIZE[1] // 2)
 
 
@@ -80,9 +82,9 @@ class PhotoSampler:
         return self._scored(placed, left, *self._first_sizes)
 
     def with_better_scores(self, rooms: Sequence[RoomCandidates]) -> list[RoomCandidates]:
-        """The candidates that may be chosen, scored anew from small pictures; no other has a score.
+        """Score the promising candidates again from small pictures; the others have no score.
 
-        rooms: all of the house at once, as room_candidates gives them.
+        rooms: all of the house at once, from room_candidates.
         """
         if self._first_sizes == self._sizes:
             return list(rooms)
@@ -99,7 +101,7 @@ class PhotoSampler:
         small = [camera.with_size(*depth_size) for camera in cameras]
         depth = self.depth_of(small)
         seen = self._shares(cameras, depth)
-        # By these near-duplicates are told.
+        # Used to find near-duplicates.
         if depth_size == DEPTH_SIZE:
             names = [(placed.room.id, int(k)) for k in which]
             self._looked_at |= dict(zip(names, zip(small, depth, strict=True), strict=True))
@@ -120,14 +122,14 @@ class PhotoSampler:
         return RoomCandidates(placed.room, candidates, verdict, score, nyu13, framing, foreground)
 
     def choose(self, rooms: Sequence[RoomCandidates]) -> dict[tuple[str, int], list[int]]:
-        """(room id, sector) -> numbers of the chosen candidates; writes their verdicts.
+        """(room id, sector) -> indices of the chosen candidates; writes their verdicts.
 
-        rooms: all of the house at once. A sector without a choice may be missing.
+        rooms: all of the house at once. Sectors without a choice may be missing.
         """
         lens = self._intrinsics(*DEPTH_SIZE)
         choice = PhotoChoice(self.fields, lens, self.depth_of, dict(self._looked_at))
         chosen = choice.choose(rooms)
-        # Count the pixels of furniture again at the size that scores are stored for, all views at once.
+        # Count the pixels of furniture again at the size of stored scores, for all views at once.
         f = self.fields
         full = self._intrinsics(f.score_width_px, f.score_height_px)
         by_room = {scored.room.id: scored for scored in rooms}
@@ -184,7 +186,7 @@ class PhotoSampler:
         return (width, height), _TINY_DEPTH_SIZE
 
     def _shares(self, cameras: list[Camera], depth: F32) -> PhotoShares:
-        """What pictures of these cameras show. depth: (N, H, W) small pictures of them."""
+        """Class shares in pictures of these cameras. depth: (N, H, W) small pictures of them."""
         rows = [part for _which, part in count_items(self.counter, cameras, self._n_items)]
         counts = np.concatenate([np.zeros((0, self._n_items + 1), np.uint32), *rows])
         flat = depth.reshape(len(cameras), depth.shape[1] * depth.shape[2])
@@ -197,7 +199,7 @@ class PhotoSampler:
 
 
 def sector_report(scored: RoomCandidates, sector: int, views: Sequence[View]) -> SectorReport:
-    """How many candidates of a sector each rule rejected, and its view.
+    """Number of candidates of a sector rejected by each rule, and its view.
 
     views: of this sector, in order of choice. Call it after `choose`, which writes the verdicts.
     """

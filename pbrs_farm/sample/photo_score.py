@@ -1,8 +1,8 @@
-"""How much a view looks like a photograph that someone would take of a room; no effects.
+"""Score of a view's likeness to a photograph that a person would take of a room; no effects.
 
-The paper's score (section 3.1) counts the pixels of all objects, doors and windows among them, and
-is highest close to one. People photograph furniture from across the room. The terms and their
-weights were fitted by eye on the example homes against the class shares of NYUv2's photographs.
+The paper's score (section 3.1) counts the pixels of all objects, including doors and windows, and is
+highest close to one. People photograph furniture from across the room. The terms and weights were
+fitted by eye on the example homes to the class shares of NYUv2's photographs.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ NO_FURNITURE: Final = (BLINDS, CURTAIN, OTHERSTRUCTURE)
 # Shares of the picture above which furniture and floor earn nothing more.
 MOST_FURNITURE: Final = 0.45
 MOST_FLOOR: Final = 0.08
-# What each object and class earns, and how many do.
+# Score per object and class, and the maximum number that counts.
 SCORE_OF_OBJECT, MOST_OBJECTS = 0.05, 8
 SCORE_OF_CLASS, MOST_CLASSES = 0.06, 8
 LEAST_CLASS_SHARE: Final = 0.005  # a class that covers less of the picture does not count as seen
@@ -48,7 +48,7 @@ FREE_OPENING, FRAMED_OPENING_COST = 0.06, 1.5
 
 
 class Foreground(NamedTuple):
-    """What stands before the lens: nearer than a distance, beyond a free share of the picture."""
+    """A cost for objects closer than a distance that cover more than a free share of the picture."""
 
     nearer_m: float
     free: float
@@ -61,12 +61,12 @@ FOREGROUND: Final = (
     # A corner of a table or the back of a chair leads into a room; half of one hides it.
     Foreground(nearer_m=0.9, free=0.05, cost=3.0),
 )
-"""Costs of what is near, all of which are paid."""
+"""Costs of close objects; all of them are added."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ItemRoles:
-    """What each instance id of a house is to a photographer; index 0 = nothing.
+    """Role of each instance id of a house in a photograph; index 0 = nothing.
 
     furniture, opening, wall, floor: (n_items + 1,) bool. nyu13: (n_items + 1,) int64 class.
     """
@@ -80,12 +80,12 @@ class ItemRoles:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PhotoShares:
-    """What N pictures show, as shares of the picture; each array (N,) but for the last two.
+    """Contents of N pictures, as shares of the picture; each array (N,) except for the last two.
 
-    largest: of the one largest piece of furniture. wall: of the largest wall. n_objects: pieces
-    that cover the least share. n_classes: NYU13 classes seen. median_m: median planar depth.
-    foreground: (N, K) of what is nearer than each row of FOREGROUND says. nyu13: (N, 14) of each class,
-    column 0 of what has none.
+    largest: of the largest piece of furniture. wall: of the largest wall. n_objects: pieces that cover the
+    minimum share. n_classes: visible NYU13 classes. median_m: median planar depth. foreground: (N, K) of
+    objects closer than each row of FOREGROUND. nyu13: (N, 14) of each class, column 0 of unclassified
+    pixels.
     """
 
     furniture: F64
@@ -118,10 +118,10 @@ def item_roles(house: House) -> ItemRoles:
 def photo_shares(
     counts: NDArray[np.uint32], depth_m: F32, roles: ItemRoles, least: float
 ) -> PhotoShares:
-    """What each picture shows.
+    """Contents of each picture.
 
-    counts: (N, n_items + 1) pixels of each instance. depth_m: (N, K) planar depth at K pixels
-    spread over the picture, 0 = nothing. least: the share of the picture that makes an object.
+    counts: (N, n_items + 1) pixels of each instance. depth_m: (N, K) planar depth at K pixels spread over
+    the picture, 0 = nothing. least: minimum share of the picture for an object.
     """
     # Turn pixels into shares, of instances and of classes.
     pixels = np.maximum(counts.sum(1, dtype=np.int64), 1)
@@ -148,8 +148,8 @@ def photo_shares(
 
 
 def _median_depth(depth_m: F32) -> F64:
-    """(N,) median of what is not nothing in each row; 0 where all is."""
-    # Sort all rows at once, nothing last: nanmedian takes them one by one.
+    """(N,) median of the nonzero values in each row; 0 without any."""
+    # Sort all rows at once, zeros last: nanmedian processes them one by one.
     n_seen = (depth_m > 0).sum(1)
     ordered = np.sort(np.where(depth_m > 0, depth_m, np.float32(np.inf)), axis=1)
     some = np.flatnonzero(n_seen)
@@ -160,11 +160,11 @@ def _median_depth(depth_m: F32) -> F64:
 
 
 def photo_score(seen: PhotoShares) -> F64:
-    """(N,) score: furniture, things and classes count; doors, close-ups and bare walls cost.
+    """(N,) score: furniture, items and classes count; doors, close-ups and bare walls cost.
 
-    Shares are of the picture, distances metres. Only differences count: zero says nothing.
+    Shares are of the picture, distances metres. Only differences matter: zero has no meaning.
     """
-    # Reward what people photograph, up to what is enough.
+    # Reward typical subjects of photographs, up to a maximum.
     score = np.minimum(seen.furniture, MOST_FURNITURE)
     score += SCORE_OF_OBJECT * np.minimum(seen.n_objects, MOST_OBJECTS)
     score += SCORE_OF_CLASS * np.minimum(seen.n_classes, MOST_CLASSES)
@@ -192,9 +192,9 @@ def framing_cost(seen: PhotoShares, tilt_deg: F64) -> F64:
 
 
 def foreground_cost(seen: PhotoShares) -> F64:
-    """(N,) what the things before the lens cost, of which FOREGROUND has the prices.
+    """(N,) total cost of objects close to the lens, by the prices in FOREGROUND.
 
-    A view pays it against others of its sector; none is left out for it.
+    It is subtracted from a view's score; no view is excluded for it.
     """
     nearer = zip(FOREGROUND, seen.foreground.T, strict=True)
     costs = [f.cost * np.maximum(share - f.free, 0) for f, share in nearer]

@@ -61,10 +61,10 @@ def rejections(
 def viewpoint_mask(house: House, room: Room, clearance_m: float) -> tuple[Bools, Bools, float]:
     """(floor, allowed, cell): bool grids (n_z, n_x) of nodes every cell metres over room_grid.
 
-    Floor: under it lies the room's floor. Allowed: floor without the plan projection of any
-    triangle between floor top and ceiling bottom, of walls, this room's objects and loose boxes
-    (triangles that reach over the grid's edge are passed over, as they were); eroded by the
-    clearance when it is above 0. A grid under 3 nodes a side allows nothing.
+    Floor: above the room's floor. Allowed: floor without the plan projection of any triangle between floor
+    top and ceiling bottom, of walls, this room's objects and loose boxes (triangles across the grid's edge
+    are skipped, as in the original); eroded by a positive clearance. A grid under 3 nodes a side allows
+    nothing.
     """
     grid = room_grid(house, room)
     # Lay the nodes over the box of the room and its objects.
@@ -74,7 +74,7 @@ def viewpoint_mask(house: House, room: Room, clearance_m: float) -> tuple[Bools,
     nodes = np.stack(np.meshgrid(xs, zs), axis=-1).reshape(-1, 2)
     shape = (len(zs), len(xs))
 
-    # Find the floor: where the room's own floor lies, else its polygon.
+    # Area of the room's own floor, else its polygon.
     floors = [i for i in _items_of(house, room) if i.kind is ItemKind.FLOOR]
     ceilings = [i for i in _items_of(house, room) if i.kind is ItemKind.CEILING]
     floor_top = max((i.bounds[1, 1] for i in floors), default=room.floor_y)
@@ -120,10 +120,10 @@ def _triangles(items: list[Item]) -> F64:
 
 
 def _plan_shapes(triangles: F64) -> NDArray[np.object_]:
-    """Plan projections (x, z): triangles, or lines where they stand upright."""
+    """Plan projections (x, z): triangles, or lines for vertical ones."""
     plan = triangles[:, :, [0, 2]]
     e, f = plan[:, 1] - plan[:, 0], plan[:, 2] - plan[:, 0]
-    # Draw triangles that stand upright as lines.
+    # Draw vertical triangles as lines.
     upright = np.abs(e[:, 0] * f[:, 1] - e[:, 1] * f[:, 0]) < 1e-9
     ring = plan[:, [0, 1, 2, 0]]
     shapes = np.empty(len(plan), np.object_)

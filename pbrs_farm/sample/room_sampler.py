@@ -1,6 +1,6 @@
 """One room's views: candidates, the rules that reject them, the best of each sector.
 
-No effects of its own: pictures come from the counter it is given.
+No effects: the counter that it is given renders the pictures.
 """
 
 from __future__ import annotations
@@ -113,7 +113,7 @@ class RoomSampler:
         coarse, share, image_verdicts = self._coarse(candidates, eligible)
         chosen = self._chosen(coarse, share, full)
 
-        # Judge by the full-size picture what has one, by the coarse picture what has not.
+        # Judge by the full-size picture if there is one, else by the coarse one.
         for k, rows in full.counts.items():
             image_verdicts[k] = self._image_verdicts(rows[None])[0]
         image_verdicts[chosen] = Verdict.WINNER

@@ -1,8 +1,7 @@
-"""The best view of a sector: coarse pictures first, finalists again at full size; no effects of its own.
+"""The best view of a sector: coarse pictures first, finalists again at full size; no effects.
 
-A candidate is rescored while its coarse score, with the margin a coarse picture can be wrong
-by, could still beat the best full one; so the answer is that of scoring all at full size
-wherever the margin holds.
+A candidate is rescored while its coarse score, plus the error margin of a coarse picture, could beat
+the best full score; so the result equals that of scoring all at full size wherever the margin holds.
 """
 
 from __future__ import annotations
@@ -45,7 +44,7 @@ class FullScores:
     counts: dict[int, NDArray[np.uint32]] = field(default_factory=dict)  # pixels of each item
 
     def rescore_new(self, candidates: NDArray[np.intp]) -> None:
-        """Score these candidates at full size, unless that was done."""
+        """Score these candidates at full size, unless done already."""
         new = np.array([c for c in candidates.tolist() if c not in self.score], np.intp)
         if not len(new):
             return
@@ -99,7 +98,7 @@ def next_diverse(
     share: (N, n_objects) part of the coarse picture each object covers. Greedy: first by objects
     newly seen, then by how much more of every object is seen than in the best chosen view.
     """
-    # Rank by objects newly seen, then by what is seen larger than before.
+    # Rank by newly visible objects, then by objects larger than before.
     seen = share[chosen].max(0)
     new_objects = ((share >= min_fraction) & (seen < min_fraction)).sum(1)
     gain = np.maximum(share - seen, 0).sum(1)

@@ -17,19 +17,19 @@ from pbrs_farm.geometry.plan_surfaces import room_shape
 from pbrs_farm.sample.eye_probes import ItemCounter, count_items
 from pbrs_farm.sample.view_score import object_columns
 
-OUTSIDE = "out"  # room id in the views of cameras that stand in no room
+OUTSIDE = "out"  # room id in the views of cameras outside all rooms
 
 
 def stored_views(
     house: House, fields: CameraFields, counter: ItemCounter
 ) -> tuple[tuple[View, ...], tuple[str, ...]]:
-    """The cameras kept in the house's source as views, and notes on those that were left out.
+    """The cameras in the house's source as views, and notes on omitted ones.
 
-    They keep their own field of view and no rule is applied. Raises nothing.
+    They keep their own field of view, and no rule is applied. Raises nothing.
     """
     cameras, notes = [], []
     for stored in house.cameras:
-        # Leave out poses that are no numbers, look nowhere, or see too wide.
+        # Skip poses with non-finite numbers, no direction, or too wide a field of view.
         numbers = np.concatenate([stored.eye, stored.towards, [stored.hfov_rad]])
         usable = np.isfinite(numbers).all() and np.linalg.norm(stored.towards) > 0
         if not usable or not 0 < stored.hfov_rad < math.pi:
@@ -56,10 +56,9 @@ def views_from_cameras(
 ) -> tuple[View, ...]:
     """Each camera as a view of its room, scored like a sampled one.
 
-    cameras: each with the id of the room that its name says, a published one's for instance; where
-    that is None or unknown it is the room the camera stands in.
-    Ids are `<room>_<sector>_<k>`, k counting the cameras of a room and sector; the room is "out"
-    for a camera in none.
+    cameras: each with the id of the room in its name, as for published ones; if that is None or unknown,
+    the room at the camera's position. Ids are `<room>_<sector>_<k>`, k counting the cameras of a room and
+    sector; the room is "out" for a camera outside all rooms.
     """
     columns = object_columns(house)
     views: list[View] = []

@@ -1,6 +1,6 @@
-"""How much two views show the same surfaces, by reprojection of one's pixels into the other; no effects.
+"""Overlap of two views, by reprojection of one's pixels into the other; no effects.
 
-Pictures of 32 x 24 pixels are enough: near-duplicates differ by far less than the threshold.
+Pictures of 32 x 24 pixels suffice: near-duplicates differ by far less than the threshold.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def shared_part(a: Camera, depth_a: F32, b: Camera, depth_b: F32) -> float:
     row = np.floor(i.cy - i.fy * camera[:, 1] / z).astype(np.int64)
     inside = (column >= 0) & (column < i.width_px) & (row >= 0) & (row < i.height_px)
 
-    # A point is seen where nothing stands before it.
+    # A point is visible if no surface is in front of it.
     there = depth_b[row[inside], column[inside]]
     seen = np.abs(there - z[inside]) <= TOLERANCE * z[inside]
     return float(seen.sum() / len(points))

@@ -81,10 +81,10 @@ def overfill(counts: NDArray[np.uint32], columns: NDArray[np.intp], fields: Came
 def released_score(
     counts: NDArray[np.uint32], columns: NDArray[np.intp], fields: CameraFields
 ) -> Scored:
-    """What the published sampler computed: the sum of ln(n // least), an integer division.
+    """Score of the published sampler: the sum of ln(n // least), an integer division.
 
-    least = floor(min_object_fraction * pixels). Objects need strictly more than it, and a view
-    needs min_objects of them (4: its code asks for more than 3), else it scores 0.
+    least = floor(min_object_fraction * pixels). Objects need strictly more than it, and a view needs
+    min_objects of them (4: its code asks for more than 3), else it scores 0.
     """
     pixels = int(counts[0].sum()) if len(counts) else 0
     least = max(1, int(fields.min_object_fraction * pixels))

@@ -31,7 +31,7 @@ def numbered_joints(house: House) -> list[tuple[int, Item, Joint]]:
 
 
 def part_label(hit: HitRecord, house: House, geometry: Geometry) -> NDArray[np.uint16]:
-    """(H, W) id of the part that is seen, as numbered_joints counts; 0 where nothing moves."""
+    """(H, W) id of the visible part, as in numbered_joints; 0 for static surfaces."""
     if not len(geometry.faces):
         return np.zeros(hit.face.shape, np.uint16)
     number = {
@@ -46,10 +46,10 @@ def part_label(hit: HitRecord, house: House, geometry: Geometry) -> NDArray[np.u
 
 
 def articulation_table(parts: NDArray[np.uint16], house: House, camera: Camera) -> dict[str, Any]:
-    """What articulation.json says of a view: a row for each part that its layer `part` shows.
+    """Contents of a view's articulation.json: a row for each part in its layer `part`.
 
     Axes and points on them are in the camera's frame with OpenCV's axes (x right, y down, z forward),
-    metres; values and limits are radians or metres from shut.
+    metres; values and limits are radians or metres from closed.
     """
     world_from_camera = opencv_world_from_camera(camera.world_from_camera)
     turn, eye = world_from_camera[:3, :3], world_from_camera[:3, 3]
@@ -73,10 +73,10 @@ def articulation_table(parts: NDArray[np.uint16], house: House, camera: Camera) 
 
 
 def motion_table(house: House, time_s: float) -> dict[str, Any]:
-    """What view.json says of a home in which things move: of each that does, where it is.
+    """Poses of moving items, for view.json.
 
-    house: at that time, seconds. Joints have their values, radians or metres from shut; whole items
-    a (4, 4) matrix from where house.glb has them to where they are, world axes, metres.
+    house: at that time, seconds. Joints have their values, radians or metres from closed; whole items a
+    (4, 4) matrix from their pose in house.glb to the current one, world axes, metres.
     """
     instance = {item.id: k for k, item in enumerate(house.items, 1)}
     joints, bodies = [], []

@@ -90,7 +90,9 @@ def _is_gap(hit: HitRecord, rays: F32, first: tuple[slice, ...], second: tuple[s
     miss_second, miss_first = _plane_miss(*ends), _plane_miss(*ends[::-1])
     # Drop steps that a plane explains: the surface goes on, seen at a grazing angle.
     near = np.minimum(np.abs(miss_first), np.abs(miss_second)) <= threshold[asked]
-    # Drop corners: both planes beyond what is seen, or both before it, meet between the pixels.
+    # Drop corners: if both planes are behind the visible surface, or both in front, they meet
+    # between the
+    # pixels.
     meet = (miss_first > 0) == (miss_second > 0)
     gap[asked] = ~(near | meet)
     return gap
@@ -100,7 +102,7 @@ _End = tuple[F32, F32, F32]
 
 
 def _plane_miss(at: _End, other: _End) -> F32:
-    """(N,) how far the other's depth lies from the tangent plane here; an end: normal, depth, ray."""
+    """(N,) distance of the other depth from the tangent plane here; an end: normal, depth, ray."""
     normal, depth, ray = at
     # Intersect the other pixel's ray with this pixel's plane n x = n (depth ray).
     with np.errstate(divide="ignore", invalid="ignore"):

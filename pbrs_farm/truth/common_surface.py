@@ -1,4 +1,4 @@
-"""How much of what one view shows another one shows too, for each pair of views of a room; no effects of its own."""
+"""Share of one view's surface visible in another one, for each pair of views of a room; no effects."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from pbrs_farm.core.camera import View
 from pbrs_farm.truth.optical_flow import inside_picture, project_points, reaches
 
 POINTS_SIZE: Final = (32, 24)
-"""Width and height of the grid of rays whose ends stand for what a view shows."""
+"""Width and height of the grid of rays that samples a view's surface."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,9 +48,9 @@ def pair_rows(views: Sequence[View], first_hit: FirstHit) -> list[ViewPairRow]:
 
 
 def shared_surface(views: Sequence[View], first_hit: FirstHit) -> F64:
-    """(N, N) share of the surface points of view a that view b sees; 0 where a shows nothing.
+    """(N, N) share of the surface points of view a visible in view b; 0 if a shows nothing.
 
-    A point is seen that lies in b's picture and that a ray from b's eye reaches.
+    A point is visible if it is inside b's picture and a ray from b's eye reaches it.
     """
     shares = np.eye(len(views))
     small = [view.camera.with_size(*POINTS_SIZE) for view in views]

@@ -1,8 +1,8 @@
 """An item's unoccluded mask: the pixels it would cover if it were alone; no effects.
 
-Exact at pixel centres: a ray through the eye meets a triangle where it lies on the same side of
-the three planes through the eye and the triangle's edges (Olano and Greer 1997), so nothing is
-clipped and nothing is divided by depth. On one row of pixels that is an interval.
+Exact at pixel centres: a ray through the eye hits a triangle if it is on the same side of the three
+planes through the eye and the triangle's edges (Olano and Greer 1997), so nothing is clipped or divided
+by depth. On one row of pixels that is an interval.
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ from pbrs_farm.core.cutouts import CutOut, CutOuts
 from pbrs_farm.core.house import Item, Surface
 from pbrs_farm.core.mesh import cross_products, finite_triangles, triangle_bounds
 
-_CHUNK_ROWS = 500_000  # row intervals handled at once: bounds memory on large meshes
+_CHUNK_ROWS = 500_000  # row intervals per batch, to bound memory on large meshes
 _CHUNK_PIXELS = 500_000  # and pixels of surfaces with holes
 
 
 def coverage(item: Item, camera: Camera, cut_outs: CutOuts | None = None) -> Mask:
-    """(H, W) bool: the ray through the pixel's centre meets any triangle of item, where it has no hole.
+    """(H, W) bool: the ray through the pixel's centre hits a triangle of item outside of holes.
 
-    cut_outs: of the house's materials. Exact for a pin-hole; of another lens, by pin-hole pictures
-    that are finer than its own.
+    cut_outs: of the house's materials. Exact for a pinhole; other lenses are approximated by finer pinhole
+    pictures.
     """
     holes = cut_outs or {}
     if camera.intrinsics.lens.is_pinhole:
@@ -58,7 +58,7 @@ def _pinhole_coverage(item: Item, camera: Camera, cut_outs: CutOuts) -> Mask:
 class _Spans(NamedTuple):
     """Intervals of pixels on rows, both ends inclusive."""
 
-    triangle: I64  # (N,) of the triangles that were given
+    triangle: I64  # (N,) triangle indices
     row: I64
     left: I64
     right: I64
@@ -98,7 +98,7 @@ def _cover_without_holes(
 
 
 def _parts_by_pixels(spans: _Spans) -> Iterator[_Spans]:
-    """The spans by and by, bounded by their pixels."""
+    """The spans in batches bounded by their pixels."""
     ends = np.cumsum(spans.right - spans.left + 1)
     most = int(ends[-1]) if len(ends) else 0
     cuts = np.searchsorted(ends, np.arange(_CHUNK_PIXELS, most, _CHUNK_PIXELS))
@@ -113,7 +113,7 @@ def _camera_space(points: F32, camera: Camera) -> F64:
 
 
 def _spans_of_triangles(corners: F64, i: Intrinsics) -> Iterator[_Spans]:
-    """The rows of pixel centres that each triangle (T, 3, 3) covers, by and by."""
+    """The rows of pixel centres covered by each triangle (T, 3, 3), in batches."""
     # Cut the triangles into chunks of bounded rows, one triangle at least.
     first, n_rows = _rows_of_triangles(corners, i)
     kept = np.nonzero(n_rows)[0]

@@ -54,8 +54,8 @@ def _grazing(hit: HitRecord, camera: Camera) -> Mask:
 def _in_projector_shadow(depth_z: F32, camera: Camera) -> Mask:
     """(H, W) bool: a nearer surface on the same row hides the point from the projector.
 
-    The projector stands BASELINE_M to the right of the camera: seen from there, column x moves
-    left by fx BASELINE_M / z. Shadows fall on the left of near objects, as the sensor's do.
+    The projector is BASELINE_M to the right of the camera: seen from there, column x moves left by
+    fx BASELINE_M / z. Shadows are on the left of near objects, as for the real sensor.
     """
     fx = camera.intrinsics.fx
     with np.errstate(divide="ignore"):

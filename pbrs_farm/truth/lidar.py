@@ -1,8 +1,7 @@
-"""Scans of laser scanners: where each beam ends, what it meets there, and how it got there; no effects.
+"""Scans of laser scanners: end points of beams, with their item and path; no effects.
 
-A beam goes on straight through panes and glass, and is turned back by mirrors: what it meets then is
-measured where the scanner believes it to be, behind the mirror. The scanner's axes are x forward, y left,
-z up.
+A beam passes straight through panes and glass, and is reflected by mirrors: the hit is then reported at its
+virtual position behind the mirror, as scanners do. The scanner's axes are x forward, y left, z up.
 """
 
 from __future__ import annotations
@@ -30,10 +29,10 @@ _CLEAR_M: Final = 1e-4  # off a surface, where the next part of a beam starts
 
 @dataclass(frozen=True, slots=True)
 class LidarSensor:
-    """A scanner by its data sheet; every beam of a turn is measured at once.
+    """A scanner by its data sheet; all beams of a turn are measured simultaneously.
 
-    elevations_deg: of its rings, upwards. step_deg: between beams of a ring. noise_m: standard
-    deviation of a range, plus noise_share of the range.
+    elevations_deg: of its rings, upwards. step_deg: between beams of a ring. noise_m: standard deviation of
+    a range, plus noise_share of the range.
     """
 
     title: str
@@ -70,11 +69,11 @@ LIDARS: Final[Mapping[str, LidarSensor]] = {
     "hdl64": LidarSensor("Velodyne HDL-64E, 10 Hz", _spread(-24.8, 2.0, 64), 0.18, 0.9, 120.0, 0.01),
     "os1_64": LidarSensor("Ouster OS1-64, 1024 x 10", _spread(-22.5, 22.5, 64), 0.3515625, 0.3, 120.0, 0.015),
 }  # fmt: skip
-"""Scanners by name. Ranges that are said as an accuracy of +-2 s are told here by s."""
+"""Scanners by name. Accuracies given as +-2 s are stored as s."""
 
 
 class FirstHits(Protocol):
-    """What a scan asks of a caster: raycast/caster.py is one."""
+    """The part of a caster that a scan uses; raycast/caster.py is one."""
 
     geometry: Geometry
 
@@ -96,13 +95,13 @@ class LidarScan:
     label: NDArray[np.uint16]  # (N,) its NYU40 class
     normals: F64  # (N, 3) unit, towards the scanner; mirrored as the point is
     through: NDArray[np.uint8]  # (N,) faces of glass on the way
-    mirrored: NDArray[np.uint8]  # (N,) mirrors on the way: above 0 nothing stands at the point
+    mirrored: NDArray[np.uint8]  # (N,) mirrors on the path: above 0 the point is virtual
     via: NDArray[np.uint16]  # (N,) instance of the first pane or mirror on the way, 0 = none
 
 
 @dataclass(slots=True, eq=False)
 class _Beams:
-    """Beams that are under way, changed in place."""
+    """Beams in flight, changed in place."""
 
     origin: F64  # (N, 3) world
     direction: F64  # (N, 3) unit, world
@@ -123,10 +122,10 @@ def lidar_scan(
     *,
     seed: int,
 ) -> LidarScan:
-    """What a scanner at a pose (4, 4, rigid) measures of a house.
+    """Scan a house from a pose (4, 4, rigid).
 
-    textures: as of LabelInputs. Equal seeds give equal noise. Not modelled: rain, sunlight, beams
-    that are wider than a line, returns from panes themselves, dark surfaces that send back too little.
+    textures: as of LabelInputs. Equal seeds give equal noise. Not modelled: rain, sunlight, beam width,
+    returns from panes themselves, dark surfaces with too weak returns.
     """
     turn, directions = world_from_scanner[:3, :3], sensor.directions()
     n = len(directions)
@@ -156,7 +155,7 @@ def lidar_scan(
 
 
 def _followed(beams: _Beams, caster: FirstHits, house: House, farthest_m: float) -> I32:
-    """(N,) the face where each beam ends, -1 where that is beyond reach; beams are moved there."""
+    """(N,) the face at the end of each beam, -1 beyond the range; moves the beams there."""
     geometry = caster.geometry
     kinds = [material.kind for material in house.materials]
     is_glass = np.array([kind in (MaterialKind.PANE, MaterialKind.GLASS) for kind in kinds])

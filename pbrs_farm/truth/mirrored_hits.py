@@ -1,7 +1,7 @@
-"""What is seen in mirrors: the pixels' rays go on where a mirror sends them; no effects.
+"""Surfaces visible in mirrors: the pixels' rays continue after reflection; no effects.
 
-As light has it: a mirror reflects about its shading normal, and every mirror on the way again. What is
-met is told where the picture shows it, behind the mirror: the whole way along the pixel's own ray.
+As for light, a mirror reflects about its shading normal, recursively. Hits are reported at their virtual position
+behind the mirror, on the pixel's own ray.
 """
 
 from __future__ import annotations
@@ -51,11 +51,10 @@ def mirrored_hits(
     hit: HitRecord, camera: Camera, geometry: Geometry, house: House, first_hit: FirstHit,
     textures: Mapping[str, NDArray[np.uint8]],
 ) -> HitRecord:  # fmt: skip
-    """The record of what the picture shows where a mirror is hit first; elsewhere it is hit.
+    """Replace hits on mirrors by those of their reflections; other pixels keep hit.
 
-    Depth and normal are those of the image behind the mirror; item and face those of the thing itself.
-    Where the mirror shows nothing, nothing is hit. first_hit, textures: as of LabelInputs. Its points
-    are not to be asked for.
+    Depth and normal are those of the virtual image; item and face those of the real one. Without a hit in
+    the mirror there is none. first_hit, textures: as of LabelInputs. Its points must not be used.
     """
     is_mirror = mirror_faces(geometry, house)
     face, depth = hit.face.reshape(-1).copy(), hit.depth_z.reshape(-1).copy()
@@ -73,7 +72,7 @@ def mirrored_hits(
             break
         rays, mirror = _reflected(rays.some(at_mirror), geometry, house, first_hit, textures)
         turned.append((rays.pixel, mirror))
-        # Show what is met now, where it may be a mirror again.
+        # The new hits may be on mirrors again.
         found = rays.face >= 0
         at, n = _met(rays, geometry)
         face[rays.pixel], depth[rays.pixel] = rays.face, np.where(found, at, 0)

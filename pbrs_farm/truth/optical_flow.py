@@ -1,7 +1,7 @@
-"""Where the surfaces of one view lie in another: flow, disparity, and what is hidden there.
+"""Correspondences of surfaces between views: flow, disparity, and occlusion.
 
-No effects of its own: rays are cast by the function that it is given. In a home in which things move, a
-surface point moves rigidly with its face from the time of one view to that of the other.
+No effects: the given function casts rays. In a home with motions, a surface point moves rigidly with its face between
+the times of the views.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ Relation = Literal["next", "previous", "stereo"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Correspondence:
-    """Where each pixel's surface point lies in another picture."""
+    """Position of each pixel's surface point in another picture."""
 
     flow: F64  # (H, W, 2) pixels to the right and down; 0 where nothing is seen or it is behind
     state: NDArray[np.uint8]  # (H, W) SEEN, OUTSIDE or HIDDEN; OUTSIDE where nothing is seen
@@ -41,10 +41,10 @@ class Correspondence:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OtherTime:
-    """The home when another view of it is taken, where things have moved until then."""
+    """The home at the time of another view, with the motions until then."""
 
     first_hit: FirstHit  # of the home at that time
-    number_of_face: I64  # (F,) of the matrix that takes the face there; 0 = it stands still
+    number_of_face: I64  # (F,) index of the face's matrix; 0 = static
     matrices: F64  # (M, 4, 4) rigid, world to world; the first is the identity
 
 
@@ -70,7 +70,7 @@ def correspondence(
     flow = np.zeros((2, hit.face.size))
     for axis, centre in enumerate((columns + 0.5, rows + 0.5)):
         flow[axis, pixels] = np.where(front, there[:, axis] - centre, 0.0)
-    # What lies in the other picture is seen where no ray ends before it.
+    # Points inside the other picture are visible if no ray ends before them.
     inside = np.flatnonzero(inside_picture(there, z, other))
     seen = reaches(points.T[:, inside].T, hit.face.ravel()[pixels[inside]], other, first_hit)
     states = np.full(shape, OUTSIDE, np.uint8)
@@ -86,7 +86,7 @@ def points_of_pixels(hit: HitRecord, camera: Camera, pixels: I64) -> F64:
     origin, directions = camera.exact_rays()
     depth = hit.depth_z.ravel()[pixels].astype(np.float64)
     rays = directions.reshape(-1, 3).take(pixels, axis=0)
-    points = np.empty((3, len(pixels))).T  # each axis lies together: half of the time
+    points = np.empty((3, len(pixels))).T  # each axis is contiguous: half of the time
     for axis in range(3):
         points[:, axis] = origin[axis] + depth * rays[:, axis]
     return points
@@ -101,9 +101,9 @@ def _move_points(points: F64, faces: I32, then: OtherTime) -> None:
 
 
 def scene_flow_label(hit: HitRecord, camera: Camera, then: OtherTime | None) -> F32:
-    """(H, W, 3) metres, world axes: by how far each pixel's surface point has moved then.
+    """(H, W, 3) metres, world axes: motion of each pixel's surface point until the other time.
 
-    0 where it stands still, or nothing is seen. The position there is the layer position plus this.
+    0 for static surfaces and for pixels without a hit. Its later position is the layer position plus this.
     """
     moved = np.zeros((hit.face.size, 3))
     if then is not None:
@@ -136,10 +136,10 @@ def project_points(points: F64, camera: Camera) -> tuple[F64, F64]:
 
 
 def inside_picture(px: F64, z: F64, camera: Camera) -> Bools:
-    """(N,) whether projected points (N, 2) at depths z (N,) lie before a camera and in its picture.
+    """(N,) true if projected points (N, 2) at depths z (N,) are in front of a camera and in its picture.
 
-    px: pixels, (0, 0) the upper left corner of the picture; NaN is outside. What stands between is
-    another question: `reaches`.
+    px: pixels, (0, 0) the upper left corner of the picture; NaN is outside. Occlusion is tested by
+    `reaches`.
     """
     i = camera.intrinsics
     with np.errstate(invalid="ignore"):
@@ -149,10 +149,10 @@ def inside_picture(px: F64, z: F64, camera: Camera) -> Bools:
 
 
 def reaches(points: F64, faces: I32, camera: Camera, first_hit: FirstHit) -> Bools:
-    """(N,) whether a ray from the camera reaches each point, or meets the point's own face.
+    """(N,) true if a ray from the camera reaches each point, or hits the point's own face.
 
-    points: (N, 3) world, metres; faces: (N,) the face each lies on, so that a grazing ray which
-    meets that very face counts. Slack of float32's rays is allowed for.
+    points: (N, 3) world, metres; faces: (N,) the face of each, so that a grazing ray which hits that face
+    counts. Tolerates the rounding of float32 rays.
     """
     if not len(points):
         return np.zeros(0, bool)

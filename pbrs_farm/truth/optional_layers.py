@@ -57,7 +57,7 @@ HitWithout = Callable[[Mask], HitRecord]  # (F,) bool faces to ignore -> the sam
 
 @dataclass(frozen=True)
 class LabelInputs:
-    """What the optional layers of one view are computed from."""
+    """Inputs of the optional layers of one view."""
 
     hit: HitRecord
     house: House
@@ -68,20 +68,18 @@ class LabelInputs:
     seed: int = 0  # of depth_sensor's noise
     partners: Mapping[Relation, Camera] = field(default_factory=dict)  # at this picture's size
     first_hit: FirstHit | None = None  # for the layers between views and behind mirrors
-    times: Mapping[Relation, OtherTime] = field(
-        default_factory=dict
-    )  # of partners when things moved
+    times: Mapping[Relation, OtherTime] = field(default_factory=dict)  # of partners, if items moved
     max_albedo: float = 1.0  # that light holds diffuse colour times texture to
 
     @cached_property
     def behind(self) -> HitRecord:
-        """The hit record behind glass: the first hit that is neither glass nor pane."""
+        """The hit record behind glass: the first hit on neither glass nor pane."""
         transparent = transparent_faces(self.geometry, self.house)
         return self.hit_without(transparent) if transparent.any() else self.hit
 
     @cached_property
     def behind_mirror(self) -> HitRecord:
-        """What mirrors show, where one is hit first; ValueError without first_hit where one is."""
+        """Hits reflected by mirrors; ValueError without first_hit if there is a mirror."""
         mirrors = mirror_faces(self.geometry, self.house)
         if not mirrors.any() or not (self.hit.valid & mirrors[self.hit.face]).any():
             return self.hit
@@ -120,8 +118,7 @@ def transparent_faces(geometry: Geometry, house: House) -> Mask:
 def source_classes(house: House) -> tuple[str, ...]:
     """The source's own classes in house, sorted; id k of class_source.png is entry k - 1.
 
-    Empty where the source has no classes of its own. Depends on the house alone, so ids of two
-    houses do not agree: go by the names.
+    Empty without source classes. Depends on the house alone, so ids of two houses differ: compare names.
     """
     return tuple(sorted({item.source_class for item in house.items if item.source_class}))
 
@@ -194,7 +191,7 @@ _LAYER_FUNCTIONS: Mapping[str, Callable[[LabelInputs], NDArray[Any]]] = {
     "behind_glass_normal": lambda s: _normal(s, s.behind),
     "behind_glass_semantic": lambda s: semantic_label(s.behind.item, s.house),
     "behind_glass_instance": lambda s: instance_label(s.behind.item, s.house),
-    # What mirrors show.
+    # Reflections in mirrors.
     "behind_mirror_depth": lambda s: depth_mm(s.behind_mirror.depth_z),
     "behind_mirror_normal": lambda s: _normal(s, s.behind_mirror),
     "behind_mirror_semantic": lambda s: semantic_label(s.behind_mirror.item, s.house),

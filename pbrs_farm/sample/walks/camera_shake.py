@@ -19,10 +19,10 @@ _STEP_M: Final = 0.006  # up and down with every step
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Shake:
-    """What is added to a steady camera at N times.
+    """Offsets from a steady camera at N times.
 
-    The two speeds bound how fast the shake alone may move and turn a camera, so that a walk
-    can keep below a limit with it: subtract them from what the path may use.
+    The two speeds bound how fast the shake alone moves and turns a camera, so that a walk can respect its
+    limits: subtract them from those of the path.
     """
 
     moved: F64  # (N, 3) metres, world
@@ -44,7 +44,7 @@ def shake(times: F64, strength: float, rng: np.random.Generator) -> Shake:
     waves = np.sin(2 * math.pi * frequency * times[:, None, None] + phases).sum(-1)  # (N, 6)
     moved = strength * _PLACE_M * waves[:, :3]
     moved[:, 1] += strength * _STEP_M * np.sin(2 * math.pi * _STEPS_HZ * times + phases[0, 0])
-    # Bound the speed by the sum of what the waves can do, three axes at once.
+    # Bound the speed by the sum over all waves, for three axes at once.
     steepest = 2 * math.pi * float(frequency.sum())
     speed = math.sqrt(3) * _PLACE_M * steepest + 2 * math.pi * _STEPS_HZ * _STEP_M
     turn = math.sqrt(3) * _TURN_RAD * steepest

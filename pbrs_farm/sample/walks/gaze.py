@@ -1,4 +1,4 @@
-"""Where a walker looks: at things on the way, turning no faster than a person does; no effects."""
+"""Gaze of a walker: at items on the way, turning no faster than a person does; no effects."""
 
 from __future__ import annotations
 
@@ -14,27 +14,27 @@ from pbrs_farm.core.arrays import F64, Bools, FirstHit
 from pbrs_farm.core.house import Geometry, House
 from pbrs_farm.sample.walks.walk_space import is_door_item
 
-_FIXATION_S: Final = (1.2, 2.8)  # how long one thing is looked at
-_DISTANCE_M: Final = (0.9, 5.5)  # range of distances at which things are looked at
+_FIXATION_S: Final = (1.2, 2.8)  # duration of a fixation
+_DISTANCE_M: Final = (0.9, 5.5)  # distances of fixated items
 _ASIDE_RAD: Final = math.radians(80)  # largest angle between gaze and way
 _SMOOTH_S: Final = 0.35  # standard deviation of the filter over the gaze
-_TILT_SHARE: Final = 0.5  # weight of the angle down to a thing; the usual tilt has the rest
+_TILT_SHARE: Final = 0.5  # weight of the angle down to an item; the usual tilt has the rest
 _TILT_DEG: Final = (-4.0, 22.0)  # range of tilts, positive downwards
 _USUAL_TILT_DEG: Final = 8.0  # NYUv2's median (docs/cameras.md)
-_SIZE_M: Final = (0.15, 3.0)  # diagonal of a thing that is looked at
-_SEEN_SHARE: Final = 0.9  # share of the line of sight to a thing that must be free
+_SIZE_M: Final = (0.15, 3.0)  # diagonals of fixated items
+_SEEN_SHARE: Final = 0.9  # minimum unobstructed share of the line of sight to an item
 _OPEN_M: Final = 3.0  # free sight beyond this counts no more
 _FAN_AZIMUTH: Final = np.radians([-24.0, -12.0, 0.0, 12.0, 24.0])
 _FAN_TILT: Final = np.radians([-8.0, 8.0, 24.0])
-_N_REMEMBERED: Final = 4  # things looked at last; they attract the gaze less
+_N_REMEMBERED: Final = 4  # recently fixated items, which attract the gaze less
 _REMEMBERED_WEIGHT: Final = 0.05  # factor of their weight
 _LEAST_OPEN: Final = 0.05  # least openness; its cube is the weight of a direction
-_YAW_PART, _TILT_PART = 0.95, 0.3  # of the turn that is allowed: together below 1
+_YAW_PART, _TILT_PART = 0.95, 0.3  # of the allowed turn: together below 1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WalkThings:
-    """What can be looked at: N items that are no structure, door or window."""
+    """Fixation targets: N items other than structure, doors and windows."""
 
     ids: NDArray[np.int64]  # (N,) instance ids
     middles: F64  # (N, 3)
@@ -42,10 +42,10 @@ class WalkThings:
 
 
 def things_of(house: House) -> WalkThings:
-    """The house's furniture and things, by the size of their boxes.
+    """The house's furniture and items, weighted by the size of their boxes.
 
-    Doors, windows, structure and items without faces are left out; so are those too small to be
-    looked at and those that are as large as a room. Weights grow with the square root of the size.
+    Doors, windows, structure and items without faces are excluded, as are items too small to fixate or as
+    large as a room. Weights grow with the square root of the size.
     """
     ids, middles, weights = [], [], []
     for number, item in enumerate(house.items, start=1):
@@ -81,7 +81,7 @@ def gaze(
 ) -> tuple[F64, F64]:
     """(N,) azimuth from +x towards +z and (N,) tilt downwards, radians; turning at most turn_rps.
 
-    Every one to three seconds another thing that is in sight is looked at, or the way ahead.
+    Every one to three seconds another visible item, or the way ahead, is fixated.
     """
     n = len(walker.times)
     step_s = float(walker.times[1] - walker.times[0]) if n > 1 else 1.0
@@ -107,7 +107,7 @@ def gaze(
 def _angles_to(
     walker: Walker, part: slice, things: WalkThings, chosen: int | None
 ) -> tuple[F64, F64]:
-    """Azimuth and tilt of one fixation: to the middle of a thing, or along the way."""
+    """Azimuth and tilt of one fixation: to the centre of an item, or along the way."""
     usual = math.radians(_USUAL_TILT_DEG)
     heading = walker.heading[part]
     if chosen is None:
@@ -127,7 +127,7 @@ def _choose_thing(
     looked_at: list[int],
     rng: np.random.Generator,
 ) -> int | None:
-    """The thing that is looked at from the place at, of those ahead and in sight; None without any."""
+    """The item fixated from the place at, among visible ones ahead; None without any."""
     eye, heading = walker.eyes[at], walker.heading[at]
     to = things.middles - eye
     level = np.linalg.norm(to[:, [0, 2]], axis=1)
@@ -135,7 +135,7 @@ def _choose_thing(
     near = (level >= _DISTANCE_M[0]) & (level <= _DISTANCE_M[1])
     candidates = np.flatnonzero(ahead & near)
     candidates = candidates[_in_sight(eye, candidates, things, geometry, first_hit)]
-    # What was looked at lately draws the eye less, and a wall close before it least of all.
+    # Recently fixated items attract the gaze less, and a close wall least of all.
     seen_lately = np.isin(candidates, looked_at[-_N_REMEMBERED:])
     weights = things.weights[candidates] * np.where(seen_lately, _REMEMBERED_WEIGHT, 1.0)
     towards = np.concatenate([to[candidates][:, [0, 2]], heading[None]])
@@ -146,7 +146,7 @@ def _choose_thing(
 
 
 def _openness(eye: F64, towards: F64, first_hit: FirstHit) -> F64:
-    """(N,) from near 0 to 1: how far one sees, by the median of a fan of rays about directions (N, 2)."""
+    """(N,) openness, near 0 to 1: median visible distance of a fan of rays about directions (N, 2)."""
     azimuth = np.arctan2(towards[:, 1], towards[:, 0])[:, None, None] + _FAN_AZIMUTH[:, None]
     tilt = np.broadcast_to(_FAN_TILT, azimuth.shape[:2] + _FAN_TILT.shape)
     azimuth = np.broadcast_to(azimuth, tilt.shape)

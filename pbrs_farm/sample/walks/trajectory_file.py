@@ -38,7 +38,7 @@ _BACKS: Final = 4  # of six rays along the axes: so many backs of walls mean an 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pose:
-    """One row: when, where, and the line of the file it stands in."""
+    """One row: time, pose, and its line in the file."""
 
     line: int
     time_s: float
@@ -54,7 +54,7 @@ def poses_from_tum(text: str, file: str) -> list[Pose]:
     (TUM's, OpenCV's) into it. Raises BadInput with the file, the row's line and the reason.
     """
     poses: list[Pose] = []
-    stamps: list[str] = []  # as they are written
+    stamps: list[str] = []  # as written
     for number, line in enumerate(text.splitlines(), start=1):
         words = line.partition("#")[0].replace(",", " ").split()
         if not words or (not poses and words[:3] == _HEAD):
@@ -78,7 +78,7 @@ def _in_seconds(poses: list[Pose], stamps: list[str], file: str) -> list[Pose]:
     largest = np.abs(times).max()
     per_second = next((per for least, per in _UNITS if largest >= least), 1)
     if per_second > 1:
-        # Divide what is written: a float of as many nanoseconds is good to 256 of them.
+        # Divide the written digits: a float of as many nanoseconds is only accurate to 256 of them.
         return [
             replace(pose, time_s=float(Decimal(stamp) / per_second))
             for pose, stamp in zip(poses, stamps, strict=True)
@@ -106,7 +106,7 @@ def _pose_of_line(words: list[str], line: int, file: str) -> Pose:
             int(np.flatnonzero(~np.isfinite(numbers))[0])
         ]
         raise BadInput(file, place, f"{name} is not finite")
-    # A quaternion of length 1 is a rotation; one that was rounded is set right.
+    # A quaternion of length 1 is a rotation; normalise rounded ones.
     quaternion = numbers[4:]
     length = float(np.linalg.norm(quaternion))
     if abs(length - 1) > _UNIT:
@@ -129,8 +129,8 @@ def trajectory_views(
 ) -> tuple[View, ...]:
     """A view for each pose, in time. Raises BadInput, naming the row, for an eye inside a wall.
 
-    All views have the recipe's field of view at the scoring size. An eye that is in no room belongs
-    to "outside". file: for the message.
+    All views have the recipe's field of view at the scoring size. An eye outside all rooms belongs to
+    "outside". file: for the message.
     """
     eyes = np.array([pose.world_from_camera[:3, 3] for pose in poses])
     inside = np.flatnonzero(inside_walls(house, eyes, geometry, first_hit))
@@ -160,10 +160,10 @@ def trajectory_views(
 
 
 def inside_walls(house: House, eyes: F64, geometry: Geometry, first_hit: FirstHit) -> Bools:
-    """(N,) whether an eye (N, 3) is inside a wall: most looks along the axes meet a wall's back.
+    """(N,) true if an eye (N, 3) is inside a wall: most rays along the axes hit a wall's back.
 
-    A ray that meets the back of a wall's face starts within that wall; openings and odd models fool
-    single rays, so several axes vote. Needs walls that are closed: call it after repair.
+    A ray that hits the back of a wall's face starts inside that wall; openings and odd models fool single
+    rays, so several axes vote. Needs closed walls: call it after repair.
     """
     if not len(geometry.faces):
         return np.zeros(len(eyes), bool)

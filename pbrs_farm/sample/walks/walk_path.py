@@ -23,11 +23,11 @@ _HEADING_M: Final = 0.2  # the same for its heading
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
-    """Where a walker is at times that are given."""
+    """Positions of a walker at given times."""
 
     places: F64  # (N, 2) plan x, z
     heading: F64  # (N, 2) unit direction of the path
-    length_m: float  # of the path that is walked
+    length_m: float  # of the walked path
 
 
 def relax_path(way: F64, space: WalkSpace) -> F64:
@@ -63,9 +63,9 @@ def _resampled(path: F64, step_m: float) -> F64:
 
 
 def spline_through(places: F64) -> F64:
-    """(M, 2) points 5 mm apart on the cubic B-spline that has the places as control points.
+    """(M, 2) points 5 mm apart on the cubic B-spline with the places as control points.
 
-    It lies within the hull of every four neighbours: twice continuous and as clear as they are.
+    It is twice continuous, and inside the hull of every four neighbours, so as clear as they are.
     """
     from scipy.interpolate import BSpline  # here: 0.1 s that only walks need
 
@@ -95,7 +95,7 @@ def time_walk(path: F64, times: F64, speed_mps: float) -> Motion:
     for k in range(len(squared) - 2, -1, -1):
         squared[k] = min(squared[k], squared[k + 1] + gain[k])
     speed = np.sqrt(squared)
-    # Add up the time from point to point and find the place of each time that is asked for.
+    # Integrate the time from point to point and interpolate the requested times.
     when = np.concatenate([[0.0], np.cumsum(step / ((speed[:-1] + speed[1:]) / 2))])
     at = np.interp(times, when, along)
     places = np.stack([np.interp(at, along, path[:, k]) for k in range(2)], axis=1)
@@ -103,7 +103,7 @@ def time_walk(path: F64, times: F64, speed_mps: float) -> Motion:
 
 
 def _curvature(path: F64) -> F64:
-    """(M,) 1/m, over 10 cm: a point of the polyline has none."""
+    """(M,) 1/m, over 10 cm: a polyline has no curvature at a point."""
     n = max(int(_CURVE_M / _DENSE_M), 1)
     if len(path) <= 2 * n:
         return np.zeros(len(path))

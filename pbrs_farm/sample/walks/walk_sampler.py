@@ -1,6 +1,6 @@
-"""A person's walk through a home as views in the order of time; no effects of its own.
+"""A person's walk through a home as views in the order of time; no effects.
 
-The same house, fields and seed give the same walk.
+Deterministic in house, fields and seed.
 """
 
 from __future__ import annotations
@@ -33,17 +33,16 @@ _SPEED_PART: Final = 0.95  # share of the speed limit for motion along the floor
 def sample_walk(
     house: House, fields: CameraFields, seed: int, geometry: Geometry, first_hit: FirstHit
 ) -> Sampling:
-    """fields.walk_frames views along one walk, where the most floor is free and most things stand.
+    """fields.walk_frames views along one walk, in the region with the most free floor and items.
 
-    Rooms are passed where their doors are open. No frame is farther from the last one than
-    fields.walk_speed_mps, or turned by more than fields.walk_turn_dps, allow. A home without a
-    region 0.6 m wide has no view; the report says which doors are shut.
+    Rooms are connected by open doors. Consecutive frames are within fields.walk_speed_mps and
+    fields.walk_turn_dps. A home without a region 0.6 m wide has no view; the report names its closed doors.
     """
     spaces = walk_spaces(house)
     space = max(spaces, key=lambda s: s.interest, default=None)
     if space is None or not space.region.any():
         return Sampling.of_views(fields, (), (_why_none(spaces),))
-    # Find the way, then where the walker is and what is looked at.
+    # Find the way, then the walker's positions and gaze.
     rng = np.random.default_rng(seed)
     times = np.arange(fields.walk_frames) / fields.walk_fps
     shaken = shake(times, fields.walk_shake, rng)
@@ -101,7 +100,7 @@ def _views_of_walk(
     room = space.room[tuple(_cells_of_path(space, poses[:, [0, 2], 3]).T)]
     views: list[View] = []
     for number, (pose, k) in enumerate(zip(poses, room.tolist(), strict=True)):
-        # In a doorway the room is the one that was left.
+        # In a doorway the room is the previous one.
         before = views[-1].room_id if views else OUTSIDE
         camera = Camera(intrinsics, pose)
         views.append(

@@ -50,16 +50,16 @@ class WalkSpace:
     level_id: str
     grid: FloorGrid
     room: NDArray[np.int32]  # (H, W) index of the room in House.rooms, -1 = none
-    floor_y: F64  # (H, W) world y of the floor, NaN where there is none
+    floor_y: F64  # (H, W) world y of the floor, NaN without floor
     clearance: F64  # (H, W) metres to the nearest cell that is not free
     ways: NDArray[np.int32]  # (H, W) number of the connected way, 0 = none
     doors: tuple[DoorWay, ...]
-    way: int = 0  # the one that is walked, 0 where none is large enough
+    way: int = 0  # number of the walked region, 0 if none is large enough
     interest: float = 0.0  # of that way: the larger, the more there is to see
 
     @cached_property
     def region(self) -> Bools:
-        """(H, W) the way that is walked; empty where none is large enough."""
+        """(H, W) the walked region; empty if none is large enough."""
         return np.asarray((self.ways == self.way) & (self.way > 0))
 
 
@@ -98,7 +98,7 @@ def _walk_space(
     strips &= room == _NO_ROOM
     _, nearest = ndimage.distance_transform_edt(room == _NO_ROOM, return_indices=True)
     floor_y[strips] = floor_y[tuple(nearest)][strips]
-    # Mark where something stands between a step and a head, and where there is a floor.
+    # Mark cells with obstacles between step and head height, and cells with floor.
     occupied, has_floor = _marks(house, grid, floor_y)
     free = np.isfinite(floor_y) & ~occupied & (has_floor | strips)
     ways = connected_ways(free)
@@ -112,7 +112,7 @@ def _walk_space(
 def _things_by_room(
     house: House, level_id: str, grid: FloorGrid, room: NDArray[np.int32]
 ) -> Counter[int]:
-    """Index of a room -> how many things of the storey have their middle in it."""
+    """Room index -> number of the storey's items with their centre in it."""
     own = [i for i in house.items if i.level_id == level_id and i.n_faces]
     things = [i for i in own if not (i.kind.is_structure or is_door_item(i))]
     middles = np.array([i.bounds.mean(0)[[0, 2]] for i in things]).reshape(-1, 2)
@@ -123,7 +123,7 @@ def _things_by_room(
 def _most_interesting(
     house: House, level_id: str, grid: FloorGrid, room: NDArray[np.int32], ways: NDArray[np.int32]
 ) -> tuple[int, float]:
-    """(number, interest) of the way whose indoor floor and whose rooms' things are most; (0, 0) = none."""
+    """(number, interest) of the region with the most indoor floor and items; (0, 0) = none."""
     best = (0, 0.0)
     things = _things_by_room(house, level_id, grid, room)
     walkable = Counter(room[ways > 0].tolist())
@@ -135,7 +135,7 @@ def _most_interesting(
         rooms = [(int(k), int((own == k).sum())) for k in np.unique(own[own >= 0])]
         indoors = {k for k, _n in rooms if house.rooms[k].has_ceiling}
         cells = sum(n if k in indoors else _OUTDOORS * n for k, n in rooms)
-        # Of a room's things as many count as of its floor belongs to this way.
+        # A room's items count in proportion to its floor in this region.
         n_things = sum(things[k] * n / walkable[k] for k, n in rooms if k in indoors)
         interest = ((cells + 1) * CELL_M**2) ** 0.5 * (1 + n_things)
         if interest > best[1]:

@@ -1,4 +1,4 @@
-"""The way of a walk: places in rooms, joined by the shortest ways that keep clear of things; no effects."""
+"""Route of a walk: places in rooms, connected by shortest paths that keep clear of items; no effects."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from pbrs_farm.sample.walks.walk_space import WalkSpace
 _ROOMY_M: Final = 0.7  # a way with this clearance costs its length alone
 _NARROW_COST: Final = 2.0  # a way without clearance costs so many times its length more
 _PLACES_A_ROOM: Final = (1, 2)  # fewest and most places of one visit
-_CHOICES: Final = 3  # places that are drawn for each one; the farthest is taken
+_CHOICES: Final = 3  # candidates drawn for each place; the farthest is chosen
 _MOST_LEGS: Final = 400
 _LEAST_ROOM_CELLS: Final = 60  # a room with fewer cells is not visited
 
 
 class WayGraph:
-    """The cells of a region as a graph of neighbours, whose edges cost more near things."""
+    """The cells of a region as a graph of neighbours, with higher edge costs near items."""
 
     def __init__(self, space: WalkSpace) -> None:
         self.cells: I64 = np.argwhere(space.region)
