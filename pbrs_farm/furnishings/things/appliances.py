@@ -27,6 +27,7 @@ from pbrs_farm.furnishings.things.outlines import bent, rect, rings
 
 # fmt: off
 
+
 _DOOR_RAD: Final = radians(95)
 
 
@@ -57,9 +58,8 @@ def coffee_machine(m: Maker) -> None:
             m.box(0.18 * s, 0.022, (-0.11, 0.1), 0.006, of=shell)
             m.box(0.18 * s, (0.0222, 0.25 * s), 0.075, 0.008, against=-0.11, of=shell)
             m.box(0.18 * s, (0.2502 * s, 0.33 * s), (-0.11, 0.1), 0.008, of=shell)
-            m.revolve([(0, 0.001), (0.062, 0.001), (0.07, 0.05), (0.068, 0.09), (0.05, 0.135),
-                (0.052, 0.15), (0, 0.15)], n=20, at=(0, 0.0222, 0.034),
-                of=plain("jug", (0.09, 0.05, 0.03), 0.06))
+            m.turned([(0.062, 0.001), (0.07, 0.05), (0.068, 0.09), (0.05, 0.135), (0.052, 0.15)],
+                n=20, at=(0, 0.0222, 0.034), of=plain("jug", (0.09, 0.05, 0.03), 0.06))
             m.tube(bent([(0.04, 0.155, 0.06), (0.085, 0.15, 0.09), (0.09, 0.06, 0.09),
                 (0.065, 0.05, 0.065)], 0.02), 0.006, n=6, at=(0, 0.012, 0), of=black)
         case 1:  # group head with its handle over a drip tray, a steam pipe beside it
@@ -108,9 +108,8 @@ def toaster(m: Maker) -> None:
     m.rounded(long, (0.01, h), d, m.pick(0.02, 0.035, 0.045), n=3, of=shell)
     m.box(long - 0.06, 0.0104, d - 0.06, 0.002, of=black)
     for k in range(n):
-        m.box(
-            long - 0.1, 0.0016, 0.028, on=h - 0.001, against=0.07 * k - 0.035 * n + 0.021, of=black
-        )
+        m.box(long - 0.1, 0.0016, 0.028, on=h - 0.001, against=0.07 * k - 0.035 * n + 0.021,
+            of=black)
     m.box(0.024, (h * 0.62, h * 0.72), 0.044, 0.003, left=long / 2 - 0.002, of=black)
     m.frustum((0.014, 0), (0.012, 0.016), n=14, turn=rotation_z(-pi / 2),
         at=(long / 2 - 0.001, h * 0.35, 0), of=black)

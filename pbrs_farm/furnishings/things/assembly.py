@@ -1,4 +1,4 @@
-"""Parts of a generated thing put together as a piece of the catalogue and its shape; no effects."""
+"""Assembly of parts into a piece of the catalogue and its shape; no effects."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ def standing_piece(
     textures: Iterable[Texture] = (),
     joints: Sequence[Joint] = (),
 ) -> Model:
-    """The parts as one piece, the middle of its base at the origin; one surface a material.
+    """One piece from parts, the middle of its base at the origin; one surface a material.
 
-    What moves has surfaces of its own; joints: in the frame of the parts.
+    Parts that move have separate surfaces. joints: in the frame of the parts.
     """
     materials: list[Material] = []
     gathered: dict[tuple[int, bool, str], list[Surface]] = {}
@@ -76,7 +76,7 @@ def hanging_piece(
     place: Place = Place.WALL,
     joints: Sequence[Joint] = (),
 ) -> Model:
-    """A generated piece that hangs, and its shape: unlike what stands, it keeps its own origin."""
+    """A hanging piece and its shape; it keeps the origin of its parts."""
     materials = tuple(dict.fromkeys(m for _s, m in parts))
     surfaces = tuple(replace(s, material=materials.index(m)) for s, m in parts)
     shape = Shape(surfaces, materials, {t.id: t for t in textures}, joints=tuple(joints))

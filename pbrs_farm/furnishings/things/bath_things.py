@@ -1,4 +1,4 @@
-"""What stands in a bath: bottles, brushes, soap, sponges, rolls of paper; no effects."""
+"""Bathroom items: bottles, brushes, soap, sponges, rolls of paper; no effects."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ def toiletries(m: Maker) -> None:
                 case 3:  # with a pump
                     m.revolve(scaled(r, tall, [(0, 0), (1, 0), (1, 0.7), (0.4, 0.78), (0, 0.78)]),
                         n=14, of=side)
-                    m.revolve([(0, tall * 0.7802), (r * 0.4, tall * 0.7802), (r * 0.4, tall * 0.84),
-                        (0.004, tall * 0.84), (0.004, tall * 0.95), (0, tall * 0.95)], n=12, of=cap)
+                    m.turned([(r * 0.4, tall * 0.7802), (r * 0.4, tall * 0.84),
+                        (0.004, tall * 0.84), (0.004, tall * 0.95)], n=12, of=cap)
                     m.box(0.014, (tall * 0.95, tall), 0.042, 0.002, z=0.014, of=cap)
                 case 4:  # a jar of cream
                     m.cylinder(r, 0, 0.03, n=18, of=side)
@@ -57,8 +57,7 @@ def soap_dispenser(m: Maker) -> None:
     r, tall = 0.034, 0.13
     pump = plain("pump", (0.75, 0.75, 0.75), 0.2)
     # The bottle, then the stem and the nose of its pump above it, 0.2 mm apart.
-    m.revolve([(0, 0), (r, 0), (r, tall), (0.014, tall + 0.012), (0.014, tall + 0.02),
-        (0, tall + 0.02)], of=m.china())
+    m.turned([(r, 0), (r, tall), (0.014, tall + 0.012), (0.014, tall + 0.02)], of=m.china())
     m.cylinder(0.005, tall + 0.0202, tall + 0.045, n=8, of=pump)
     m.box(0.016, 0.0098, 0.053, on=tall + 0.0452, z=0.0185, of=pump)
 
@@ -82,8 +81,7 @@ def soap_bar(m: Maker) -> None:
     """A bar of soap on a dish."""
     soap = m.pick((0.9, 0.86, 0.74), (0.75, 0.85, 0.72), (0.88, 0.74, 0.74))
     # A shallow dish, its rim 15 mm high and its floor 5 mm thick.
-    m.revolve([(0, 0), (0.04, 0), (0.058, 0.014), (0.055, 0.015), (0.038, 0.005), (0, 0.005)], n=18,
-        of=m.china())
+    m.turned([(0.04, 0), (0.058, 0.014), (0.055, 0.015), (0.038, 0.005)], n=18, of=m.china())
     m.bulged((0.08, 0.026, 0.052), n=6, edge=0.5, bulge=4.0, at=(0, 0.0185, 0),
         of=plain("soap", soap, 0.4))
 
@@ -91,7 +89,7 @@ def soap_bar(m: Maker) -> None:
 @thing(group="bath_small")
 def spray_bottle(m: Maker) -> None:
     """A spray bottle of cleaner."""
-    m.revolve([(0, 0), (0.038, 0), (0.038, 0.14), (0.014, 0.19), (0.014, 0.2), (0, 0.2)], n=14,
+    m.turned([(0.038, 0), (0.038, 0.14), (0.014, 0.19), (0.014, 0.2)], n=14,
         of=plain("bottle", m.any_colour(), 0.25))
     # Head and trigger point along +z.
     with m.of(plain("spray head", (0.9, 0.9, 0.9), 0.4)):

@@ -32,6 +32,7 @@ from pbrs_farm.furnishings.things.outlines import bent, d_shape, oval, rect, rin
 
 # fmt: off
 
+
 _LID_RAD: Final = pi / 2  # of a toilet, close before its cistern
 
 
@@ -41,7 +42,7 @@ _LID_RAD: Final = pi / 2  # of a toilet, close before its cistern
 def toilet(m: Maker, size: Size) -> None:
     """A toilet.
 
-    A cistern on it, one that stands out of the wall, a box behind it, or a high cistern.
+    Cistern on it, before the wall, in a box behind it, or high on the wall.
     """
     w, d, h = size
     hw = w / 2
@@ -101,9 +102,8 @@ def toilet(m: Maker, size: Size) -> None:
                 glossy("panel", (0.15, 0.15, 0.16), 0.3)))
             m.box(0.22, 0.14, 0.01, 0.002, on=h - 0.2, against=back + tank, of=button)
             for a, b in ((-0.1, 0.02), (0.028, 0.1)):
-                m.box(
-                    (a, b), 0.12, 0.004, 0.002, on=h - 0.19, against=back + tank + 0.01, of=button
-                )
+                m.box((a, b), 0.12, 0.004, 0.002, on=h - 0.19, against=back + tank + 0.01,
+                    of=button)
         case 2:  # a round tank of the bowl's own form
             m.loft(rings(d_shape, [(w * 0.92, tank, 0.2), (w, tank, rim),
                 (w, tank + 0.01, h - 0.03), (w * 0.96, tank, h - 0.005),
@@ -198,7 +198,7 @@ def vanity(m: Maker, size: Size) -> None:
     legs = m.weighted(0.4, 0.3, 0.3)
     low = m.pick(0.25, 0.3) if legs == 0 else 0.14 if legs == 1 else 0.0
     hollow(m, (-hw + 0.02, hw - 0.02), (low, top), (back, hd - 0.05), 0.016, look.front)
-    # What seems to float is held by a strip at the wall.
+    # A strip at the wall holds a floating bowl.
     match legs:
         case 0:
             m.box(0.24, low, 0.03, against=back, of=look.body)
@@ -245,8 +245,8 @@ def pedestal_basin(m: Maker, size: Size) -> None:
                     (0.15 * s, 0.14, 0.02, 0.06), (0.16 * s, 0.14, 0.02, 0.5),
                     (0.2 * s, 0.18, 0.02, y - 0.14)]))
             case 2:  # turned
-                m.revolve([(0.0, 0.0), (0.1 * s, 0.0), (0.11 * s, 0.03), (0.07 * s, 0.07),
-                    (0.06 * s, 0.4), (0.075 * s, 0.6), (0.1 * s, y - 0.15), (0.0, y - 0.15)], n=22)
+                m.turned([(0.1 * s, 0.0), (0.11 * s, 0.03), (0.07 * s, 0.07), (0.06 * s, 0.4),
+                    (0.075 * s, 0.6), (0.1 * s, y - 0.15)], n=22)
     basin_tap(m, y - 0.003, back + 0.06, tap)
     m.rod(0.0, (y - 0.1, h), back + 0.05, 0.004, n=6, of=tap)
 
@@ -318,8 +318,8 @@ def bathtub(m: Maker, size: Size) -> None:
                 (w * 0.55, d * 0.45, 0.2)], n=36, power=2.6), of=colour)
             claw = m.pick(CHROME, BRASS, BLACK_STEEL, colour)
             for x, z in product((-1.0, 1.0), (-1.0, 1.0)):
-                m.revolve([(0.0, 0.0), (0.035, 0.0), (0.04, 0.02), (0.024, 0.05), (0.035, 0.1),
-                    (0.045, 0.18), (0.0, 0.18)], n=14, at=(x * 0.3 * w, 0.0, z * 0.26 * d), of=claw)
+                m.turned([(0.035, 0.0), (0.04, 0.02), (0.024, 0.05), (0.035, 0.1), (0.045, 0.18)],
+                    n=14, at=(x * 0.3 * w, 0.0, z * 0.26 * d), of=claw)
     # Its taps: on the rim at one end, or along the back.
     if has_tap:
         with (m.of(tap), m.moved(at=(side * (hw - (0.06 if form == 0 else 0.025)), h - 0.012, 0.0),
@@ -388,9 +388,8 @@ def shower(m: Maker, size: Size) -> None:
         m.tube(bent([(-hw + 0.012, h - 0.03, -hd), (-hw + 0.012, h - 0.03, hd - 0.012),
             (hw - 0.012, h - 0.03, hd - 0.012), (hw - 0.012, h - 0.03, -hd)], 0.08, n=4), 0.011,
             of=fittings)
-        weave = plain(
-            "curtain fabric", mix(m.any_colour(), (0.93, 0.93, 0.92), m.pick(0.3, 0.8, 0.95)), 0.7
-        )
+        weave = plain("curtain fabric", mix(m.any_colour(), (0.93, 0.93, 0.92),
+            m.pick(0.3, 0.8, 0.95)), 0.7)
         wide = m.uniform(0.35, 0.7) * w
         m.add(hanging(wide, h - tray - 0.07, 0.05, 0.003, m.pick(5.0, 6.0, 7.0)),
             at=(-hw + 0.07 + wide / 2, tray + 0.03, hd - 0.03), of=weave)
@@ -406,8 +405,7 @@ def shower(m: Maker, size: Size) -> None:
         if m.chance(0.5):
             m.tube(bent([(x, 1.0, z), (x, h - 0.12, z), (x, h - 0.12, z + 0.36),
                 (x, h - 0.15, z + 0.36)], 0.05, n=4), 0.011, n=10)
-            m.revolve([(0.0, 0.0), (0.11, 0.0), (0.11, 0.008), (0.02, 0.02), (0.0, 0.02)], n=24,
-                at=(x, h - 0.17, z + 0.36))
+            m.turned([(0.11, 0.0), (0.11, 0.008), (0.02, 0.02)], n=24, at=(x, h - 0.17, z + 0.36))
         else:
             m.rod(x, (1.05, h - 0.2), z, 0.01, n=10)
             m.tube([(x, h - 0.28, z + 0.005), (x, h - 0.2, z + 0.09)], 0.011, n=10)

@@ -28,6 +28,7 @@ from pbrs_farm.furnishings.things.shapes import Pair, row
 
 # fmt: off
 
+
 Metres = Annotated[float, Range(0.005, 2.0)]
 
 _USUAL_DUVET = (0.17, 0.05, 0.02, 1.0)
@@ -39,7 +40,8 @@ class Bed:
     """Parameters of a bed. Its height is that of the head."""
 
     sleepers: Annotated[int, Range(1, 3)]
-    head: Annotated[str, Choice("panel", "slats", "soft", "channels", "buttons", "metal", "boards", "low")]
+    head: Annotated[str, Choice("panel", "slats", "soft", "channels", "buttons", "metal", "boards",
+        "low")]
     under: Annotated[str, Choice("legs", "box", "drawers")]
     frame: Material
     bar: Material  # of a head of metal, and of the frame below it
@@ -63,9 +65,8 @@ class Bed:
 
 def draw_bed(m: Maker, size: Size, sleepers: int) -> Bed:
     """Draw a bed's parameters."""
-    frame = m.pick(
-        m.timber, m.timber, m.dark_timber, WHITE, glossy("paint", m.paint(), 0.4), m.cloth()
-    )
+    frame = m.pick(m.timber, m.timber, m.dark_timber, WHITE, glossy("paint", m.paint(), 0.4),
+        m.cloth())
     head = m.pick("panel", "slats", "soft", "channels", "buttons", "metal", "boards", "low")
     bar = m.pick(BLACK_STEEL, WHITE_STEEL, BRASS)
     under = m.pick("legs", "legs", "box", "drawers") if head != "metal" else "legs"

@@ -18,9 +18,10 @@ from pbrs_farm.furnishings.things.outlines import bent, d_shape, oval, polar, re
 
 # fmt: off
 
+
 _FORMS = 17
-# How much wider, deeper and higher a form of the catalogue is than 2 r and `tall`. Two for sorting have
-# a width of their own.
+# width, depth and height of each form, per 2 r, 2 r and `tall`; the pair for sorting has a fixed
+# width
 _EXTENT: Final = {0: (1.0, 1.0, 1.0), 1: (1.0, 1.0, 1.0), 2: (1.0, 1.0, 1.0), 3: (1.02, 1.25, 1.2),
     4: (1.02, 1.25, 1.2), 5: (0.975, 0.825, 1.42), 6: (1.0, 0.75, 1.0), 7: (1.0, 1.0, 1.0),
     8: (1.0, 1.0, 1.12), 10: (0.91, 0.76, 1.38), 11: (1.01, 0.76, 1.36), 12: (0.97, 0.97, 1.05),
@@ -38,9 +39,8 @@ def bin_of(m: Maker, form: int, r: float, tall: float) -> None:
     material = m.metal if m.chance(0.3) else plain("bin", m.any_colour(), 0.5)
     match form:
         case 0 | 1:  # for paper
-            m.vessel(
-                [(0, 0), (r * 0.85, 0), (r, tall)], 0.003, n=20 if form == 0 else 28, of=material
-            )
+            m.vessel([(0, 0), (r * 0.85, 0), (r, tall)], 0.003, n=20 if form == 0 else 28,
+                of=material)
         case 2:
             wire_bin(m, r, tall)
         case 3 | 4:
@@ -107,23 +107,20 @@ def wire_bin(m: Maker, r: float, tall: float) -> None:
     with m.of(m.metal):
         m.cylinder(r * 0.85, 0, 0.004, n=20)
         for t in (0.3, 0.65, 1.0):
-            m.hoop(oval(2 * r * (0.85 + 0.15 * t), 2 * r * (0.85 + 0.15 * t), n=22),
-                t * tall, 0.003, n=5)
+            m.hoop(oval(2 * r * (0.85 + 0.15 * t), 2 * r * (0.85 + 0.15 * t), n=22), t * tall,
+                0.003, n=5)
         for k in range(22):
-            m.tube([polar(0.84 * r, 0.002, 0.2856 * k), polar(r, tall, 0.2856 * k)], 0.0015,
-                n=4)
+            m.tube([polar(0.84 * r, 0.002, 0.2856 * k), polar(r, tall, 0.2856 * k)], 0.0015, n=4)
 
 
 def pedal_bin(m: Maker, r: float, tall: float, form: int, material: Material) -> None:
     """A bin with a pedal; form 3 has a lid like its body."""
     h = tall * 1.2
-    m.revolve([(0, 0.012), (r * 0.98, 0.012), (r, 0.02), (r, h * 0.86), (0, h * 0.86)],
-        n=26, of=material)
+    m.turned([(r * 0.98, 0.012), (r, 0.02), (r, h * 0.86)], n=26, of=material)
     m.cylinder(r * 1.02, 0, 0.0118, n=26, of=plain("bin foot", (0.08, 0.08, 0.08), 0.6))
-    m.revolve(scaled(r, h, [(0, 0.8602), (1.02, 0.8602), (1.02, 0.89), (0.8, 0.97),
-        (0, 1)]), n=26, of=material if form == 3 else plain("lid", (0.1, 0.1, 0.1), 0.5))
-    m.box(0.06, (0.004, 0.018), (r * 0.9, r + 0.05), 0.003,
-        of=plain("pedal", (0.1, 0.1, 0.1), 0.5))
+    m.revolve(scaled(r, h, [(0, 0.8602), (1.02, 0.8602), (1.02, 0.89), (0.8, 0.97), (0, 1)]), n=26,
+        of=material if form == 3 else plain("lid", (0.1, 0.1, 0.1), 0.5))
+    m.box(0.06, (0.004, 0.018), (r * 0.9, r + 0.05), 0.003, of=plain("pedal", (0.1, 0.1, 0.1), 0.5))
     m.box(0.08, (h * 0.82, h * 0.9), (-r - 0.015, -r * 0.9), 0.003,
         of=plain("hinge", (0.1, 0.1, 0.1), 0.5))
 
@@ -152,13 +149,11 @@ def bag_bin(m: Maker, r: float, tall: float) -> None:
     """A bag in a frame on crossed legs."""
     with m.of(m.pick(m.timber, m.metal)):
         for z, s in product((-0.5, 0.5), (-1.0, 1.0)):
-            m.tube([(-s * 0.85 * r, 0.008, z * r), (s * 0.85 * r, tall * 1.3, z * r)],
-                0.008, n=7)
+            m.tube([(-s * 0.85 * r, 0.008, z * r), (s * 0.85 * r, tall * 1.3, z * r)], 0.008, n=7)
         for x in (-0.85, 0.85):
             m.rod(x * r, tall * 1.3, (-0.6 * r, 0.6 * r), 0.009, n=7)
     m.loft(rings(rect, [(1.0 * r, 0.8 * r, 0.03, 0.18 * tall),
-        (1.62 * r, 0.92 * r, 0.04, tall * 1.28)], n=3), of=plain("bag", m.any_colour(),
-        0.95))
+        (1.62 * r, 0.92 * r, 0.04, tall * 1.28)], n=3), of=plain("bag", m.any_colour(), 0.95))
 
 
 def _drawn_size(m: Maker) -> Size:
@@ -169,7 +164,7 @@ def _drawn_size(m: Maker) -> Size:
 
 @family(group="bin", place=Place.FLOOR, called="bin", variants=40, size=_drawn_size)
 def standing_bin(m: Maker, size: Size) -> None:
-    """A bin of the catalogue, in one of the forms that are as deep by their width."""
+    """A bin of the catalogue, in a form with the same ratio of depth to width."""
     w, d, h = size
     fitting = [(form, w / extent[0] / 2, h / extent[2]) for form,
         extent in _EXTENT.items() if abs(extent[1] / extent[0] - d / w) < 0.02]

@@ -44,7 +44,7 @@ def bevelled(low: Sequence[float], high: Sequence[float], r: float = 0.003) -> S
     half = np.maximum((b - a) / 2, 1e-4)
     cut = min(float(r), 0.4 * float(half.min()))
     inner = half - cut
-    # Vertex (axis, side, i, j) lies on the face of that axis and side.
+    # Vertex (axis, side, i, j) belongs to the face of that axis and side.
     points = _BEVEL_SIGNS * np.where(_BEVEL_IS_OUT, half, inner) + (a + b) / 2
     return Surface(
         "bevelled", points.astype(np.float32), _BEVEL_FACES.copy(), 0, None, _BEVEL_NORMALS.copy()
@@ -58,7 +58,7 @@ def _bevel_mesh() -> tuple[F64, Bools, I32]:
     number = {row: k for k, row in enumerate(rows)}
 
     def at(axis: int, along: int, u: int, v: int, of: int) -> int:
-        # The vertex on the face of axis `of` at the corner that is `along` on `axis`.
+        # The vertex on the face of axis `of` at the corner with sign `along` on `axis`.
         signs = {axis: along, (axis + 1) % 3: u, (axis + 2) % 3: v}
         return number[of, (signs[0], signs[1], signs[2])]
 
@@ -115,8 +115,8 @@ def rounded(low: Sequence[float], high: Sequence[float], r: float, *, n: int = 2
             points.append((s * inner + cut * out).reshape(-1, 3) + (a + b) / 2)
             normals.append(out.reshape(-1, 3))
             grid = np.stack([quads, quads + m, quads + m + 1, quads + 1], -1) + first
-            both = np.concatenate([grid[:, [0, 1, 2]], grid[:, [0, 2, 3]]])
-            faces.append(both if side > 0 else both[:, ::-1])
+            triangles = np.concatenate([grid[:, [0, 1, 2]], grid[:, [0, 2, 3]]])
+            faces.append(triangles if side > 0 else triangles[:, ::-1])
     return Surface(
         "rounded",
         np.concatenate(points).astype(np.float32),
@@ -139,11 +139,11 @@ def revolve(profile: Profile | F64, *, n: int = 16) -> Surface:
     outward = np.stack([steps[:, 1], -steps[:, 0]], -1)
     # Average the normals of two stretches at a soft corner.
     soft = (outward[:-1] * outward[1:]).sum(1) > np.cos(_SHARP_RAD)
-    both = outward[:-1] + outward[1:]
-    both /= np.maximum(np.linalg.norm(both, axis=1, keepdims=True), 1e-12)
+    mean = outward[:-1] + outward[1:]
+    mean /= np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-12)
     begin, end = outward.copy(), outward.copy()
-    begin[1:][soft] = both[soft]
-    end[:-1][soft] = both[soft]
+    begin[1:][soft] = mean[soft]
+    end[:-1][soft] = mean[soft]
     angles = 2 * np.pi * np.arange(n + 1) / n
     around = np.stack([np.cos(angles), np.zeros(n + 1), -np.sin(angles)], -1)
     around[-1] = around[0]
@@ -344,7 +344,7 @@ def stretched(surface: Surface, size: tuple[float, float, float]) -> Surface:
 
 
 def sheared(surface: Surface, foot: tuple[float, ...], top: tuple[float, ...]) -> Surface:
-    """An upright body 1 m high as a leg from foot to top: what was level stays level."""
+    """Shear an upright body 1 m high into a leg from foot to top; level edges stay level."""
     shear = np.eye(3)
     shear[:, 1] = np.asarray(top) - foot
     points = surface.positions.astype(np.float64) @ shear.T + np.asarray(foot)

@@ -15,6 +15,7 @@ from pbrs_farm.furnishings.things.materials import any_colour
 
 # fmt: off
 
+
 _EDGE_PX = 1024
 _COLUMNS, _ROWS = 30, 3
 _SPINE_W, _SPINE_H, _PAGES_H = 34, 180, 20
@@ -58,7 +59,7 @@ class Covers:
         return _box(x + 9, y + _SPINE_H + 3, x + _SPINE_W - 9, y + _SPINE_H + _PAGES_H - 3)
 
     def front(self, cell: int) -> Box4:
-        """Its front cover; a plain one for cells that have none."""
+        """Its front cover, or a plain colour for cells without one."""
         if cell >= N_COVERS:
             return self.board(cell)
         x = (cell % 7) * (_COVER_W + 2)
@@ -133,17 +134,16 @@ def _draw_spine(image: Image.Image, draw: ImageDraw.ImageDraw, cell: int, colour
     draw.rectangle((x, y, x + _SPINE_W - 1, y + _SPINE_H - 1), _bytes(colour))
     # Bands, a label or a publisher's mark.
     if rng.random() < 0.4:
-        for at in (8, 14, _SPINE_H - 22):
-            draw.line((x, y + at, x + _SPINE_W - 1, y + at), ink, int(rng.integers(1, 3)))
+        for level in (8, 14, _SPINE_H - 22):
+            draw.line((x, y + level, x + _SPINE_W - 1, y + level), ink, int(rng.integers(1, 3)))
     if rng.random() < 0.25:
         label = _bytes(shade(colour, float(rng.uniform(0.4, 0.7))))
         draw.rectangle((x, y + 25, x + _SPINE_W - 1, y + 95), label)
     # Titles run from the top down.
     size = int(rng.integers(13, 20))
     line = Image.new("L", (_SPINE_H - 50, _SPINE_W), 0)
-    ImageDraw.Draw(line).text(
-        ((_SPINE_H - 50) / 2, _SPINE_W / 2), title, 255, ImageFont.load_default(size), anchor="mm"
-    )
+    ImageDraw.Draw(line).text(((_SPINE_H - 50) / 2, _SPINE_W / 2), title, 255,
+        ImageFont.load_default(size), anchor="mm")
     image.paste(ink, (x, y + 22), line.rotate(-90, expand=True))
     # Pages between two boards.
     top = y + _SPINE_H
@@ -151,9 +151,8 @@ def _draw_spine(image: Image.Image, draw: ImageDraw.ImageDraw, cell: int, colour
     paper = float(rng.uniform(0.78, 0.93))
     for column in range(3, _SPINE_W - 3):
         tone = paper * (0.88 if column % 2 else 1.0)
-        draw.line(
-            (x + column, top, x + column, top + _PAGES_H - 1), _bytes((tone, tone, tone * 0.92))
-        )
+        draw.line((x + column, top, x + column, top + _PAGES_H - 1),
+            _bytes((tone, tone, tone * 0.92)))
 
 
 def _draw_front(image: Image.Image, cell: int, colour: Rgb, ink: tuple[int, int, int], title: str,
@@ -172,6 +171,6 @@ def _draw_front(image: Image.Image, cell: int, colour: Rgb, ink: tuple[int, int,
         else:
             draw.rectangle(corner, shape)
     for k, word in enumerate(title.split()):
-        at = (_COVER_W / 2, 20 + 22 * k)
-        draw.text(at, word, ink, ImageFont.load_default(22), anchor="mm")
+        position = (_COVER_W / 2, 20 + 22 * k)
+        draw.text(position, word, ink, ImageFont.load_default(22), anchor="mm")
     image.paste(front, (x, y))

@@ -17,19 +17,19 @@ from pbrs_farm.geometry.solids import box
 
 # fmt: off
 
+
 _BOARD_M = 0.0025
 _GAP_M = 0.0004  # between neighbours, so that no faces coincide
 
-# A book that lies with its front cover up: its right side turned up.
+# a book with its front cover up
 _LYING: F64 = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 
 
-def run_of_books(
-    rng: np.random.Generator, covers: Covers, length: float, height: float, depth: float
-) -> tuple[Model, float]:
+def run_of_books(rng: np.random.Generator, covers: Covers, length: float, height: float,
+    depth: float) -> tuple[Model, float]:
     """Upright books side by side, at most length wide and height high, and the last one's height.
 
-    depth: of the place; the spines stand in one line, or nearly.
+    depth: of the shelf; the spines are aligned to a few millimetres.
     """
     most = min(0.30, height)
     # Sets of a publisher have one size; the rest differ.
@@ -46,9 +46,8 @@ def run_of_books(
             break
         surface = _upright(covers, int(rng.integers(N_CELLS)), thick, tall, deep)
         back = float(abs(rng.normal(0, 0.004)))
-        parts.append(
-            (transformed(surface, np.eye(3), (x + thick / 2, 0, -deep / 2 - back)), covers.material)
-        )
+        parts.append((transformed(surface, np.eye(3), (x + thick / 2, 0, -deep / 2 - back)),
+            covers.material))
         x += thick + _GAP_M
         last = tall
     if not parts:
@@ -74,7 +73,7 @@ def leaning_book(rng: np.random.Generator, covers: Covers, height: float, depth:
 
 
 def stack_of_books(rng: np.random.Generator, covers: Covers, n: int, most: float = 1.0) -> Model:
-    """n lying books, the larger below, each a little turned; at most `most` wide."""
+    """A stack of n books, larger ones below, each turned a little; at most `most` wide."""
     tall = sorted((float(min(np.clip(rng.normal(0.23, 0.035), 0.15, 0.31),
         most)) for _ in range(n)), reverse=True)
     parts: list[Part] = []
@@ -104,13 +103,12 @@ def magazines(rng: np.random.Generator, covers: Covers, n: int) -> Model:
         turn = rotation_y(float(rng.normal(0, 0.15)))
         parts.append((transformed(lying, turn, (0, y, 0)), covers.material))
         y += thick + _GAP_M / 2
-    return standing_piece(
-        "magazines", parts, group="newspaper", nyu40=PAPER, textures=(covers.texture,)
-    )
+    return standing_piece("magazines", parts, group="newspaper", nyu40=PAPER,
+        textures=(covers.texture,))
 
 
 def open_book(rng: np.random.Generator, covers: Covers) -> Model:
-    """A book that lies open."""
+    """An open book."""
     tall, wide = float(rng.uniform(0.19, 0.25)), float(rng.uniform(0.13, 0.17))
     cell = int(rng.integers(N_CELLS))
     parts: list[Part] = []
@@ -133,7 +131,7 @@ def _upright(covers: Covers, cell: int, thick: float, tall: float, deep: float) 
 
 
 def _bound(covers: Covers, cell: int, thick: float, tall: float, deep: float) -> list[Surface]:
-    # The same as two boards, a spine and pages that stand back from their edges.
+    # A book of two boards, a spine and pages set back from their edges.
     b, plain = _BOARD_M, covers.board(cell)
 
     def part(x: tuple[float, float], y: tuple[float, float], z: tuple[float, float]) -> Surface:

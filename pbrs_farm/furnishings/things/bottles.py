@@ -17,6 +17,7 @@ from pbrs_farm.furnishings.things.outlines import bent, fluted, oval, rect, ring
 
 # fmt: off
 
+
 _Shape = tuple[tuple[float, float], ...]
 
 # Of each body: half its width and its height in metres, its outside up to the mouth in shares of these,
@@ -68,9 +69,9 @@ def bottle(m: Maker) -> None:
     r, tall = m.uniform(0.03, 0.041), m.uniform(0.22, 0.32)
     match m.integers(0, 7):
         case 0:  # water: waves in its side
-            m.revolve([(0, 0), (r * 0.9, 0), (r, 0.01), (r, 0.05), (r * 0.93, 0.06), (r, 0.07),
+            m.turned([(r * 0.9, 0), (r, 0.01), (r, 0.05), (r * 0.93, 0.06), (r, 0.07),
                 (r * 0.93, 0.08), (r, 0.09), (r, tall * 0.65), (r * 0.4, tall * 0.88),
-                (0.013, tall * 0.9), (0.013, tall * 0.94), (0, tall * 0.94)], n=18,
+                (0.013, tall * 0.9), (0.013, tall * 0.94)], n=18,
                 of=glass((0.85, 0.93, 0.97), 0.25))
             sleeve(m, r, 0.1, tall * 0.58, plain("label", m.any_colour(), 0.5))
             m.cylinder(0.015, tall * 0.9402, tall, n=14, of=plain("cap", m.any_colour(), 0.4))
@@ -90,8 +91,8 @@ def bottle(m: Maker) -> None:
             m.cylinder(0.012, 0, 0.012, n=12, turn=rotation_x(0.7), at=(0, 0.21, 0.019),
                 of=plain("cap", m.any_colour(), 0.4))
         case 3:  # a thermos
-            m.revolve([(0, 0), (0.04, 0), (0.042, 0.006), (0.042, 0.2), (0.034, 0.225), (0, 0.225)],
-                n=22, of=m.pick(m.metal, plain("flask", m.any_colour(), 0.35)))
+            m.turned([(0.04, 0), (0.042, 0.006), (0.042, 0.2), (0.034, 0.225)], n=22,
+                of=m.pick(m.metal, plain("flask", m.any_colour(), 0.35)))
             m.revolve([(0, 0.2252), (0.034, 0.2252), (0.032, 0.27), (0, 0.272)], n=20,
                 of=plain("cup", (0.12, 0.12, 0.12), 0.5))
             m.tube(bent([(0.04, 0.19, 0), (0.075, 0.185, 0), (0.075, 0.06, 0), (0.04, 0.055, 0)],
@@ -101,21 +102,20 @@ def bottle(m: Maker) -> None:
                 (0.036, 0.032, 0.145), (0.034, 0.03, 0.15)], n=20),
                 of=plain("bottle", m.pick((0.65, 0.09, 0.06), (0.85, 0.65, 0.12),
                 (0.93, 0.92, 0.86), (0.25, 0.14, 0.06)), 0.3))
-            m.revolve([(0, 0.1502), (0.0175, 0.1502), (0.016, 0.17), (0.006, 0.175), (0.003, 0.2),
-                (0, 0.2)], n=14, of=plain("cap", (0.93, 0.93, 0.92), 0.4))
-        case 5:  # two that stand together
+            m.turned([(0.0175, 0.1502), (0.016, 0.17), (0.006, 0.175), (0.003, 0.2)], n=14,
+                of=plain("cap", (0.93, 0.93, 0.92), 0.4))
+        case 5:  # two side by side
             for x in (-0.045, 0.045):
                 with m.moved(at=(x, 0, 0)):
-                    m.revolve([(0, 0), (0.032, 0), (0.033, 0.15), (0.026, 0.18), (0.012, 0.2),
-                        (0.012, 0.25), (0, 0.25)], n=14, of=plain("bottle",
-                        m.pick((0.1, 0.2, 0.08), (0.5, 0.4, 0.1), (0.25, 0.1, 0.06)), 0.1))
+                    m.turned([(0.032, 0), (0.033, 0.15), (0.026, 0.18), (0.012, 0.2),
+                        (0.012, 0.25)], n=14, of=plain("bottle", m.pick((0.1, 0.2, 0.08),
+                        (0.5, 0.4, 0.1), (0.25, 0.1, 0.06)), 0.1))
                     m.cylinder(0.014, 0.2502, 0.27, n=12, of=cap)
         case 6:  # a round flask in a bast cover
-            m.revolve([(0, 0.004), (0.03, 0.004), (0.062, 0.05), (0.055, 0.1), (0.02, 0.15),
-                (0.012, 0.18), (0.013, 0.25), (0, 0.25)], n=20, of=plain("bottle", (0.1, 0.2, 0.08),
-                0.08))
-            m.revolve([(0, 0), (0.034, 0), (0.066, 0.05), (0.058, 0.1), (0.053, 0.1), (0.061, 0.05),
-                (0.03, 0.003), (0, 0.003)], n=20, of=plain("bast", (0.7, 0.58, 0.38), 0.9))
+            m.turned([(0.03, 0.004), (0.062, 0.05), (0.055, 0.1), (0.02, 0.15), (0.012, 0.18),
+                (0.013, 0.25)], n=20, of=plain("bottle", (0.1, 0.2, 0.08), 0.08))
+            m.turned([(0.034, 0), (0.066, 0.05), (0.058, 0.1), (0.053, 0.1), (0.061, 0.05),
+                (0.03, 0.003)], n=20, of=plain("bast", (0.7, 0.58, 0.38), 0.9))
 
 
 def _composed(m: Maker) -> None:
@@ -124,9 +124,8 @@ def _composed(m: Maker) -> None:
     half, high, shape, straight = _BODIES[name]
     r, tall = half * m.uniform(0.93, 1.07), high * m.uniform(0.92, 1.08)
     profile = [(x * r, y * tall) for x, y in shape]
-    tint = m.pick(
-        (0.1, 0.2, 0.08), (0.3, 0.16, 0.06), (0.8, 0.85, 0.85), (0.25, 0.3, 0.1), (0.16, 0.22, 0.34)
-    )
+    tint = m.pick((0.1, 0.2, 0.08), (0.3, 0.16, 0.06), (0.8, 0.85, 0.85), (0.25, 0.3, 0.1),
+        (0.16, 0.22, 0.34))
     n = m.pick(18, 18, 20)
     is_clear = m.chance(0.35)
     side = glass(tint, 0.3) if is_clear else plain("bottle", tint, 0.08)
@@ -137,7 +136,7 @@ def _composed(m: Maker) -> None:
     else:
         m.revolve([(0.0, 0.0), *profile, (0.0, profile[-1][1])], n=n, of=side)
     if is_clear:
-        # What is in it ends below the shoulder, or lower.
+        # The liquid ends at the shoulder or below.
         level = m.uniform(0.5, 1.0) * straight[1] * tall
         inner = 0.68 if facets else 0.93
         inside = [(inner * x, max(y, 0.004)) for x, y in profile if y < level]
@@ -150,12 +149,12 @@ def _composed(m: Maker) -> None:
 
 
 def _close(m: Maker, mouth: float, top: float, tall: float) -> None:
-    """What closes a mouth of a radius at a height: one of nine ways, or nothing."""
+    """One of nine closures for a mouth of a radius at a height, or none."""
     y, q = top + 0.0002, mouth
     cap = m.pick(m.metal, plain("cap", m.any_colour(), 0.4), plain("cap", (0.1, 0.1, 0.1), 0.4))
     cork = plain("cork", (0.7, 0.55, 0.38), 0.9)
     match m.integers(0, 10):
-        case 0:  # a cork that stands out
+        case 0:  # a cork, partly out of the neck
             m.frustum((0.8 * q, y), (0.86 * q, y + 0.012), n=12, of=cork)
         case 1:  # a stopper of wood on a cork
             m.revolve([(0.0, y), (0.8 * q, y), (0.8 * q, y + 0.004), (1.25 * q, y + 0.005),
@@ -169,8 +168,7 @@ def _close(m: Maker, mouth: float, top: float, tall: float) -> None:
                 (0.0, y + 0.003)], n=21, of=cap)
         case 4:  # a capsule of foil down the neck
             low = y - min(0.16 * tall, 0.045)
-            m.revolve([(0.0, low), (1.06 * q + 0.0012, low), (1.04 * q + 0.001, y + 0.001),
-                (0.0, y + 0.001)], n=18, of=cap)
+            m.turned([(1.06 * q + 0.0012, low), (1.04 * q + 0.001, y + 0.001)], n=18, of=cap)
         case 5:  # a pourer
             m.frustum((1.1 * q, y), (0.9 * q, y + 0.008), n=14, of=cork)
             m.tube(bent([(0.0, y + 0.006, 0.0), (0.0, y + 0.03, 0.0), (0.018, y + 0.055, 0.0)],
@@ -192,9 +190,8 @@ def _close(m: Maker, mouth: float, top: float, tall: float) -> None:
             pass
 
 
-def _label(
-    m: Maker, profile: Sequence[tuple[float, float]], straight: tuple[float, float], n: int
-) -> None:
+def _label(m: Maker, profile: Sequence[tuple[float, float]], straight: tuple[float, float],
+    n: int) -> None:
     """Labels on a turned body between two heights: a band, a low one, two, one with another on the neck.
 
     n: sides of the body.
@@ -241,15 +238,14 @@ def jar(m: Maker) -> None:
     With a lid, a cork, a swing top, of tin, square, with a label, a set of three, a spice rack, a pot of honey.
     """
     form, r, tall = m.integers(0, 13), m.uniform(0.035, 0.055), m.uniform(0.09, 0.2)
-    grain = m.pick(
-        (0.35, 0.2, 0.1), (0.85, 0.75, 0.5), (0.9, 0.88, 0.82), (0.6, 0.3, 0.12), (0.4, 0.45, 0.2)
-    )
+    grain = m.pick((0.35, 0.2, 0.1), (0.85, 0.75, 0.5), (0.9, 0.88, 0.82), (0.6, 0.3, 0.12),
+        (0.4, 0.45, 0.2))
     side = m.china() if m.chance(0.5) else plain("filled jar", grain, 0.15)
     lid = plain("wood lid", m.wood, 0.5) if m.chance(0.5) else m.metal
     match form:
         case 0 | 1:  # with a lid
-            m.revolve([(0, 0), (r * 0.95, 0), (r, 0.006), (r, tall - 0.02), (r * 0.9, tall - 0.012),
-                (0, tall - 0.012)], of=side)
+            m.turned([(r * 0.95, 0), (r, 0.006), (r, tall - 0.02), (r * 0.9, tall - 0.012)],
+                of=side)
             m.revolve([(0, tall - 0.0118), (r * 0.93, tall - 0.0118), (r * 0.93, tall),
                 (0, tall + 0.001)], of=lid)
             if form == 1:
@@ -260,8 +256,8 @@ def jar(m: Maker) -> None:
         case 4:  # tin
             paint_of = plain("tin", m.any_colour(), 0.3)
             m.cylinder(r, 0, tall * 0.85, n=22, of=paint_of)
-            m.revolve([(0, tall * 0.8502), (r + 0.002, tall * 0.8502), (r + 0.002, tall * 0.97),
-                (r * 0.9, tall), (0, tall)], n=22, of=m.pick(paint_of, m.metal))
+            m.turned([(r + 0.002, tall * 0.8502), (r + 0.002, tall * 0.97), (r * 0.9, tall)], n=22,
+                of=m.pick(paint_of, m.metal))
             m.box(0.05, (tall * 0.25, tall * 0.6), 0.0066, against=r - 0.006,
                 of=plain("label", (0.92, 0.91, 0.87), 0.6))
         case 5:  # square
@@ -274,9 +270,9 @@ def jar(m: Maker) -> None:
         case 7:
             spice_rack(m, lid)
         case 8:  # a pot of honey or jam with a cloth
-            m.revolve([(0, 0), (0.034, 0), (0.037, 0.008), (0.037, 0.07), (0.03, 0.08), (0, 0.08)],
-                n=18, of=plain("jam", m.pick((0.4, 0.03, 0.06), (0.75, 0.42, 0.06),
-                (0.8, 0.3, 0.05)), 0.12))
+            m.turned([(0.034, 0), (0.037, 0.008), (0.037, 0.07), (0.03, 0.08)], n=18,
+                of=plain("jam", m.pick((0.4, 0.03, 0.06), (0.75, 0.42, 0.06), (0.8, 0.3, 0.05)),
+                0.12))
             m.revolve([(0, 0.0802), (0.033, 0.0802), (0.045, 0.072), (0.046, 0.074), (0.034, 0.096),
                 (0, 0.097)], n=18, of=plain("cloth", m.any_colour(), 0.95))
         case 9:  # utensils in a pot
@@ -306,16 +302,16 @@ def jar(m: Maker) -> None:
         case 12:  # a kitchen scale
             paint_of = plain("scale", m.any_colour(), 0.35)
             m.box(0.18, 0.05, 0.14, 0.012, of=paint_of)
-            m.revolve([(0, 0), (0.012, 0), (0.012, 0.02), (0.1, 0.03), (0.11, 0.045),
-                (0.107, 0.046), (0.09, 0.034), (0, 0.034)], n=26, at=(0, 0.049, 0), of=m.metal)
+            m.turned([(0.012, 0), (0.012, 0.02), (0.1, 0.03), (0.11, 0.045), (0.107, 0.046),
+                (0.09, 0.034)], n=26, at=(0, 0.049, 0), of=m.metal)
             m.frustum((0.035, 0), (0.033, 0.004), n=20, turn=LYING_ALONG_Z, at=(0, 0.025, 0.0695),
                 of=plain("dial", (0.93, 0.92, 0.88), 0.4))
 
 
 def stoppered_jar(m: Maker, r: float, tall: float, form: int, grain: Rgb) -> None:
     """A filled jar of glass with a cork, or with a glass stopper on a wire."""
-    m.revolve(scaled(r, tall, [(0, 0), (1, 0), (1, 0.8), (0.8, 0.88), (0.8, 0.92),
-        (0, 0.92)]), n=18, of=glass())
+    m.revolve(scaled(r, tall, [(0, 0), (1, 0), (1, 0.8), (0.8, 0.88), (0.8, 0.92), (0, 0.92)]),
+        n=18, of=glass())
     full = tall * m.uniform(0.4, 0.7)
     m.revolve([(0, 0.003), (r - 0.004, 0.003), (r - 0.004, full), (0, full + 0.1 * r)],
         of=plain("grain", grain, 0.9))
@@ -334,11 +330,10 @@ def jar_set(m: Maker, r: float, tall: float, side: Material, lid: Material) -> N
     """Three jars in a row, each smaller than the one before."""
     for k, s in enumerate((1.0, 0.86, 0.72)):
         with m.moved(at=(k * 2.05 * r, 0, 0)):
-            m.revolve([(0, 0), (r * 0.95 * s, 0), (r * s, 0.006),
-                (r * s, (tall - 0.02) * s), (0, (tall - 0.02) * s)], of=side)
+            m.turned([(r * 0.95 * s, 0), (r * s, 0.006), (r * s, (tall - 0.02) * s)], of=side)
             m.revolve([(0, (tall - 0.02) * s + 0.0002), (r * s, (tall - 0.02) * s + 0.0002),
-                (r * s, tall * s - 0.004), (0.008, tall * s - 0.002),
-                (0.01, tall * s + 0.008), (0, tall * s + 0.009)], of=lid)
+                (r * s, tall * s - 0.004), (0.008, tall * s - 0.002), (0.01, tall * s + 0.008),
+                (0, tall * s + 0.009)], of=lid)
 
 
 def spice_rack(m: Maker, lid: Material) -> None:
@@ -351,6 +346,6 @@ def spice_rack(m: Maker, lid: Material) -> None:
     for k in range(5):
         with m.moved(at=(-0.1 + 0.05 * k, 0.0082, 0)):
             m.cylinder(0.021, 0, 0.06, n=12, of=plain("spice",
-                m.pick((0.5, 0.15, 0.05), (0.3, 0.35, 0.12), (0.75, 0.55, 0.12),
-                (0.15, 0.1, 0.07)), 0.3))
+                m.pick((0.5, 0.15, 0.05), (0.3, 0.35, 0.12), (0.75, 0.55, 0.12), (0.15, 0.1, 0.07)),
+                0.3))
             m.cylinder(0.021, 0.0602, 0.076, n=12, of=lid)

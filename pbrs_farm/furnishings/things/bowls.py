@@ -1,4 +1,4 @@
-"""Bowls, what lies in them, and pots with plants; no effects."""
+"""Bowls with contents, and pots with plants; no effects."""
 
 from __future__ import annotations
 
@@ -100,8 +100,7 @@ def plant_pot(m: Maker) -> None:
                     (1.5 * r - 0.01, 1.5 * r - 0.01, 0.006, 0.01)], n=2))
             case 4:  # on a saucer
                 m.vessel([(0, 0.0102), (r * 0.68, 0.0102), (r * 0.95, tall)], 0.006, n=20)
-                m.revolve([(0, 0), (r * 0.8, 0), (r, 0.018), (r * 0.97, 0.02), (r * 0.8, 0.01),
-                    (0, 0.01)], n=22)
+                m.turned([(r * 0.8, 0), (r, 0.018), (r * 0.97, 0.02), (r * 0.8, 0.01)], n=22)
             case 5:  # on three legs
                 m.vessel([(0, 0.08), (r * 0.9, 0.08), (r, 0.09), (r, 0.08 + tall)], 0.005, n=24)
                 for k in range(3):

@@ -31,9 +31,8 @@ def storage_box(m: Maker) -> None:
     colour = m.any_colour()
     card, grain = plain("box", colour, 0.7), plain("box wood", m.wood, 0.6)
     if form < 2:
-        lidded_box(
-            m, w, h, d, card, plain("lid", shade(colour, 0.9) if form == 0 else m.any_colour(), 0.7)
-        )
+        lidded_box(m, w, h, d, card, plain("lid", shade(colour,
+            0.9) if form == 0 else m.any_colour(), 0.7))
         if form == 1:
             m.box(0.08, 0.035, 0.002, on=0.35 * h, against=hd, of=m.metal)
             m.box(0.068, 0.025, 0.0005, on=0.35 * h + 0.005, against=hd + 0.0021,
@@ -110,7 +109,7 @@ def plastic_box(m: Maker, w: float, h: float, d: float, hw: float, colour: Rgb) 
 
 
 def lidded_box(m: Maker, w: float, h: float, d: float, side: Material, lid: Material) -> None:
-    """The lid takes the upper 22 % of the height and stands out by 4 mm all round."""
+    """A box with a lid over the upper 22 % of its height, 4 mm wider all round."""
     m.box(w, h * 0.78, d, of=side)
     m.box(w + 0.008, (h * 0.78, h), d + 0.008, of=lid)
 
@@ -170,9 +169,8 @@ def shelf_basket(m: Maker) -> None:
                     of=plain("band", m.any_colour(), 0.9))
 
 
-def rope_side(
-    m: Maker, w: float, d: float, out: float, h: float, n: int, material: Material
-) -> None:
+def rope_side(m: Maker, w: float, d: float, out: float, h: float, n: int,
+    material: Material) -> None:
     """A bottom and courses of rope one above another; out.
 
     By how much of its width it opens upwards.
@@ -212,9 +210,8 @@ def basket(m: Maker) -> None:
                     m.uniform(0.02, 0.034), n=7, of=plain("log", shade((0.45, 0.32, 0.2),
                     m.uniform(0.7, 1.3)), 0.9))
         case 5:  # wool and needles, or rolled blankets
-            m.vessel(
-                scaled(r, tall, [(0, 0), (0.8, 0), (1, 0.5), (0.95, 0.8)]), 0.01, n=20, of=weave
-            )
+            m.vessel(scaled(r, tall, [(0, 0), (0.8, 0), (1, 0.5), (0.95, 0.8)]), 0.01, n=20,
+                of=weave)
             for k in range(3):
                 m.sphere(polar(0.45 * r, tall * 0.62, 2.1 * k), 0.42 * r, n=12,
                     of=plain("wool", m.any_colour(), 0.95))
@@ -250,7 +247,7 @@ def cartons(m: Maker) -> None:
 
 
 def cardboard(m: Maker, w: float, h: float, d: float, y: float, slip: float) -> None:
-    """A box of cardboard with its tape, its base at y; slip: how far it may stand aside."""
+    """A box of cardboard with tape, its base at y; slip: maximum offset, metres."""
     board = plain("cardboard", shade((0.66, 0.5, 0.33), m.uniform(0.9, 1.1)), 0.85)
     m.box(w, h, d, at=(m.uniform(-slip, slip) if slip else 0, y, 0), of=board)
     # The tape runs over the top along x and 6 cm down both sides.

@@ -33,11 +33,12 @@ from pbrs_farm.furnishings.things.shapes import Pair
 
 # fmt: off
 
+
 _BOARD_M: Final = 0.018
 
 
 class Space(NamedTuple):
-    """What is behind a column of fronts."""
+    """The space behind a column of fronts."""
 
     x: Pair  # between its sides
     back: float  # z of its back's inner face
@@ -46,7 +47,7 @@ class Space(NamedTuple):
 
 
 class Boards(NamedTuple):
-    """What a piece is made of."""
+    """Materials of a piece."""
 
     body: Material
     front: Material
@@ -150,7 +151,7 @@ def wardrobe(m: Maker, boards: Boards, size: Size) -> None:
 
 @thing(group="cabinet", nyu40=CABINET, place=Place.FLOOR)
 def tall_cabinet(m: Maker, boards: Boards, size: Size) -> None:
-    """A narrow cupboard: shelves that are open in the middle, doors above and below."""
+    """A narrow cupboard: open shelves in the middle, doors above and below."""
     w, h, d = size
     hw, hd = w / 2, d / 2
     low, high = 0.4 * h, 0.62 * h
@@ -186,7 +187,7 @@ def desk(m: Maker, boards: Boards, size: Size) -> None:
     """A table to write at, drawers under one end of it."""
     w, h, d = size
     table(m, boards, size, 0.04)
-    # Three drawers hang between the legs of one end, or stand on the floor.
+    # Three drawers between the legs of one end, or down to the floor.
     if m.chance(0.7):
         side = m.pick(-1.0, 1.0)
         x0, x1 = sorted((side * (w / 2 - 0.06), side * (w / 2 - 0.44)))
@@ -242,9 +243,8 @@ def table(m: Maker, boards: Boards, size: Size, leg: float) -> None:
         m.box(0.018, 0.06, 2 * to_z, x=-x, on=h - thick - 0.06, mirrored="x")
 
 
-def cupboard(
-    m: Maker, boards: Boards, size: Size, may_have_legs: bool, columns: Sequence[Sequence[str]]
-) -> None:
+def cupboard(m: Maker, boards: Boards, size: Size, may_have_legs: bool,
+    columns: Sequence[Sequence[str]]) -> None:
     """A closed box behind columns of fronts, which are named from the top downwards."""
     w, h, d = size
     foot = carcass(m, boards, size, may_have_legs)
@@ -293,7 +293,7 @@ def column_of_fronts(m: Maker, boards: Boards, x: Pair, y: Pair, z: float, kinds
 
 
 def doors(m: Maker, boards: Boards, x: Pair, y: Pair, z: float, n: int, back: float) -> None:
-    """Doors side by side before z, shelves behind them already; back: of what is behind."""
+    """Doors side by side before z, with shelves behind them; back: z of the back."""
     has_knobs, space = m.chance(0.4), Space(x, back, is_filled=True)
     for k in range(n):
         front(m, boards, (x[0] + (x[1] - x[0]) * k / n, x[0] + (x[1] - x[0]) * (k + 1) / n), y, z,
@@ -302,7 +302,7 @@ def doors(m: Maker, boards: Boards, x: Pair, y: Pair, z: float, n: int, back: fl
 
 def front(m: Maker, boards: Boards, x: Pair, y: Pair, z: float, kind: str, has_knobs: bool,
     opens_left: bool, space: Space) -> None:
-    """A door, drawer or flap that opens, with what is behind it."""
+    """A door, drawer or flap that opens, with its interior."""
     with opens(m, kind, x, y, z + 0.0165, space.back, opens_left):
         face(m, boards, x, y, z, kind, has_knobs, opens_left)
         if is_drawer(kind, y):
@@ -315,7 +315,7 @@ def face(m: Maker, boards: Boards, x: Pair, y: Pair, z: float, kind: str, has_kn
     opens_left: bool) -> None:
     """A front 16 mm thick, 2 mm from its neighbours, and what opens it.
 
-    That stands at the side of a door that has no hinges, and lies across a drawer.
+    The grip is upright at a door's free side, and level on a drawer.
     """
     m.box((x[0] + 0.002, x[1] - 0.002), (y[0] + 0.002, y[1] - 0.002), 0.016, against=z + 0.0005,
         of=boards.front)

@@ -24,21 +24,22 @@ from pbrs_farm.furnishings.things.outlines import bent, oval, polar
 
 # fmt: off
 
-# Half the width of what stands at the end of an arm.
+
+# half the width of the light at the end of an arm
 _CUP_M: Final = {"candle": 0.034, "ball": 0.05, "shade": 0.065, "bell": 0.055}
 
 
 def _candle(m: Maker, x: float, y: float, z: float, of: Material) -> None:
     """A drip pan, a candle of card and its bulb: 0.13 m from y up."""
-    m.revolve([(0.0, 0.0), (0.012, 0.0), (0.034, 0.012), (0.032, 0.015), (0.011, 0.008),
-        (0.0, 0.008)], n=14, at=(x, y, z), of=of)
+    m.turned([(0.012, 0.0), (0.034, 0.012), (0.032, 0.015), (0.011, 0.008)], n=14, at=(x, y, z),
+        of=of)
     m.cylinder(0.01, 0.008, 0.085, n=10, at=(x, y, z), of=plain("candle", (0.9, 0.88, 0.8), 0.6))
     m.revolve([(0.0, 0.0855), (0.008, 0.087), (0.013, 0.1), (0.005, 0.126), (0.0, 0.13)], n=10,
         at=(x, y, z), of=OPAL)
 
 
 def _cup(m: Maker, x: float, y: float, z: float, of: Material, kind: str) -> None:
-    """What stands at the end of an arm: a candle, a ball, a shade of cloth or a bell of glass."""
+    """The light at the end of an arm: a candle, a ball, a shade of cloth or a bell of glass."""
     if kind == "candle":
         _candle(m, x, y, z, of)
         return
@@ -61,18 +62,15 @@ def _cup(m: Maker, x: float, y: float, z: float, of: Material, kind: str) -> Non
 
 def _hang(m: Maker, low: float, h: float, of: Material) -> None:
     """A rod or a chain from low to the canopy at h."""
-    m.revolve(
-        [(0.0, h - 0.03), (0.025, h - 0.03), (0.06, h - 0.006), (0.06, h), (0.0, h)], n=20, of=of
-    )
+    m.turned([(0.025, h - 0.03), (0.06, h - 0.006), (0.06, h)], n=20, of=of)
     if m.chance(0.5):
         m.rod(0.0, (low, h - 0.028), 0.0, 0.006, n=7, of=of)
         return
     n = max(int((h - 0.02 - low) / 0.04), 1)
     step = (h - 0.02 - low) / n
     for k in range(n):
-        ring = [
-            (0.009 * cos(t), 0.62 * step * sin(t), 0.0) for t in (2 * pi * j / 8 for j in range(9))
-        ]
+        ring = [(0.009 * cos(t), 0.62 * step * sin(t),
+            0.0) for t in (2 * pi * j / 8 for j in range(9))]
         m.tube(ring, 0.0022, n=4, turn=rotation_y(pi / 2 * (k % 2)),
             at=(0.0, low + step * (k + 0.5), 0.0), of=of)
 
@@ -84,9 +82,8 @@ def arms(m: Maker, r: float, h: float, of: Material) -> None:
     m.revolve([(0.0, 0.0), (0.012, 0.01), (0.028, 0.03), (0.012, 0.055), (0.035, 0.1), (0.05, 0.14),
         (0.02, 0.19), (0.012, 0.25 * h + 0.06), (0.022, 0.3 * h + 0.06), (0.01, body), (0.0, body)],
         n=18, of=of)
-    tiers = [(n, reach, 0.1)] + (
-        [(max(n // 2, 3), 0.55 * reach, 0.3 * h)] if h > 0.6 and n < 8 and m.chance(0.6) else []
-    )
+    tiers = [(n, reach, 0.1)] + ([(max(n // 2, 3), 0.55 * reach,
+        0.3 * h)] if h > 0.6 and n < 8 and m.chance(0.6) else [])
     for count, far, y in tiers:
         for k in range(count):
             a = 2 * pi * (k + 0.5 * (y > 0.11)) / count
@@ -137,17 +134,17 @@ def crystal(m: Maker, r: float, h: float, of: Material) -> None:
         long = min(y - 0.006, 0.5 * top / n_rings + 0.06) if j < n_rings - 1 else y - 0.002
         for k in range(n):
             a = 2 * pi * k / n
-            at = polar(q, y - long, a)
+            position = polar(q, y - long, a)
             if shape == "rods":
-                m.cylinder(0.007, 0.0, long - 0.004, n=5, at=at, of=drop)
+                m.cylinder(0.007, 0.0, long - 0.004, n=5, at=position, of=drop)
             elif shape == "beads":
                 for i in range(2):
-                    m.sphere((0, 0, 0), 0.012, n=5, at=(at[0], y - long * (0.35 + 0.5 * i), at[2]),
-                        of=drop)
-                m.rod(at[0], (y, y - long * 0.95), at[2], 0.0015, n=3, of=of)
+                    m.sphere((0, 0, 0), 0.012, n=5, at=(position[0], y - long * (0.35 + 0.5 * i),
+                        position[2]), of=drop)
+                m.rod(position[0], (y, y - long * 0.95), position[2], 0.0015, n=3, of=of)
             else:
                 m.revolve([(0.0, 0.0), (0.011, 0.22 * long), (0.002, long - 0.004),
-                    (0.0, long - 0.004)], n=6, at=at, of=drop)
+                    (0.0, long - 0.004)], n=6, at=position, of=drop)
     m.rod(0.0, (0.45 * top, top + 0.01), 0.0, 0.01, of=of)
     for k in range(4):
         a = pi / 2 * k + 0.4

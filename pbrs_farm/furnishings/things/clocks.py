@@ -1,4 +1,4 @@
-"""Clocks that stand; no effects."""
+"""Table clocks; no effects."""
 
 from __future__ import annotations
 
@@ -15,16 +15,15 @@ from pbrs_farm.furnishings.things.outlines import bent, rect, rings
 
 @thing(group="clock", called="alarm_clock")
 def clock(m: Maker) -> None:
-    """A clock to stand: digital, round, with two bells, a wedge, for a mantel, under a glass dome."""
+    """A table clock: digital, round, with two bells, a wedge, for a mantel, under a glass dome."""
     form = m.integers(0, 13)
     material = m.metal if m.chance(0.35) else plain("clock", m.any_colour(), 0.4)
     grain = plain("clock wood", m.wood, 0.45)
     match form:
         case 0:  # digital
             m.box(0.14, 0.07, 0.05, 0.004, of=material)
-            m.box(
-                0.11, (0.015, 0.055), (0.025, 0.0255), of=plain("display", (0.05, 0.06, 0.05), 0.1)
-            )
+            m.box(0.11, (0.015, 0.055), (0.025, 0.0255), of=plain("display", (0.05, 0.06, 0.05),
+                0.1))
         case 1:  # round, on a foot
             with m.moved(at=(0, 0.062, 0)):
                 clock_face(m, 0.055, material)
@@ -85,8 +84,8 @@ def bell_clock(m: Maker, material: Material) -> None:
             m.revolve([(0, 0), (0.022, 0), (0.019, 0.012), (0, 0.02)], n=14,
                 turn=rotation_z(-x * 0.6), at=(x * 0.033, 0.126, 0))
             m.tube([(x * 0.025, 0.03, 0), (x * 0.04, 0.0, 0)], 0.004, n=6)
-        m.tube(bent([(-0.03, 0.125, 0), (-0.02, 0.165, 0), (0.02, 0.165, 0),
-            (0.03, 0.125, 0)], 0.02, n=3), 0.003, n=6)
+        m.tube(bent([(-0.03, 0.125, 0), (-0.02, 0.165, 0), (0.02, 0.165, 0), (0.03, 0.125, 0)],
+            0.02, n=3), 0.003, n=6)
 
 
 def domed_clock(m: Maker, grain: Material) -> None:
@@ -108,10 +107,9 @@ def carriage_clock(m: Maker) -> None:
         m.box(0.09, (0.115, 0.13), 0.08, 0.003)
         for x, z in product((-0.039, 0.039), (-0.034, 0.034)):
             m.rod(x, (0.012, 0.118), z, 0.005)
-        m.tube(bent([(-0.03, 0.128, 0), (-0.03, 0.165, 0), (0.03, 0.165, 0),
-            (0.03, 0.128, 0)], 0.015, n=3), 0.004, n=6)
-    m.box(0.068, (0.015, 0.115), (-0.03, 0.026), 0.002,
-        of=plain("case", (0.9, 0.88, 0.82), 0.4))
+        m.tube(bent([(-0.03, 0.128, 0), (-0.03, 0.165, 0), (0.03, 0.165, 0), (0.03, 0.128, 0)],
+            0.015, n=3), 0.004, n=6)
+    m.box(0.068, (0.015, 0.115), (-0.03, 0.026), 0.002, of=plain("case", (0.9, 0.88, 0.82), 0.4))
     with m.moved(at=(0, 0.068, 0.0075)):
         clock_face(m, 0.03, m.metal)
 
@@ -121,8 +119,7 @@ def clock_radio(m: Maker, material: Material, grain: Material) -> None:
     m.box(0.24, (0.004, 0.11), 0.1, 0.01, of=m.pick(grain, material))
     m.box((-0.11, 0.02), (0.02, 0.1), (0.049, 0.053), 0.002,
         of=plain("grille", (0.2, 0.2, 0.21), 0.9))
-    m.box((0.035, 0.11), (0.06, 0.1), (0.05, 0.0506), of=plain("display",
-        (0.05, 0.06, 0.05), 0.1))
+    m.box((0.035, 0.11), (0.06, 0.1), (0.05, 0.0506), of=plain("display", (0.05, 0.06, 0.05), 0.1))
     m.revolve([(0, 0), (0.016, 0), (0.014, 0.012), (0, 0.013)], turn=LYING_ALONG_Z,
         at=(0.072, 0.035, 0.0495), of=m.metal)
     for x, z in product((-0.1, 0.1), (-0.035, 0.035)):
@@ -131,8 +128,8 @@ def clock_radio(m: Maker, material: Material, grain: Material) -> None:
 
 def clock_face(m: Maker, r: float, material: Material) -> None:
     """A case, a dial and two hands, facing +z about the origin."""
-    m.revolve([(0, -0.02), (r * 0.9, -0.02), (r, 0), (r * 0.9, 0.02), (r * 0.85, 0.021),
-        (0, 0.021)], n=24, turn=LYING_ALONG_Z, of=material)
+    m.turned([(r * 0.9, -0.02), (r, 0), (r * 0.9, 0.02), (r * 0.85, 0.021)], n=24,
+        turn=LYING_ALONG_Z, of=material)
     m.revolve([(0, 0.0211), (r * 0.8, 0.0211), (0, 0.022)], n=24, turn=LYING_ALONG_Z,
         of=plain("dial", m.pick((0.93, 0.93, 0.9), (0.9, 0.86, 0.76), (0.1, 0.1, 0.1)), 0.5))
     for long in (0.45, 0.7):

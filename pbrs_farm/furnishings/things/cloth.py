@@ -105,7 +105,7 @@ def draped(
     wave: float = 1.0,
     n: int = 14,
 ) -> Surface:
-    """A cover over the left, right and front edge of what is w wide and d deep about the origin.
+    """A cover over the left, right and front edge of a top w wide and d deep about the origin.
 
     Its top is at y = 0, drop hangs down; folds: how deep they are at the hem; wave: how many.
     """
@@ -119,7 +119,7 @@ def draped(
     fall = (fall_x**4 + fall_z**4) ** 0.25
     share = fall / max(drop, 1e-6)
     ripple = folds * share * np.sin(28.0 * wave * (x / max(w, 0.1) + 1.7 * z / max(d, 0.1)))
-    # On top it lies in soft waves.
+    # soft waves on top
     swell = np.sin(7.1 * wave * x / w + 2.3 * z / d) + np.sin(5.3 * wave * z / d - 3.1 * x / w)
     swell *= 0.35 * folds * (1 - share)
     to_side, to_front = np.sign(x) * (fall_x >= fall_z), 1.0 * (fall_z > fall_x)
@@ -128,7 +128,7 @@ def draped(
 
 
 def _over_edge(at: F64, half: float) -> tuple[F64, F64]:
-    """(place across, how far it hangs) of cloth that lies up to half either way and hangs below."""
+    """(position across, drop) of a cloth: flat up to `half` either way, hanging beyond."""
     over = np.maximum(np.abs(at) - half, 0.0)
     out = np.minimum(np.abs(at), half) + 0.02 * np.minimum(over / 0.05, 1.0)
     return np.sign(at) * out, np.maximum(over - 0.015, 0.0)

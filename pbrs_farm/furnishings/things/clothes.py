@@ -141,7 +141,7 @@ def bag(m: Maker) -> None:
 
 @thing(group="bag", nyu40=BAG)
 def suitcase(m: Maker) -> None:
-    """A suitcase that stands on its wheels."""
+    """A suitcase on its wheels."""
     w, h, d = m.uniform(0.38, 0.5), m.uniform(0.52, 0.7), m.uniform(0.2, 0.28)
     hd = d / 2
     usual = m.chance(0.6)

@@ -1,4 +1,4 @@
-"""What lies on a desk: screens, laptops, papers, pens, telephones, binders, loudspeakers; no effects."""
+"""Desk items: screens, laptops, papers, pens, telephones, binders, loudspeakers; no effects."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from numpy import pi
 from pbrs_farm.core.classes import BOOKS, PAPER
 from pbrs_farm.core.frames import LYING_ALONG_X, LYING_ALONG_Z, rotation_x, rotation_y, rotation_z
 from pbrs_farm.dress.style import shade
-from pbrs_farm.furnishings.things.bodies import sphere, stretched
 from pbrs_farm.furnishings.things.maker import Maker, thing
 from pbrs_farm.furnishings.things.materials import BLACK_GLASS, BLACK_STEEL, CHROME, STEEL, plain
 
@@ -35,11 +34,9 @@ def monitor(m: Maker) -> None:
     keys = plain("keys", m.pick((0.1, 0.1, 0.1), (0.88, 0.88, 0.87)), 0.6)
     m.box((-0.21, 0.16), 0.016, (0.1, 0.23), 0.004, of=black)
     for i, k in product(range(4), range(12)):
-        m.box(
-            0.024, (0.016, 0.02), 0.024, x=0.0292 * k - 0.188, against=0.108 + 0.0292 * i, of=keys
-        )
-    m.add(stretched(sphere((0, 0, 0), 1.0, n=12), (0.032, 0.018, 0.055)), at=(0.22, 0.018, 0.17),
-        of=black)
+        m.box(0.024, (0.016, 0.02), 0.024, x=0.0292 * k - 0.188, against=0.108 + 0.0292 * i,
+            of=keys)
+    m.ellipsoid((0.032, 0.018, 0.055), n=12, at=(0.22, 0.018, 0.17), of=black)
 
 
 @thing(group="laptop")
@@ -50,9 +47,8 @@ def laptop(m: Maker) -> None:
     grey = m.pick(0.12, 0.62, 0.75)
     shell = plain("laptop", (grey, grey, grey * 1.01), 0.35)
     m.box(w, 0.014, d, of=shell)
-    m.box(
-        0.88 * w, (0.014, 0.0155), (-d * 0.38, d * 0.08), of=plain("keys", (0.09, 0.09, 0.09), 0.6)
-    )
+    m.box(0.88 * w, (0.014, 0.0155), (-d * 0.38, d * 0.08),
+        of=plain("keys", (0.09, 0.09, 0.09), 0.6))
     m.box(0.3 * w, (0.014, 0.0145), (d * 0.16, d * 0.42), of=plain("pad",
         shade((grey, grey, grey), 0.85), 0.3))
     # Lid and screen are open by 105 degrees about the hinge at the back.
@@ -79,9 +75,9 @@ def papers(m: Maker) -> None:
 def notebook(m: Maker) -> None:
     """A notebook with a pen on it."""
     m.box(0.15, 0.014, 0.21, of=plain("notebook", m.any_colour(), 0.6))
-    # The pages stand out of the cover by up to 1 mm, on all sides but the spine's.
+    # The pages exceed the cover by up to 1 mm, except at the spine.
     m.box(0.1485, (0.003, 0.011), 0.212, x=0.00125, of=plain("pages", (0.9, 0.89, 0.84), 0.9))
-    # An upright pen 14 cm long lies along x, its middle at the origin, and is then turned.
+    # A pen 14 cm long is made along x about the origin, and then turned.
     with (m.moved(turn=rotation_y(m.uniform(-0.6, 0.6)), at=(0.01, 0.0142 + 0.0045, 0)),
         m.of(plain("pen", m.pick((0.08, 0.1, 0.3), (0.05, 0.05, 0.05), (0.6, 0.1, 0.1)), 0.3))):
         m.revolve([(0, 0), (0.002, 0.002), (0.0045, 0.015), (0.0045, 0.138), (0, 0.14)], n=8,
@@ -116,7 +112,7 @@ def phone(m: Maker) -> None:
     """A mobile phone, its screen up."""
     m.box(0.072, 0.0085, 0.15, of=plain("phone", m.pick((0.1, 0.1, 0.11), (0.8, 0.8, 0.8),
         (0.3, 0.35, 0.45)), 0.3))
-    # The screen lies 0.3 mm proud of the shell.
+    # The screen is 0.3 mm proud of the shell.
     m.box(0.067, (0.0085, 0.0088), 0.143, of=plain("screen", (0.02, 0.02, 0.025), 0.06))
 
 
@@ -154,9 +150,8 @@ def electronics(m: Maker) -> None:
             m.name, w, h = "radio", m.uniform(0.22, 0.3), m.uniform(0.13, 0.18)
             m.rounded(w, (0.008, h), 0.1, 0.018, n=3, of=shell)
             m.box(0.024, 0.0085, 0.07, 0.002, left=0.028 - w / 2, mirrored="x", of=black)
-            m.cylinder(
-                h * 0.34, 0, 0.003, n=22, turn=LYING_ALONG_Z, at=(-w / 4, h * 0.52, 0.0495), of=mesh
-            )
+            m.cylinder(h * 0.34, 0, 0.003, n=22, turn=LYING_ALONG_Z, at=(-w / 4, h * 0.52, 0.0495),
+                of=mesh)
             m.box((0.01, w / 2 - 0.03), (h * 0.55, h * 0.78), (0.0495, 0.051),
                 of=plain("scale", (0.85, 0.8, 0.65), 0.4))
             for x in (0.035, w / 2 - 0.045):
@@ -187,8 +182,6 @@ def electronics(m: Maker) -> None:
             m.name, w = "console", m.uniform(0.26, 0.3)
             m.box(w, 0.055, (-0.12, 0.06), 0.005, of=shell)
             m.box((-w / 2 + 0.04, w / 2 - 0.1), (0.03, 0.036), (0.06, 0.0606), of=black)
-            m.add(stretched(sphere((0, 0, 0), 1.0, n=12), (0.07, 0.018, 0.035)),
-                at=(-0.02, 0.018, 0.13), of=black)
+            m.ellipsoid((0.07, 0.018, 0.035), n=12, at=(-0.02, 0.018, 0.13), of=black)
             for x in (-0.09, 0.05):
-                m.add(stretched(sphere((0, 0, 0), 1.0, n=10), (0.02, 0.016, 0.035)),
-                    at=(x, 0.016, 0.145), of=black)
+                m.ellipsoid((0.02, 0.016, 0.035), n=10, at=(x, 0.016, 0.145), of=black)

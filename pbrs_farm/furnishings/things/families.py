@@ -1,8 +1,8 @@
 """The generated catalogue: families of furniture, many variations each.
 
-A variation is known by its family, its number and its style (`generated#cooker-07-nordic`). Its size
-is drawn at once, its shape when it is used. Variations of a set (a kitchen) that have one number share
-what the set draws. Effects: imports the modules of installed plugins that add furniture.
+A variation has a family, a number and a style (`generated#cooker-07-nordic`). Its size
+is drawn at once, its shape on use. Variations of a set (a kitchen) with the same number share
+the values that the set draws. Effects: imports the modules of installed plugins that add furniture.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ from pbrs_farm.furnishings.things.assembly import GENERATED
 from pbrs_farm.furnishings.things.maker import Family, described_in
 
 VERSION: Final = 8
-"""Of what families are written with: part of the catalogue's digest. Raised when a shape changes."""
+"""Part of the catalogue's digest: raised when a shape changes."""
 
 # The order decides which piece a seed draws.
 _MODULES: Final = (
@@ -94,7 +94,7 @@ def families() -> Mapping[str, Family]:
 
 
 def is_of_family(piece: Piece) -> bool:
-    """Whether a piece is a variation of a family."""
+    """True if a piece is a variation of a family."""
     return piece.id in family_numbers()
 
 
@@ -110,7 +110,7 @@ def family_pieces() -> tuple[Piece, ...]:
 
 @cache
 def family_numbers() -> dict[str, tuple[str, int]]:
-    """Of each variation's id: its family, its number."""
+    """Family and number of each variation, by id."""
     rows = (
         (name, number)
         for name, family in families().items()
@@ -120,7 +120,7 @@ def family_numbers() -> dict[str, tuple[str, int]]:
 
 
 def family_shape(piece: Piece) -> Shape:
-    """The shape of a variation, as large as it says."""
+    """The shape of a variation, scaled to the size of its piece."""
     return fitted_to_size(_drawn(piece), piece)
 
 
@@ -130,7 +130,7 @@ def fitted_to_size(shape: Shape, piece: Piece) -> Shape:
 
 
 def drawn_size(piece: Piece) -> tuple[float, float, float]:
-    """Width, depth and height of a variation as its steps draw it, metres."""
+    """Width, depth and height of a variation before scaling, metres."""
     low, high = _drawn(piece).bounds
     width, height, depth = (float(v) for v in high - low)
     return width, depth, height
@@ -146,7 +146,7 @@ def _drawn(piece: Piece) -> Shape:
 
 
 def _shared(family: Family, number: int) -> tuple[Style, tuple[Any, ...]]:
-    # The taste of a variation, and what it has in common with those of its set.
+    # The style of a variation, and the values of its set.
     of = family.of_set.__name__ if family.of_set else family.name
     rng = np.random.default_rng(keys.seed("family", of, number))
     style = style_for(rng)
@@ -156,7 +156,7 @@ def _shared(family: Family, number: int) -> tuple[Style, tuple[Any, ...]]:
 def _piece(name: str, number: int) -> Piece:
     family = families()[name]
     style, shared = _shared(family, number)
-    own = np.random.default_rng(keys.seed("family", "size", name, number))
+    rng = np.random.default_rng(keys.seed("family", "size", name, number))
     taste = style.name.replace(" ", "-")
     return Piece(
         f"{GENERATED}{name}-{number:02d}-{taste}",
@@ -164,17 +164,17 @@ def _piece(name: str, number: int) -> Piece:
         family.group,
         family.place,
         family.nyu40,
-        family.size(own, style, *shared),
+        family.size(rng, style, *shared),
         ItemKind.LAMP if family.nyu40 == LAMP else ItemKind.OBJECT,
         of_set=f"{family.of_set.__name__} {number}" if family.of_set else "",
     )
 
 
 def _sized(shape: Shape, piece: Piece) -> Shape:
-    """The shape as wide, deep and high as the piece says, with what hangs on a wall before z = 0."""
+    """The shape scaled to the piece's size; wall pieces start at z = 0."""
     low, high = shape.bounds
-    wanted = np.array([piece.size[0], piece.size[2], piece.size[1]])
-    scale = wanted / np.maximum(high - low, 1e-6)
+    target = np.array([piece.size[0], piece.size[2], piece.size[1]])
+    scale = target / np.maximum(high - low, 1e-6)
     base = np.array([(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])
     if piece.place is Place.WALL:
         base[2] = low[2]
@@ -198,7 +198,7 @@ def _scaled(surface: Surface, scale: F64, base: F64) -> Surface:
 
 
 def _lit(shape: Shape, piece: Piece) -> Shape:
-    """The shape with the light that its surfaces of opal glass give together."""
+    """The shape with one light for all its surfaces of opal glass."""
     bulbs = tuple(
         k
         for k, surface in enumerate(shape.surfaces)
@@ -222,7 +222,7 @@ def _lit(shape: Shape, piece: Piece) -> Shape:
 
 @cache
 def families_digest() -> str:
-    """Of everything that families are written with, and of the plugins that add some."""
+    """Digest of the modules of all families, and of the plugins that add some."""
     texts = [Path(str(module.__file__)).read_bytes() for module in (joints, *_MODULES)]
-    known = [hashlib.sha256(text).hexdigest() for text in texts]
-    return keys.digest(VERSION, *known, *marks_in_digest("furniture", plugins("furniture")))
+    digests = [hashlib.sha256(text).hexdigest() for text in texts]
+    return keys.digest(VERSION, *digests, *marks_in_digest("furniture", plugins("furniture")))

@@ -1,4 +1,4 @@
-"""What fills a wall from side to side and up to the ceiling: wardrobes, bookcases, show cases; no effects.
+"""Furniture that fills a wall up to the ceiling: wardrobes, bookcases, show cases; no effects.
 
 Furnishing stretches them to the wall they are for (generate/furnish/fitted_walls.py), and so does dressing.
 """
@@ -34,6 +34,7 @@ from pbrs_farm.furnishings.things.shapes import Pair
 
 # fmt: off
 
+
 _BOARD_M: Final = 0.018
 _BACK_M: Final = 0.008
 
@@ -46,7 +47,7 @@ def _stuff(m: Maker, dark_share: float) -> Material:
 
 
 def _filled_in(m: Maker, size: Size, front: float, foot: float, of: Material) -> tuple[Pair, Pair]:
-    """A plinth, and strips at both ends and at the ceiling; x and y of what is between."""
+    """A plinth, and strips at both ends and at the ceiling. Returns x and y of the space between."""
     w, d, h = size
     side, top = m.uniform(0.02, 0.05), m.uniform(0.02, 0.06)
     with m.of(of):
@@ -67,9 +68,8 @@ def fitted_wardrobe(m: Maker, size: Size) -> None:
     front = m.pick(body, body, WHITE, m.timber)
     form = m.weighted(0.4, 0.28, 0.32)
     kinds = ("flat", "flat", "raised") if form == 1 else ("flat", "shaker", "shaker", "grooved")
-    look = Look(
-        m.pick(*kinds), front, body, body, m.pick("square", "none", "edge", "disc"), m.metal
-    )
+    look = Look(m.pick(*kinds), front, body, body, m.pick("square", "none", "edge", "disc"),
+        m.metal)
     f = d / 2 - 0.02
     x, y = _filled_in(m, size, f, m.pick(0.05, 0.07, 0.1), body)
     hollow(m, x, y, (-d / 2, f), _BOARD_M, body)
@@ -87,10 +87,9 @@ def fitted_wardrobe(m: Maker, size: Size) -> None:
             _leaves(m, x, y, f - 0.03, -d / 2 + _BACK_M, front, body)
 
 
-def _leaves(
-    m: Maker, x: Pair, y: Pair, z: float, back: float, front: Material, body: Material
-) -> None:
-    """Leaves that slide one before the other on two rails; every other one may be a mirror."""
+def _leaves(m: Maker, x: Pair, y: Pair, z: float, back: float, front: Material,
+    body: Material) -> None:
+    """Leaves that slide past each other on two rails; every second may be a mirror."""
     n = max(2, round((x[1] - x[0]) / 1.0))
     step, rail = (x[1] - x[0]) / n, m.pick(STEEL, BLACK_STEEL, WHITE_STEEL, body)
     mirror, is_panelled = m.pick(-1, -1, 0, 1), m.chance(0.4)
@@ -101,19 +100,19 @@ def _leaves(
     for k in range(n):
         a = max(x[0] + k * step - 0.03, x[0] + _BOARD_M)
         b = min(x[0] + (k + 1) * step + 0.03, x[1] - _BOARD_M)
-        at = z + 0.024 * (k % 2)
+        face = z + 0.024 * (k % 2)
         with m.sliding("leaf", along=(1.0 if k < n - 1 else -1.0, 0.0, 0.0), upper_m=step - 0.08):
-            m.box((a + 0.002, b - 0.002), (low, high), 0.018, 0.0015, against=at, of=front)
+            m.box((a + 0.002, b - 0.002), (low, high), 0.018, 0.0015, against=face, of=front)
             if k % 2 == mirror:
-                m.box((a + 0.03, b - 0.03), (low + 0.03, high - 0.03), 0.001, against=at + 0.0182,
+                m.box((a + 0.03, b - 0.03), (low + 0.03, high - 0.03), 0.001, against=face + 0.0182,
                     of=SILVERED)
             elif is_panelled:
                 for c in (1, 2):
                     mid = low + (high - low) * c / 3
-                    m.box((a + 0.002, b - 0.002), 0.012, 0.001, on=mid - 0.006, against=at + 0.0182,
-                        of=rail)
+                    m.box((a + 0.002, b - 0.002), 0.012, 0.001, on=mid - 0.006,
+                        against=face + 0.0182, of=rail)
             for grip in (a + 0.002, b - 0.024):
-                m.box(0.022, (low, high), 0.0016, left=grip, against=at + 0.0182, of=rail)
+                m.box(0.022, (low, high), 0.0016, left=grip, against=face + 0.0182, of=rail)
         inner = (x[0] + k * step + (0.008 if k else _BOARD_M),
             x[0] + (k + 1) * step - (0.008 if k < n - 1 else _BOARD_M))
         if k:
@@ -150,8 +149,8 @@ def fitted_bookcase(m: Maker, size: Size) -> None:
             # Boards at the foot and the top, and shelves not all at the heights of the next bay's.
             shift = m.pick(0.0, 0.0, 0.0, 0.06)
             for j in range(rows + 1):
-                at = cut + (y[1] - t - cut) * j / rows - (shift if 1 < j < rows else 0.0)
-                m.box((a, b), t, (back, f - 0.004), on=at)
+                level = cut + (y[1] - t - cut) * j / rows - (shift if 1 < j < rows else 0.0)
+                m.box((a, b), t, (back, f - 0.004), on=level)
     if form == 1:
         kinds = m.pick(("door",), ("door",), ("drawer", "drawer"))
         fronts_of(m, look, (x[0], x[1]), (y[0], cut + t), f, [kinds] * n, False,
@@ -170,9 +169,8 @@ def fitted_cabinet(m: Maker, size: Size) -> None:
     w, d, h = size
     hw = w / 2
     body = _stuff(m, 0.55)
-    look = Look(
-        m.pick("flat", "raised"), body, body, body, m.pick("edge", "square", "none"), m.metal
-    )
+    look = Look(m.pick("flat", "raised"), body, body, body, m.pick("edge", "square", "none"),
+        m.metal)
     n, f = max(2, round(w / 0.56)), d / 2 - 0.025
     low, cut, shallow = m.pick(0.05, 0.08), m.uniform(0.8, 0.95), f - m.uniform(0.08, 0.14)
     has_crown = m.chance(0.6)
@@ -216,22 +214,22 @@ def _glass_door(m: Maker, look: Look, x: Pair, y: Pair, z: float, opens_left: bo
 
 
 def _china(m: Maker, ware: Material, x: Pair, y: float, z: float) -> None:
-    """One or two things that stand behind glass on a shelf at y."""
+    """One or two dishes behind glass on a shelf at y."""
     n = m.weighted(0.35, 0.35, 0.3)
     for k in range(n):
-        at = (x[0] + (x[1] - x[0]) * (k + 0.5) / n, y + 0.0002, z + m.normal(0, 0.01))
+        position = (x[0] + (x[1] - x[0]) * (k + 0.5) / n, y + 0.0002, z + m.normal(0, 0.01))
         r = min(0.1, 0.42 * (x[1] - x[0]) / n)
         match m.integers(0, 4):
             case 0:  # plates on each other
                 high = m.uniform(0.03, 0.09)
                 m.revolve([(0.0, 0.0), (0.6 * r, 0.0), (r, 0.012), (r, high), (0.0, high - 0.01)],
-                    n=10, at=at, of=ware)
+                    n=10, at=position, of=ware)
             case 1:  # a jug or a vase
                 high = m.uniform(0.14, 0.22)
                 m.revolve([(0.0, 0.0), (0.5 * r, 0.0), (0.75 * r, 0.35 * high),
-                    (0.35 * r, 0.8 * high), (0.45 * r, high), (0.0, high - 0.01)], n=10, at=at,
-                    of=m.pick(ware, m.china()))
+                    (0.35 * r, 0.8 * high), (0.45 * r, high), (0.0, high - 0.01)], n=10,
+                    at=position, of=m.pick(ware, m.china()))
             case _:  # bowls, cups upside down
                 high = m.uniform(0.07, 0.11)
                 wide, narrow = min(0.06, 0.7 * r), min(0.035, 0.4 * r)
-                m.frustum((wide, 0.0), (narrow, high), n=10, at=at, of=ware)
+                m.frustum((wide, 0.0), (narrow, high), n=10, at=position, of=ware)

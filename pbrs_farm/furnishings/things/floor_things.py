@@ -1,4 +1,4 @@
-"""What lies on floors beside boxes, bags and shoes: cables, bricks to play with, a computer, a mat; no effects."""
+"""Items on floors: cables, toy bricks, a computer, a mat; no effects."""
 
 from __future__ import annotations
 
@@ -23,9 +23,8 @@ def power_strip(m: Maker) -> None:
     m.box(long, 0.038, 0.052, 0.006, of=body)
     for k in range(n):
         x = -long / 2 + 0.045 + 0.045 * k
-        m.cylinder(
-            0.017, 0.0375, 0.0385, n=14, at=(x, 0.0, 0.0), of=plain("socket", (0.2, 0.2, 0.2), 0.6)
-        )
+        m.cylinder(0.017, 0.0375, 0.0385, n=14, at=(x, 0.0, 0.0),
+            of=plain("socket", (0.2, 0.2, 0.2), 0.6))
         if m.chance(0.45):
             plug = plain("plug", m.pick((0.07, 0.07, 0.07), (0.9, 0.9, 0.88)), 0.5)
             m.add(bevelled((x - 0.017, 0.0385, -0.02), (x + 0.017, 0.0385 + m.uniform(0.02, 0.05),
@@ -33,7 +32,7 @@ def power_strip(m: Maker) -> None:
             end = 0.2 + 0.1 * m.uniform(0, 1)
             m.tube(bent([(x, 0.05, 0.018), (x, 0.045, 0.06), (x + m.normal(0, 0.05), 0.004, 0.11),
                 (x + m.normal(0, 0.1), 0.004, end)], 0.03, n=3), 0.003, n=5, of=plug)
-    # The cable leaves at one end, lies in a loop and goes on.
+    # The cable leaves at one end, makes a loop and goes on.
     r, z = m.uniform(0.07, 0.12), m.uniform(-0.05, 0.05)
     path: list[Triple] = [(long / 2 - 0.01, 0.012, 0.0), (long / 2 + 0.05, 0.005, 0.0)]
     turns = m.pick(1.0, 1.6, 2.4)
@@ -55,17 +54,19 @@ def toy_blocks(m: Maker) -> None:
         # A ring of places keeps them apart.
         a, r = 2.4 * k, 0.055 * (k + 0.6) ** 0.62
         s = m.uniform(0.014, 0.021)
-        at = polar(r, 0.0, a)
+        position = polar(r, 0.0, a)
         of = m.pick(*colours)
         match m.integers(0, 5):
             case 0:
-                m.cylinder(s, 0.0, 2 * s, n=14, at=at, of=of)
+                m.cylinder(s, 0.0, 2 * s, n=14, at=position, of=of)
             case 1:
-                m.sphere((0.0, s, 0.0), s, n=10, at=at, of=of)
+                m.sphere((0.0, s, 0.0), s, n=10, at=position, of=of)
             case 2:
-                m.box(3.8 * s, s, 2 * s, 0.0015, at=at, turn=rotation_y(m.uniform(0, pi)), of=of)
+                m.box(3.8 * s, s, 2 * s, 0.0015, at=position, turn=rotation_y(m.uniform(0, pi)),
+                    of=of)
             case _:
-                m.box(2 * s, 2 * s, 2 * s, 0.0015, at=at, turn=rotation_y(m.uniform(0, pi)), of=of)
+                m.box(2 * s, 2 * s, 2 * s, 0.0015, at=position, turn=rotation_y(m.uniform(0, pi)),
+                    of=of)
 
 
 @thing(group="computer", called="computer_tower")
@@ -91,11 +92,11 @@ def computer_tower(m: Maker) -> None:
 
 @thing(group="mat", called="rolled_mat")
 def rolled_mat(m: Maker) -> None:
-    """A mat for exercise, rolled up and lying, a strap round it."""
+    """A rolled-up exercise mat with a strap round it."""
     r, long = m.uniform(0.055, 0.08), m.uniform(0.55, 0.65)
     mat = plain("mat foam", m.any_colour(), 0.9)
     m.revolve([(0.0, 0.0), (0.35 * r, 0.004), (0.4 * r, 0.0), (0.7 * r, 0.003), (0.75 * r, 0.0),
         (r, 0.0), (r, long), (0.0, long)], n=24, turn=LYING_ALONG_X, at=(-long / 2, r, 0.0), of=mat)
     for x in (-0.25, 0.25):
-        m.revolve([(0.0, 0.0), (1.02 * r, 0.0), (1.02 * r, 0.02), (0.0, 0.02)], n=24,
-            turn=LYING_ALONG_X, at=(x * long, r, 0.0), of=plain("strap", (0.1, 0.1, 0.1), 0.7))
+        m.turned([(1.02 * r, 0.0), (1.02 * r, 0.02)], n=24, turn=LYING_ALONG_X,
+            at=(x * long, r, 0.0), of=plain("strap", (0.1, 0.1, 0.1), 0.7))

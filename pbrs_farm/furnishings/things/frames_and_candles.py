@@ -1,4 +1,4 @@
-"""Framed photographs that stand, and candles; no effects."""
+"""Framed photographs for tables, and candles; no effects."""
 
 from __future__ import annotations
 
@@ -28,12 +28,11 @@ def table_frame(m: Maker) -> None:
         plain("frame", (0.9, 0.9, 0.88), 0.4), m.metal, plain("frame", m.any_colour(), 0.4))
     match form:
         case 0 | 1:  # without or with a mat
-            leaning_frame(
-                m, w, h, m.uniform(0.01, 0.028), 0.015, material, 0.0 if form == 0 else 0.03
-            )
-        case 2:  # a mat of its own, deep as a box
+            leaning_frame(m, w, h, m.uniform(0.01, 0.028), 0.015, material,
+                0.0 if form == 0 else 0.03)
+        case 2:  # with a mat, deep as a box
             leaning_frame(m, w, h, 0.012, 0.032, material, 0.04)
-        case 3:  # two that are hinged, a little open
+        case 3:  # two hinged frames, a little open
             with m.moved(turn=rotation_y(0.3), at=(-w * 0.48, 0, 0)):
                 frame_of(m, w, h, 0.014, 0.012, material, 0.0)
             with m.moved(turn=rotation_y(-0.3), at=(w * 0.48, 0, 0)):
@@ -63,18 +62,16 @@ def table_frame(m: Maker) -> None:
             m.tube([(0, 0, -h * 0.55), (0, h * 0.8, -h * 0.17)], 0.005, n=6, of=material)
 
 
-def leaning_frame(
-    m: Maker, w: float, h: float, b: float, t: float, material: Material, mat: float
-) -> None:
-    """It leans back by ten degrees on a stand that goes from behind up to the frame's back."""
+def leaning_frame(m: Maker, w: float, h: float, b: float, t: float, material: Material,
+    mat: float) -> None:
+    """It leans back by ten degrees on a prop."""
     with m.moved(turn=rotation_x(-0.17)):
         frame_of(m, w, h, b, t, material, mat)
     m.box(0.03, h * 0.62, (-0.003, 0), turn=rotation_x(0.42), at=(0, 0, -h * 0.352), of=material)
 
 
-def frame_of(
-    m: Maker, w: float, h: float, b: float, t: float, material: Material, mat: float
-) -> None:
+def frame_of(m: Maker, w: float, h: float, b: float, t: float, material: Material,
+    mat: float) -> None:
     """A frame of moulding b wide and t thick round a photograph; mat: how wide its mat is."""
     hw = w / 2
     with m.of(material):
@@ -146,17 +143,16 @@ def candle(m: Maker) -> None:
             for _ in range(m.integers(1, 4)):
                 h = m.uniform(0.06, 0.2)
                 with m.moved(at=(x, 0, m.uniform(-0.02, 0.02))):
-                    m.revolve([(0, 0), (0.035, 0), (0.033, 0.006), (0.008, 0.012),
-                        (0.007, h - 0.02), (0.015, h - 0.015), (0.015, h), (0, h)], of=stick)
+                    m.turned([(0.035, 0), (0.033, 0.006), (0.008, 0.012), (0.007, h - 0.02),
+                        (0.015, h - 0.015), (0.015, h)], of=stick)
                     m.revolve([(0, 0), (0.011, 0), (0.008, 0.19), (0, 0.2)], n=12,
                         at=(0, h + 0.0002, 0), of=wax)
                 x += 0.085
         case 2:  # tea lights
             for k in range(m.integers(2, 6)):
                 with m.moved(at=(0.075 * k, 0, m.uniform(-0.025, 0.025))):
-                    m.vessel(
-                        [(0, 0), (0.026, 0), (0.03, 0.05)], 0.003, of=glass(m.any_colour(), 0.35)
-                    )
+                    m.vessel([(0, 0), (0.026, 0), (0.03, 0.05)], 0.003,
+                        of=glass(m.any_colour(), 0.35))
                     m.cylinder(0.019, 0.004, 0.018, n=14, of=wax)
         case 3:  # in a jar
             r, h = m.uniform(0.035, 0.05), m.uniform(0.07, 0.11)
@@ -184,8 +180,8 @@ def candle(m: Maker) -> None:
         case 5:  # on three arms
             h = m.uniform(0.14, 0.2)
             with m.of(stick):
-                m.revolve([(0, 0), (0.05, 0), (0.048, 0.008), (0.01, 0.018), (0.008, h),
-                    (0.016, h + 0.01), (0, h + 0.01)], n=18)
+                m.turned([(0.05, 0), (0.048, 0.008), (0.01, 0.018), (0.008, h), (0.016, h + 0.01)],
+                    n=18)
                 for x in (-1.0, 1.0):
                     m.tube(bent([(0, 0.55 * h, 0), (x * 0.09, 0.5 * h, 0), (x * 0.09, 0.9 * h, 0)],
                         0.04, n=4), 0.006)
@@ -193,8 +189,7 @@ def candle(m: Maker) -> None:
                 m.revolve([(0, 0), (0.011, 0), (0.009, 0.14), (0, 0.15)], n=10,
                     at=(x, y * h + (0.0105 if x == 0.0 else 0.0), 0), of=wax)
         case 6:  # a ball on a dish
-            m.revolve([(0, 0), (0.05, 0), (0.065, 0.01), (0.062, 0.012), (0.045, 0.005),
-                (0, 0.005)], n=20, of=stick)
+            m.turned([(0.05, 0), (0.065, 0.01), (0.062, 0.012), (0.045, 0.005)], n=20, of=stick)
             if m.chance(0.5):
                 m.sphere((0, 0.047, 0), 0.042, of=wax)
             else:
@@ -203,11 +198,10 @@ def candle(m: Maker) -> None:
 
 def pillar(m: Maker, r: float, tall: float, wax: Material) -> None:
     """A candle with its wick."""
-    # The rim stands 4 mm above the hollow that the wick rises from.
+    # The rim is 4 mm above the hollow of the wick.
     m.revolve([(0, 0), (r, 0), (r, tall - 0.004), (r - 0.004, tall), (0, tall - 0.004)], of=wax)
-    m.frustum(
-        (0.0015, tall - 0.005), (0.001, tall + 0.008), n=5, of=plain("wick", (0.1, 0.1, 0.1), 0.9)
-    )
+    m.frustum((0.0015, tall - 0.005), (0.001, tall + 0.008), n=5,
+        of=plain("wick", (0.1, 0.1, 0.1), 0.9))
 
 
 def photograph(m: Maker, low: Pair, high: Pair) -> None:

@@ -1,4 +1,4 @@
-"""Drinking glasses: a bowl, what it stands on, and what is in it; no effects."""
+"""Drinking glasses: a bowl, a stem or foot, and a drink; no effects."""
 
 from __future__ import annotations
 
@@ -16,10 +16,11 @@ from pbrs_farm.furnishings.things.outlines import bent, fluted, oval, rings
 
 # fmt: off
 
+
 _Shape = tuple[tuple[float, float], ...]
 
 # Of each bowl: half its width and its height in metres, and its outside from the foot to the rim in
-# shares of these. Those of the first table stand on a stem, those of the second on the table.
+# shares of these. The first table is for bowls on a stem, the second for glasses without one.
 _ON_STEMS: Final[dict[str, tuple[float, float, _Shape]]] = {"red wine": (0.045, 0.11,
     ((0.35, 0.04), (0.8, 0.22), (1.0, 0.45), (0.95, 0.7), (0.75, 1.0))),
     "white wine": (0.036, 0.1, ((0.4, 0.05), (0.95, 0.32), (1.0, 0.5), (0.85, 1.0))),
@@ -50,7 +51,7 @@ _WALL_M: Final = 0.002
 
 
 def _filled(m: Maker, r: float, low: float, tall: float, shape: _Shape, share: float) -> None:
-    """What is in a bowl up to a share of its height."""
+    """A drink in a bowl, up to a share of its height."""
     radii, heights = np.array([(0.0, 0.0), *shape]).T
     ys = np.linspace(0.06, share, 5)
     inside = [(float(np.interp(y, heights, radii) * r - _WALL_M - 0.0008),
@@ -95,7 +96,7 @@ def _stemmed(m: Maker) -> None:
 
 
 def _tumbler(m: Maker) -> None:
-    """A glass that stands on its own base, one or a few."""
+    """A glass without a stem, one or a few."""
     name = m.pick(*_TUMBLERS)
     half, tall, shape = _TUMBLERS[name]
     r, tall = half * m.uniform(0.92, 1.08), tall * m.uniform(0.92, 1.1)
@@ -103,13 +104,13 @@ def _tumbler(m: Maker) -> None:
     outer = [(0.0, 0.0), *((x * r, y * tall) for x, y in shape)]
     n = 1 if m.chance(0.75) else m.integers(2, 5)
     for k in range(n):
-        apart = 2.3 * r
+        step = 2.3 * r
         glass = vessel(outer, _WALL_M * (1.0 if base == 1.0 else 1.4), n=16)
-        m.add(glass, at=(apart * (k % 2), 0.0, apart * (k // 2)))
+        m.add(glass, at=(step * (k % 2), 0.0, step * (k // 2)))
         # A thick base is a slab of glass inside.
         if base > 1.0:
             m.cylinder(0.8 * shape[0][0] * r, _WALL_M * 1.5, _WALL_M * base,
-                at=(apart * (k % 2), 0.0, apart * (k // 2)))
+                at=(step * (k % 2), 0.0, step * (k // 2)))
     if n > 1:
         return
     share = m.uniform(0.4, 0.85)
@@ -149,9 +150,8 @@ def _mug(m: Maker) -> None:
     else:
         m.add(handle(r, tall))
     if m.chance(0.5):
-        m.cylinder(
-            r - 0.0075, 0.0135, 0.72 * tall, n=18, of=plain("drink", (0.82, 0.55, 0.12), 0.1)
-        )
+        m.cylinder(r - 0.0075, 0.0135, 0.72 * tall, n=18, of=plain("drink", (0.82, 0.55, 0.12),
+            0.1))
         if m.chance(0.6):
             m.cylinder(r - 0.0075, 0.7202 * tall, 0.86 * tall, n=18,
                 of=plain("foam", (0.93, 0.9, 0.82), 0.9))

@@ -1,4 +1,4 @@
-"""What hangs on walls: shelves, cupboards, rails with tools, sockets, mirrors, pin boards, coats; no effects.
+"""Wall items: shelves, cupboards, rails with tools, sockets, mirrors, pin boards, coats; no effects.
 
 Each has its back at z = 0 and grows to +z, the middle of its lower edge at the origin.
 """
@@ -29,9 +29,10 @@ from pbrs_farm.geometry.solids import lathe, quads_surface
 
 # fmt: off
 
+
 _STICKY: Final[tuple[Rgb, ...]] = ((0.95, 0.88, 0.35), (0.95, 0.6, 0.7), (0.6, 0.85, 0.6),
     (0.55, 0.8, 0.93))
-# Turns what stands upright so that its top looks along +z.
+# turns an upright solid so that its top faces +z
 _LYING: Final = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
 
 
@@ -69,9 +70,8 @@ def wall_cupboard(m: Maker, body: Material, face: Material, width: float, height
         for r in range(rows):
             low, high = r * height / rows, (r + 1) * height / rows
             with opens(m, "flap", (-w, w), (low, high), d + 0.0185, 0.0, is_high=True):
-                m.box(
-                    2 * w - 0.004, (low + 0.002, high - 0.002), 0.018, against=d + 0.0005, of=face
-                )
+                m.box(2 * w - 0.004, (low + 0.002, high - 0.002), 0.018, against=d + 0.0005,
+                    of=face)
                 m.box(0.16, 0.01, 0.0115, on=low + 0.02, against=d + 0.0185, of=m.metal)
         shelves(m, (-w + t, w - t), (0.0, height), (0.008, d), body)
         return
@@ -86,9 +86,8 @@ def wall_cupboard(m: Maker, body: Material, face: Material, width: float, height
             (0.008, d), body)
 
 
-def cupboard_door(
-    m: Maker, face: Material, span: Pair, height: float, d: float, form: int, opens_left: bool
-) -> None:
+def cupboard_door(m: Maker, face: Material, span: Pair, height: float, d: float, form: int,
+    opens_left: bool) -> None:
     """A door of a cupboard that hangs, before d, with what opens it at the end without hinges."""
     x, step = span[0], span[1] - span[0]
     a = x + (step - 0.04 if opens_left else 0.04)
@@ -97,7 +96,7 @@ def cupboard_door(
     match form:
         case 3 | 5:
             with m.of(face):
-                # A frame stands out round a panel.
+                # a raised frame round a panel
                 for y in (0.002, height - 0.062):
                     m.box((x + 0.062, x + step - 0.062), 0.06, 0.005, on=y, against=d + 0.0185)
                 for q in (x + 0.002, x + step - 0.062):
@@ -135,9 +134,8 @@ def tool_rail(m: Maker, width: float) -> None:
     """A bar on two holders with tools, pans and cups on hooks; the bar hangs above y = 0.3."""
     half, y = width / 2, 0.36
     m.cylinder(0.006, 0.0, width, n=12, turn=LYING_ALONG_X, at=(-half, y, 0.045), of=m.metal)
-    m.box(
-        0.016, 0.016, 0.041, left=0.022 - half, on=y - 0.008, against=0.0, mirrored="x", of=m.metal
-    )
+    m.box(0.016, 0.016, 0.041, left=0.022 - half, on=y - 0.008, against=0.0, mirrored="x",
+        of=m.metal)
     x = -half + 0.1
     while x < half - 0.08:
         tool = m.weighted(0.3, 0.3, 0.22, 0.18)
@@ -184,9 +182,8 @@ def pan(m: Maker, x: float, y: float) -> None:
     """A pan that hangs from (x, y), its inside to the front."""
     r, low, black = m.uniform(0.08, 0.1), y - 0.13, plain("pan", (0.07, 0.07, 0.075), 0.4)
     m.box(0.018, (low - 0.004, y - 0.024), (0.028, 0.046), x=x, of=black)
-    m.revolve([(0.0, 0.0), (0.85 * r, 0.0), (r, 0.035), (0.96 * r, 0.035), (0.82 * r, 0.005),
-        (0.0, 0.005)], n=24, turn=LYING_ALONG_Z, at=(x, low - r, 0.008),
-        of=black if m.chance(0.6) else m.metal)
+    m.turned([(0.85 * r, 0.0), (r, 0.035), (0.96 * r, 0.035), (0.82 * r, 0.005)], n=24,
+        turn=LYING_ALONG_Z, at=(x, low - r, 0.008), of=black if m.chance(0.6) else m.metal)
 
 
 def hung_cup(m: Maker, x: float, y: float) -> None:
@@ -194,8 +191,8 @@ def hung_cup(m: Maker, x: float, y: float) -> None:
     r, h = 0.038, 0.085
     with m.of(plain("hung cup", m.any_colour(), 0.25)):
         m.box(0.036, 0.024, 0.01, x=x, on=y - 0.05, z=0.045)
-        m.revolve([(0.0, 0.0), (r, 0.0), (r, h), (r - 0.004, h), (r - 0.004, 0.004), (0.0, 0.004)],
-            n=18, turn=LYING_ALONG_X, at=(x - h / 2, y - 0.03 - 0.018 - r, 0.045))
+        m.turned([(r, 0.0), (r, h), (r - 0.004, h), (r - 0.004, 0.004)], n=18, turn=LYING_ALONG_X,
+            at=(x - h / 2, y - 0.03 - 0.018 - r, 0.045))
 
 
 @thing(group="socket", place=Place.WALL)
@@ -332,9 +329,8 @@ def coat(m: Maker, x: float, is_bath: bool) -> None:
                 at=(x + sign * (wide / 2 - 0.015), 0.02, 0.085))
 
 
-def ring(
-    name: str, low: Sequence[float] | F64, high: Sequence[float] | F64, width: float, depth: float
-) -> Surface:
+def ring(name: str, low: Sequence[float] | F64, high: Sequence[float] | F64, width: float,
+    depth: float) -> Surface:
     """A closed rectangular moulding with mitred corners; low, high (2,) are its outer corners."""
     outer = np.array([[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]])
     inner = outer + width * np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]])

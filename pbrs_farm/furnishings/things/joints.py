@@ -1,4 +1,4 @@
-"""What furniture is put together from: carcasses, fronts that open, pulls, legs; no effects."""
+"""Building blocks of furniture: carcasses, fronts that open, pulls, legs; no effects."""
 
 from __future__ import annotations
 
@@ -26,22 +26,23 @@ from pbrs_farm.furnishings.things.shapes import Pair
 
 # fmt: off
 
+
 _HEIGHTS: Final = {"door": 3.4, "low": 0.7}  # of fronts in one column, against a drawer's
 _FRONT_M: Final = 0.019  # thickness of a front
 _BOARD_M: Final = 0.016  # of a carcass
 _BACK_M: Final = 0.008
-_DOOR_RAD: Final = 95 * pi / 180  # as far as cupboard hinges go: most open so far beside a wall
+_DOOR_RAD: Final = 95 * pi / 180  # limit of usual cupboard hinges
 _FLAP_RAD: Final = 95 * pi / 180
-_FLAP_M: Final = 0.2  # lower fronts are drawers, whatever they are called
-_DRAWN_OUT: Final = 0.75  # of the depth that a drawer comes out
-_SLIDE_M: Final = 0.013  # of a drawer's rail, at either side
-_LEAST_BOX_M: Final = 0.03  # a lower space behind a front holds no drawer
+_FLAP_M: Final = 0.2  # lower fronts are drawers
+_DRAWN_OUT: Final = 0.75  # share of its depth that a drawer opens
+_SLIDE_M: Final = 0.013  # width of a drawer's rail, each side
+_LEAST_BOX_M: Final = 0.03  # least height of a drawer's box
 _SHELF_STEP_M: Final = 0.36
-_HANGING_M: Final = 1.2  # from which a space has a rail for clothes
+_HANGING_M: Final = 1.2  # least height of a space with a rail for clothes
 
 
 class Inside(NamedTuple):
-    """What lies behind fronts."""
+    """The space behind fronts."""
 
     back: float  # z of the back's inner face
     has_boards: bool = True  # uprights between columns, shelves behind doors
@@ -50,7 +51,7 @@ class Inside(NamedTuple):
 
 
 class Look(NamedTuple):
-    """What the doors and drawers of a piece look like."""
+    """Look of the doors and drawers of a piece."""
 
     kind: str  # of a front: flat, shaker, grooved, raised, glazed
     front: Material
@@ -89,10 +90,10 @@ def shell(m: Maker, x: Pair, y: Pair, z: Pair, wall: float, material: Material, 
 
 def opens(m: Maker, kind: str, x: Pair, y: Pair, z: float, back: float, opens_left: bool = True,
     is_high: bool = False) -> AbstractContextManager[None]:
-    """What is added inside opens as a front of its kind does: 'door', 'drawer', 'low', 'flap'.
+    """Add parts inside this context that open as a 'door', 'drawer', 'low' drawer or 'flap'.
 
-    z: of its outer face; back: where the space behind it ends. A door's hinges are at its left
-    where opens_left, a flap's above where is_high.
+    z: of its outer face; back: z of the end of the space behind it. A door's hinges are at its left
+    if opens_left, a flap's above if is_high.
     """
     if kind == "door":
         return m.hinged("door", at=(x[0] if opens_left else x[1], y[0], z),
@@ -104,7 +105,7 @@ def opens(m: Maker, kind: str, x: Pair, y: Pair, z: float, back: float, opens_le
 
 
 def is_drawer(kind: str, y: Pair) -> bool:
-    """Whether a front of that kind and height is one of a drawer."""
+    """True if a front of that kind and height belongs to a drawer."""
     return kind in ("drawer", "low") or (kind == "flap" and y[1] - y[0] <= _FLAP_M)
 
 
@@ -122,17 +123,16 @@ def drawer_box(m: Maker, x: Pair, y: Pair, z: Pair, material: Material, top: flo
         m.box((a + t, b - t), 0.008, (back + t, z[1]), on=low + 0.006)
 
 
-def shelves(
-    m: Maker, x: Pair, y: Pair, z: Pair, material: Material, rail: Material | None = None
-) -> None:
+def shelves(m: Maker, x: Pair, y: Pair, z: Pair, material: Material,
+    rail: Material | None = None) -> None:
     """Shelves in the space x, y, z; rail: one shelf above, a rail for clothes under it."""
     tall = y[1] - y[0]
     levels = [y[0] + tall * k / n for n in (round(tall / _SHELF_STEP_M),) for k in range(1, n)]
     if rail is not None and tall > _HANGING_M:
         levels = [y[1] - 0.3]
         m.rod((x[0], x[1]), y[1] - 0.36, (z[0] + z[1]) / 2, 0.0125, of=rail)
-    for at in levels:
-        m.box((x[0], x[1]), _BOARD_M, (z[0], z[1] - 0.02), on=at, of=material)
+    for level in levels:
+        m.box((x[0], x[1]), _BOARD_M, (z[0], z[1] - 0.02), on=level, of=material)
 
 
 def panel(m: Maker, kind: str, x: Pair, y: Pair, z: float, material: Material) -> None:
@@ -151,9 +151,8 @@ def panel(m: Maker, kind: str, x: Pair, y: Pair, z: float, material: Material) -
             if kind == "shaker":
                 m.box((a + rail, b - rail), (c + rail, d - rail), 0.011, against=z)
             else:
-                m.box(
-                    (a + rail, b - rail), (c + rail, d - rail), 0.004, against=z + 0.006, of=FROSTED
-                )
+                m.box((a + rail, b - rail), (c + rail, d - rail), 0.004, against=z + 0.006,
+                    of=FROSTED)
         elif kind == "grooved":
             m.box((a, b), (c, d), 0.012, against=z)
             n = max(2, round((b - a) / 0.11))
@@ -167,12 +166,11 @@ def panel(m: Maker, kind: str, x: Pair, y: Pair, z: float, material: Material) -
                     0.006, against=z + 0.019)
 
 
-def pull(
-    m: Maker, kind: str, x: float, y: float, z: float, across: bool, long: float, material: Material
-) -> None:
-    """What a front is opened by, its foot at z.
+def pull(m: Maker, kind: str, x: float, y: float, z: float, across: bool, long: float,
+    material: Material) -> None:
+    """The pull of a front, its foot at z.
 
-    Bar, bow, knob, cup, edge, ring or none. across: it lies along x.
+    Bar, bow, knob, cup, edge, ring or none. across: along x.
     """
     h = long / 2
     with m.of(material), m.moved(at=(x, y, z)):
@@ -209,9 +207,8 @@ def pull(
                     m.rod(0.0, 0.0, (0.0, 0.016), 0.004, n=6)
 
 
-def door_front(
-    m: Maker, look: Look, x: Pair, y: Pair, z: float, opens_left: bool, is_high: bool
-) -> None:
+def door_front(m: Maker, look: Look, x: Pair, y: Pair, z: float, opens_left: bool,
+    is_high: bool) -> None:
     """A front with a pull at the side away from its hinges.
 
     At its upper end below, its lower end above eyes.
@@ -234,7 +231,7 @@ def door_front(
 def drawer_front(m: Maker, look: Look, x: Pair, y: Pair, z: float) -> None:
     """The front of a drawer or flap with its pull, or two on wide ones."""
     wide, tall = x[1] - x[0], y[1] - y[0]
-    # What has a frame on doors is flat on low drawers.
+    # Low drawers are flat where doors have a frame.
     is_flat = (tall < 0.17 and look.kind != "grooved") or look.kind == "glazed"
     panel(m, "flat" if is_flat else look.kind, x, y, z, look.front)
     middle, high, long = ((x[0] + x[1]) / 2, y[1] - 0.045 if tall > 0.2 else (y[0] + y[1]) / 2,
@@ -250,10 +247,10 @@ def drawer_front(m: Maker, look: Look, x: Pair, y: Pair, z: float) -> None:
 
 def fronts_of(m: Maker, look: Look, x: Pair, y: Pair, z: float, columns: Sequence[Sequence[str]],
     is_high: bool, inside: Inside, add_to: Callable[[int], None] | None = None) -> None:
-    """Columns of fronts before z that open, each column named from the top, and what is behind them.
+    """Columns of fronts before z that open, each named from the top, and their interiors.
 
-    'door', 'drawer', 'low' (a lower drawer), 'flap', 'open'. add_to: adds to a front of the column of
-    that number what moves with it.
+    'door', 'drawer', 'low' (a lower drawer), 'flap', 'open'. add_to: adds moving parts to a front of
+    the column of that number.
     """
     n, t = len(columns), _BOARD_M
     for k, kinds in enumerate(columns):
@@ -268,10 +265,10 @@ def fronts_of(m: Maker, look: Look, x: Pair, y: Pair, z: float, columns: Sequenc
             c, d = y[1] - (y[1] - y[0]) * below / total, y[1] - (y[1] - y[0]) * above / total
             if kind == "open":
                 continue
-            left = k % 2 == 0 if n > 1 else True
-            with opens(m, kind, (a, b), (c, d), z + _FRONT_M, inside.back, left, is_high):
+            is_left = k % 2 == 0 if n > 1 else True
+            with opens(m, kind, (a, b), (c, d), z + _FRONT_M, inside.back, is_left, is_high):
                 if kind == "door":
-                    door_front(m, look, (a, b), (c, d), z, left, is_high)
+                    door_front(m, look, (a, b), (c, d), z, is_left, is_high)
                 else:
                     drawer_front(m, look, (a, b), (c, d), z)
                 if is_drawer(kind, (c, d)):
@@ -283,9 +280,8 @@ def fronts_of(m: Maker, look: Look, x: Pair, y: Pair, z: float, columns: Sequenc
                     inside.rail if k % 2 == 0 else None)
 
 
-def leg(
-    m: Maker, kind: str, foot: Pair, top: Pair, high: float, thick: float, material: Material
-) -> None:
+def leg(m: Maker, kind: str, foot: Pair, top: Pair, high: float, thick: float,
+    material: Material) -> None:
     """One of furniture's legs from foot (x, z) to top (x, z) at a height.
 
     Square, round, tapered, hairpin or bun.
@@ -304,9 +300,8 @@ def leg(
                     (0.35, 0.85), (0.5, 1), (0, 1)]), at=(top[0], 0.0, top[1]))
             case "hairpin":
                 for s in (-1.0, 1.0):
-                    m.tube(
-                        [(foot[0], 0.004, foot[1]), (top[0] + s * 0.035, high, top[1])], 0.005, n=6
-                    )
+                    m.tube([(foot[0], 0.004, foot[1]), (top[0] + s * 0.035, high, top[1])], 0.005,
+                        n=6)
                 m.rod((foot[0] - 0.008, foot[0] + 0.008), 0.005, foot[1], 0.005, n=6)
             case "turned":
                 m.revolve(scaled(thick, high, [(0, 0), (0.35, 0), (0.4, 0.06), (0.28, 0.1),
@@ -316,7 +311,7 @@ def leg(
 
 def four_legs(m: Maker, kind: str, w: float, d: float, high: float, thick: float, inset: float,
     splay: float, material: Material) -> None:
-    """Under what is w wide and d deep, inset from its edges, leaning outwards by splay."""
+    """Four legs under a top w wide and d deep, inset from its edges, leaning outwards by splay."""
     for sx, sz in product((-1.0, 1.0), (-1.0, 1.0)):
         leg(m, kind, (sx * (w / 2 - inset + splay), sz * (d / 2 - inset + splay)),
             (sx * (w / 2 - inset), sz * (d / 2 - inset)), high, thick, material)

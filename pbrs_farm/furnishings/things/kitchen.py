@@ -55,6 +55,7 @@ from pbrs_farm.furnishings.things.shapes import Pair
 
 # fmt: off
 
+
 _OVEN: Final = glossy("oven enamel", (0.09, 0.09, 0.095), 0.35)
 CLEAR_PLASTIC: Final = glass((0.93, 0.96, 0.96), 0.25)
 _FALLING_RAD: Final = radians(88)  # of doors that fall open
@@ -66,12 +67,12 @@ _HOB_M: Final = {"gas": 0.044, "ceramic": 0.006, "plates": 0.019}  # that a hob 
 
 @dataclass(frozen=True, slots=True)
 class KitchenSet:
-    """What the units of one kitchen have in common."""
+    """Shared values of the units of one kitchen."""
 
     top_h: float  # of the worktop's upper side
     top_t: float  # its thickness
     look: Look
-    upper_look: Look  # of what hangs on the wall
+    upper_look: Look  # of wall units
     worktop: Material
     plinth: Material
     plinth_h: float
@@ -84,8 +85,8 @@ def kitchen_set(m: Maker) -> KitchenSet:
     is_wood = m.chance(0.25)
     colour = m.paint()
     front = m.timber if is_wood else glossy("front", colour, m.uniform(0.2, 0.5))
-    other = m.weighted(0.55, 0.25, 0.2)
-    upper_front = (front, glossy("front", (0.91, 0.91, 0.89), 0.4), m.timber)[other]
+    second = m.weighted(0.55, 0.25, 0.2)
+    upper_front = (front, glossy("front", (0.91, 0.91, 0.89), 0.4), m.timber)[second]
     body = WHITE if m.chance(0.7) else glossy("carcass", (0.4, 0.4, 0.4), 0.5)
     stone = m.weighted(0.4, 0.2, 0.2, 0.1, 0.1)
     worktop = (plain("oak wood", mix(m.wood, (0.6, 0.45, 0.3), 0.4), 0.45),
@@ -94,9 +95,8 @@ def kitchen_set(m: Maker) -> KitchenSet:
     pull_kind = m.pick("bar", "bow", "knob", "disc", "square", "cup", "edge", "edge")
     pull_material = m.metal if m.chance(0.6) else m.pick(STEEL, BLACK_STEEL, BRASS)
     look = Look(kind, front, body, worktop, pull_kind, pull_material)
-    upper_look = Look(
-        m.pick(kind, kind, kind, "glazed"), upper_front, body, worktop, pull_kind, pull_material
-    )
+    upper_look = Look(m.pick(kind, kind, kind, "glazed"), upper_front, body, worktop, pull_kind,
+        pull_material)
     plinth = front if m.chance(0.5) else m.pick(STEEL, RUBBER)
     plinth_h = m.pick(0.1, 0.12, 0.15)
     return KitchenSet(top_h, top_t, look, upper_look, worktop, plinth, plinth_h)
@@ -111,15 +111,10 @@ def unit_body(m: Maker, size: Size, top_h: float, k: KitchenSet) -> None:
     m.box(w, k.plinth_h, (-d / 2 + 0.02, f - 0.05), of=k.plinth)
 
 
-_FRONTS: Final[Mapping[str, list[tuple[str, ...]]]] = {
-    "door": [("door",)],
-    "low_door": [("low", "door")],
-    "three_drawers": [("drawer", "drawer", "drawer")],
-    "low_two_drawers": [("low", "drawer", "drawer")],
-    "two_doors": [("door",), ("door",)],
-    "two_drawers": [("drawer", "drawer")],
-    "four_drawers": [("low", "low", "drawer", "drawer")],
-}
+_FRONTS: Final[Mapping[str, list[tuple[str, ...]]]] = {"door": [("door",)],
+    "low_door": [("low", "door")], "three_drawers": [("drawer", "drawer", "drawer")],
+    "low_two_drawers": [("low", "drawer", "drawer")], "two_doors": [("door",), ("door",)],
+    "two_drawers": [("drawer", "drawer")], "four_drawers": [("low", "low", "drawer", "drawer")]}
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,18 +150,16 @@ def unit(m: Maker, size: Size, k: KitchenSet, p: KitchenUnit) -> None:
 
 
 @family(group="base_cabinet", nyu40=COUNTER, place=Place.KITCHEN, called="kitchen_cabinet",
-    variants=32, of_set=kitchen_set, size=lambda m, k: (0.6, 0.6, k.top_h),
-    draw=lambda m, _size, k: draw_unit(m, k, "door", "low_door", "three_drawers", "low_two_drawers",
-    "two_doors"))
+    variants=32, of_set=kitchen_set, size=lambda m, k: (0.6, 0.6, k.top_h), draw=lambda m, _size,
+    k: draw_unit(m, k, "door", "low_door", "three_drawers", "low_two_drawers", "two_doors"))
 def base_cabinet(m: Maker, size: Size, k: KitchenSet, p: KitchenUnit) -> None:
     """A kitchen's unit with a worktop: doors, drawers, or both."""
     unit(m, size, k, p)
 
 
 @family(group="base_cabinet", nyu40=COUNTER, place=Place.KITCHEN, called="kitchen_cabinet",
-    variants=32, of_set=kitchen_set, size=lambda m, k: (0.6, 0.6, k.top_h),
-    draw=lambda m, _size, k: draw_unit(m, k, "low_two_drawers", "two_drawers", "four_drawers",
-    "low_door"))
+    variants=32, of_set=kitchen_set, size=lambda m, k: (0.6, 0.6, k.top_h), draw=lambda m, _size,
+    k: draw_unit(m, k, "low_two_drawers", "two_drawers", "four_drawers", "low_door"))
 def drawer_cabinet(m: Maker, size: Size, k: KitchenSet, p: KitchenUnit) -> None:
     """A second unit of the kitchen, mostly of drawers."""
     unit(m, size, k, p)
@@ -175,7 +168,7 @@ def drawer_cabinet(m: Maker, size: Size, k: KitchenSet, p: KitchenUnit) -> None:
 @family(group="blind_cabinet", nyu40=COUNTER, place=Place.KITCHEN, called="kitchen_blind_cabinet",
     variants=32, of_set=kitchen_set, size=lambda m, k: (0.67, 0.588, k.top_h))
 def blind_cabinet(m: Maker, size: Size, k: KitchenSet) -> None:
-    """What stands in the corner of a kitchen, and strips beside it: a front that nothing opens."""
+    """A blind unit for the corner of a kitchen, its front fixed."""
     w, h = size[0], size[2]
     # It is drawn like its neighbours, whose pulls reach 12 mm before their worktop.
     unit_body(m, (w, 0.6, h), k.top_h, k)
@@ -264,8 +257,8 @@ def kitchen_tap(m: Maker, y: float, z: float, top: float) -> None:
     material = m.pick(CHROME, CHROME, STEEL, BLACK_STEEL, m.metal)
     form, r, t = m.weighted(0.4, 0.3, 0.3), m.uniform(0.01, 0.014), top
     with m.of(material):
-        m.revolve([(0.0, y), (0.028, y), (0.028, y + 0.006), (0.022, y + 0.012), (0.022, y + 0.05),
-            (0.0, y + 0.05)], n=20, at=(0.0, 0.0, z))
+        m.turned([(0.028, y), (0.028, y + 0.006), (0.022, y + 0.012), (0.022, y + 0.05)], n=20,
+            at=(0.0, 0.0, z))
         match form:
             case 0:  # an arch
                 m.tube(bent([(0.0, y + 0.04, z), (0.0, t - r, z), (0.0, t - r, z + 0.2),
@@ -284,10 +277,9 @@ def kitchen_tap(m: Maker, y: float, z: float, top: float) -> None:
                 m.rod((s * 0.015, s * 0.055), y + 0.03, z, 0.012)
 
 
-def hob_top(
-    m: Maker, w: float, d: float, y: float, z: float, kind: str, material: Material
-) -> None:
-    """What one cooks on, over y: gas, ceramic, or solid plates, in w by d about z."""
+def hob_top(m: Maker, w: float, d: float, y: float, z: float, kind: str,
+    material: Material) -> None:
+    """A hob over y: gas, ceramic, or solid plates, in w by d about z."""
     match kind:
         case "ceramic":
             m.board(w, d, y, y + 0.006, 0.01, 0.002, z=z, of=BLACK_GLASS)
@@ -301,16 +293,15 @@ def hob_top(
             m.board(w, d, y, y + 0.008, 0.015, 0.003, z=z, of=material)
             for x, c, r in ((-0.24, -0.22, 0.09), (0.24, -0.22, 0.073), (-0.24, 0.22, 0.073),
                 (0.24, 0.22, 0.09)):
-                m.revolve([(0.0, y + 0.006), (r + 0.008, y + 0.006), (r + 0.006, y + 0.011),
-                    (r, y + 0.012), (r, y + 0.019), (r * 0.3, y + 0.019), (r * 0.28, y + 0.016),
-                    (0.0, y + 0.016)], n=26, at=(x * w, 0.0, z + c * d), of=CAST_IRON)
+                m.turned([(r + 0.008, y + 0.006), (r + 0.006, y + 0.011), (r, y + 0.012),
+                    (r, y + 0.019), (r * 0.3, y + 0.019), (r * 0.28, y + 0.016)], n=26,
+                    at=(x * w, 0.0, z + c * d), of=CAST_IRON)
         case "gas":
             m.board(w, d, y, y + 0.008, 0.015, 0.003, z=z, of=material)
             for x, c, r in ((-0.24, -0.22, 0.05), (0.24, -0.22, 0.038), (-0.24, 0.22, 0.03),
                 (0.24, 0.22, 0.042)):
-                m.revolve([(0.0, y + 0.007), (r + 0.012, y + 0.007), (r, y + 0.014), (r, y + 0.022),
-                    (r - 0.008, y + 0.026), (0.0, y + 0.026)], n=18, at=(x * w, 0.0, z + c * d),
-                    of=CAST_IRON)
+                m.turned([(r + 0.012, y + 0.007), (r, y + 0.014), (r, y + 0.022),
+                    (r - 0.008, y + 0.026)], n=18, at=(x * w, 0.0, z + c * d), of=CAST_IRON)
             # Grates: a frame over each side and four fingers a burner.
             with m.of(CAST_IRON):
                 for s in (-0.24, 0.24):
@@ -330,7 +321,7 @@ def hob_top(
 
 
 def oven(m: Maker, x: Pair, y: Pair, z: Pair) -> None:
-    """What is behind an oven's door: a cavity of dark enamel with a grid and a tray in it."""
+    """The interior of an oven: a cavity of dark enamel with a grid and a tray."""
     wall = 0.035
     shell(m, x, y, z, wall, _OVEN)
     a, b, c = x[0] + wall, x[1] - wall, (z[0] + 0.06, z[1] - 0.03)
@@ -342,11 +333,11 @@ def oven(m: Maker, x: Pair, y: Pair, z: Pair) -> None:
 def rack(m: Maker, x: Pair, y: float, z: Pair, material: Material, n: int = 8) -> None:
     """A grid of bars from front to back on two rails, at a height."""
     with m.of(material):
-        for at in z:
-            m.box((x[0], x[1]), 0.006, 0.008, on=y, z=at)
+        for bar in z:
+            m.box((x[0], x[1]), 0.006, 0.008, on=y, z=bar)
         for k in range(n):
-            at = x[0] + (x[1] - x[0]) * (k + 0.5) / n
-            m.box(0.004, 0.004, (z[0], z[1]), x=at, on=y + 0.001)
+            bar = x[0] + (x[1] - x[0]) * (k + 0.5) / n
+            m.box(0.004, 0.004, (z[0], z[1]), x=bar, on=y + 0.001)
 
 
 def oven_front(m: Maker, x: Pair, y: Pair, z: float, panel_h: float, material: Material, grip: str,
@@ -381,7 +372,7 @@ def oven_front(m: Maker, x: Pair, y: Pair, z: float, panel_h: float, material: M
 @family(group="cooker", nyu40=OTHERFURNITURE, place=Place.KITCHEN, variants=32,
     size=lambda m: (m.pick(0.5, 0.6, 0.6), 0.6, m.uniform(0.88, 0.92)))
 def cooker(m: Maker, size: Size) -> None:
-    """A cooker that stands between the units.
+    """A freestanding cooker between the units.
 
     Hob, knobs, oven door, a drawer below; some have a lid or a splash back.
     """
@@ -401,9 +392,8 @@ def cooker(m: Maker, size: Size) -> None:
         hollow(m, (-hw, hw), (0.06, 0.062 + drawer), box, 0.012, material)
         with opens(m, "drawer", (-hw, hw), (0.065, 0.06 + drawer), f + 0.02, box[0]):
             m.box(w - 0.004, (0.065, 0.06 + drawer), 0.02, 0.003, against=f, of=material)
-            drawer_box(
-                m, (-hw + 0.012, hw - 0.012), (0.065, 0.06 + drawer), (box[0] + 0.012, f), STEEL
-            )
+            drawer_box(m, (-hw + 0.012, hw - 0.012), (0.065, 0.06 + drawer), (box[0] + 0.012, f),
+                STEEL)
     panel_h = m.pick(0.09, 0.1, 0.11)
     # The oven in a body of its sheet, and what its knobs turn above it.
     low, high = 0.06 + (drawer + 0.002 if drawer > 0 else 0.0), y - 0.016 - panel_h - 0.004
@@ -422,7 +412,7 @@ def built_in_cooker(m: Maker, size: Size, k: KitchenSet) -> None:
     hw = w / 2
     kind = m.pick("ceramic", "ceramic", "ceramic", "gas", "plates")
     f = d / 2 - 0.049
-    # The worktop lies below its height by what stands on it.
+    # Lower the worktop by the height of the hob.
     y = h - _HOB_M[kind]
     unit_body(m, (w, d, y), y, k)
     m.box(w, (y - k.top_t, y), (-d / 2, d / 2 - 0.012), of=k.worktop)
@@ -452,18 +442,17 @@ def dishwasher(m: Maker, size: Size, k: KitchenSet) -> None:
     # A tub of steel with two baskets behind the door, which falls open.
     shell(m, (-hw + 0.0166, hw - 0.0166), (k.plinth_h + 0.0166, y - 0.014),
         (-d / 2 + _BACK_M, f - 0.001), 0.02, STEEL)
-    for at in (k.plinth_h + 0.12, k.plinth_h + 0.42):
+    for level in (k.plinth_h + 0.12, k.plinth_h + 0.42):
         for rim in (0.0, 0.09):
-            rack(m, (-hw + 0.05, hw - 0.05), at + rim, (-d / 2 + 0.07, f - 0.03), WHITE_STEEL,
+            rack(m, (-hw + 0.05, hw - 0.05), level + rim, (-d / 2 + 0.07, f - 0.03), WHITE_STEEL,
                 n=12 if rim == 0 else 2)
-    with m.hinged(
-        "door", at=(-hw, k.plinth_h, f + 0.02), axis=(1.0, 0.0, 0.0), upper_rad=_FALLING_RAD
-    ):
+    with m.hinged("door", at=(-hw, k.plinth_h, f + 0.02), axis=(1.0, 0.0, 0.0),
+        upper_rad=_FALLING_RAD):
         dishwasher_front(m, k, (-hw, hw), y, f)
 
 
 def dishwasher_front(m: Maker, k: KitchenSet, x: Pair, y: float, f: float) -> None:
-    """A front of the kitchen, or one of its own with a panel, up to y before f."""
+    """A front of the kitchen, or a maker's front with a panel, up to y before f."""
     hw = x[1]
     if m.chance(0.45):
         drawer_front(m, k.look, x, (k.plinth_h, y), f)
@@ -485,9 +474,8 @@ def hood(m: Maker, size: Size) -> None:
     """An extractor over the cooker: a chimney, a pyramid, a dome, a glass plate, or a flat one."""
     w, d, h = size
     hd = d / 2
-    material = m.pick(
-        STEEL, STEEL, ENAMEL, glossy("black enamel", (0.06, 0.06, 0.065), 0.3), m.metal
-    )
+    material = m.pick(STEEL, STEEL, ENAMEL, glossy("black enamel", (0.06, 0.06, 0.065), 0.3),
+        m.metal)
     form = m.weighted(0.3, 0.3, 0.2, 0.2) if h > 0.5 else 4
     # Everything is drawn from the wall, z = -d / 2.
     c, cd = 0.24, 0.26
@@ -535,8 +523,8 @@ def fridge(m: Maker, size: Size) -> None:
     f, foot = d / 2 - (0.07 if grip == "none" else 0.1), 0.05
     grip_material = m.pick(STEEL, CHROME, CHROME, material)
     cut = m.pick(0.38, 0.36, 0.68, 0.72, 1.0) * h
-    left = m.chance(0.5)
-    # Its compartments from below: low, high, what is in them, how many doors they have.
+    hinges_left = m.chance(0.5)
+    # Its compartments from below: low, high, filling, number of doors.
     if w > 0.8:
         low = h * 0.4 if m.chance(0.5) else foot
         spaces = [(low, h, "shelves", 2)]
@@ -555,7 +543,7 @@ def fridge(m: Maker, size: Size) -> None:
                 drawer_box(m, (-hw + 0.05, hw - 0.05), (c + 0.05, e - 0.05),
                     (-d / 2 + 0.08, f + 0.004), WHITE)
         for k in range(n_doors):
-            is_left = left if n_doors == 1 else k == 0
+            is_left = hinges_left if n_doors == 1 else k == 0
             a, b = (-hw, hw) if n_doors == 1 else ((-hw, -0.002), (0.002, hw))[k]
             with m.hinged("door", at=(a if is_left else b, c, f + 0.07),
                 axis=(0.0, -1.0 if is_left else 1.0, 0.0), upper_rad=_FRIDGE_RAD):
@@ -568,19 +556,19 @@ def fridge(m: Maker, size: Size) -> None:
                 else:
                     m.rounded(w - 0.002, (c + 0.002, e - 0.002), 0.064, 0.05 if retro else 0.008,
                         n=3 if retro else 1, against=f + 0.006, of=material)
-                    at = c + 0.52 * (e - c) if e - c > 1.2 else c + min(0.28, 0.5 * (e - c))
-                    pull(m, grip, (hw - 0.05) * (1 if left else -1), e - 0.2 if e < 0.6 * h else at,
-                        f + 0.069, False, min(0.34, 0.6 * (e - c)), grip_material)
+                    level = c + 0.52 * (e - c) if e - c > 1.2 else c + min(0.28, 0.5 * (e - c))
+                    pull(m, grip, (hw - 0.05) * (1 if hinges_left else -1),
+                        e - 0.2 if e < 0.6 * h else level, f + 0.069, False,
+                        min(0.34, 0.6 * (e - c)), grip_material)
                 if shows_time and e == h and k == 0:
-                    at = -0.05 if n_doors == 1 else -0.112
-                    m.box(0.1, 0.1, 0.0013, left=at, on=h - 0.3, against=f + 0.0695, of=BLACK_GLASS)
+                    x = -0.05 if n_doors == 1 else -0.112
+                    m.box(0.1, 0.1, 0.0013, left=x, on=h - 0.3, against=f + 0.0695, of=BLACK_GLASS)
     for x, z in product((-hw + 0.06, hw - 0.06), (-d / 2 + 0.06, f - 0.06)):
         m.frustum((0.022, 0.0), (0.018, foot + 0.01), n=10, at=(x, 0.0, z), of=RUBBER)
 
 
-def fridge_space(
-    m: Maker, x: Pair, y: Pair, z: Pair, material: Material, r: float, filling: str
-) -> None:
+def fridge_space(m: Maker, x: Pair, y: Pair, z: Pair, material: Material, r: float,
+    filling: str) -> None:
     """A compartment of a fridge: foam between sheet and a white liner; 'shelves' or 'drawers' in it."""
     wall = 0.045
     shell(m, x, y, z, wall, material, r, liner=WHITE)
@@ -593,21 +581,21 @@ def fridge_space(
                 low + (high - low) * (k + 1) / n - 0.014), (c[0], c[1] + 0.04), 0.006,
                 of=CLEAR_PLASTIC)
     for k in range(1, n) if filling == "shelves" else ():
-        at = low + (high - low) * k / n
-        m.box((a, b), 0.005, (c[0], c[1]), on=at, of=CLEAR_PLASTIC)
-        m.box((a, b), 0.014, 0.012, on=at - 0.004, against=c[1] - 0.012, of=WHITE)
+        level = low + (high - low) * k / n
+        m.box((a, b), 0.005, (c[0], c[1]), on=level, of=CLEAR_PLASTIC)
+        m.box((a, b), 0.014, 0.012, on=level - 0.004, against=c[1] - 0.012, of=WHITE)
 
 
 def door_racks(m: Maker, x: Pair, y: Pair, z: float) -> None:
-    """What bottles stand in, on the inside of a fridge's door at z."""
+    """Racks for bottles on the inside of a fridge's door at z."""
     n = max(1, round((y[1] - y[0]) / 0.4))
     for k in range(n):
-        at = y[0] + 0.08 + (y[1] - y[0] - 0.12) * k / n
+        level = y[0] + 0.08 + (y[1] - y[0] - 0.12) * k / n
         with m.of(WHITE):
-            m.box((x[0], x[1]), 0.006, 0.076, on=at, against=z - 0.07)
-            m.box((x[0], x[1]), 0.064, 0.004, on=at + 0.006, against=z - 0.07)
+            m.box((x[0], x[1]), 0.006, 0.076, on=level, against=z - 0.07)
+            m.box((x[0], x[1]), 0.064, 0.004, on=level + 0.006, against=z - 0.07)
             for a in (x[0], x[1] - 0.004):
-                m.box(0.004, 0.064, 0.072, left=a, on=at + 0.006, against=z - 0.066)
+                m.box(0.004, 0.064, 0.072, left=a, on=level + 0.006, against=z - 0.066)
 
 
 def holed_plate(x: Pair, y: Pair, z: Pair, middle: Pair, r: float, *, n: int = 36) -> Surface:
@@ -623,15 +611,14 @@ def holed_plate(x: Pair, y: Pair, z: Pair, middle: Pair, r: float, *, n: int = 3
     for corner in ((low[0], low[1]), (high[0], low[1]), (high[0], high[1]), (low[0], high[1])):
         edge[np.argmax(way @ np.array(corner))] = corner
     flat = np.concatenate([edge, r * way]) + centre
-    points = np.concatenate([np.c_[flat, np.full(2 * n, at)] for at in z])
+    points = np.concatenate([np.c_[flat, np.full(2 * n, level)] for level in z])
     i, j = np.arange(n), (np.arange(n) + 1) % n
     outer, inner, front = 0, n, 2 * n
 
     def quads(a: int, b: int) -> I32:
         """Two triangles from ring a to ring b, seen from where a is left of b going round."""
-        return np.concatenate(
-            [np.stack([a + i, a + j, b + j], -1), np.stack([a + i, b + j, b + i], -1)]
-        )
+        return np.concatenate([np.stack([a + i, a + j, b + j], -1),
+            np.stack([a + i, b + j, b + i], -1)])
 
     faces = np.concatenate([quads(front + outer, front + inner), quads(inner, outer),
         quads(outer, front + outer), quads(front + inner, inner)])

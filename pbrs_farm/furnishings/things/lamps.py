@@ -11,7 +11,6 @@ from pbrs_farm.core.catalogue import Place
 from pbrs_farm.core.classes import LAMP
 from pbrs_farm.core.frames import LYING_ALONG_Z, rotation_x, rotation_z
 from pbrs_farm.core.house import Material
-from pbrs_farm.furnishings.things.bodies import sphere, stretched
 from pbrs_farm.furnishings.things.maker import Maker, Size, family
 from pbrs_farm.furnishings.things.materials import (
     BLACK_STEEL,
@@ -83,8 +82,8 @@ def draw_floor_lamp(m: Maker, size: Size) -> FloorLamp:
 
 
 @family(group="floor_lamp", nyu40=LAMP, place=Place.FLOOR, called="floor_lamp", variants=36,
-    draw=draw_floor_lamp,
-    size=lambda m: (*m.pick((0.36, 0.36), (0.4, 0.4), (0.46, 0.46)), m.uniform(1.4, 1.72)))
+    draw=draw_floor_lamp, size=lambda m: (*m.pick((0.36, 0.36), (0.4, 0.4), (0.46, 0.46)),
+    m.uniform(1.4, 1.72)))
 def standing_lamp(m: Maker, size: Size, p: FloorLamp) -> None:
     """A lamp on the floor: a shade on a pole or a tripod, a column, or a ball."""
     w, d, h = size
@@ -93,16 +92,16 @@ def standing_lamp(m: Maker, size: Size, p: FloorLamp) -> None:
         match p.form:
             case "pole":
                 top = h - 0.5 * tall - 0.05
-                m.revolve([(0.0, 0.0), (r * 0.72, 0.0), (r * 0.72, 0.014), (0.02, 0.03),
-                    (0.011, 0.05), (0.011, top), (0.0, top)], n=28)
+                m.turned([(r * 0.72, 0.0), (r * 0.72, 0.014), (0.02, 0.03), (0.011, 0.05),
+                    (0.011, top)], n=28)
             case "tripod":
                 top, neck = h - 0.5 * tall - 0.04, h - tall
                 for k in range(3):
                     a = 2.0944 * k
                     m.tube([polar(0.96 * r, 0.006, a), polar(0.02, neck - 0.06, a)], 0.012,
                         end=0.016)
-                m.revolve([(0.0, neck - 0.1), (0.035, neck - 0.1), (0.035, neck - 0.05),
-                    (0.01, neck - 0.03), (0.01, top), (0.0, top)])
+                m.turned([(0.035, neck - 0.1), (0.035, neck - 0.05), (0.01, neck - 0.03),
+                    (0.01, top)])
             case "column":
                 q = p.column_m
                 m.board(w, d, 0.0, 0.03, p.corner_m, 0.004)
@@ -111,8 +110,7 @@ def standing_lamp(m: Maker, size: Size, p: FloorLamp) -> None:
                     m.revolve([(q - 0.002, y), (q + 0.012, y), (q + 0.012, y + 0.022),
                         (q - 0.002, y + 0.022), (q - 0.002, y)], n=24)
             case "ball":
-                m.revolve([(0.0, 0.0), (r, 0.0), (r, 0.012), (0.014, 0.024), (0.01, h - 0.24),
-                    (0.0, h - 0.24)], n=28)
+                m.turned([(r, 0.0), (r, 0.012), (0.014, 0.024), (0.01, h - 0.24)], n=28)
                 m.sphere((0.0, h - 0.13, 0.0), 0.13, n=20, of=OPAL)
     if p.form in ("pole", "tripod"):
         lamp_shade(m, r, r * p.taper, h - tall, h, p.shade)
@@ -122,7 +120,7 @@ def standing_lamp(m: Maker, size: Size, p: FloorLamp) -> None:
 @family(group="floor_lamp", nyu40=LAMP, place=Place.FLOOR, called="reading_lamp", variants=16,
     size=lambda m: (m.pick(0.44, 0.48), m.pick(0.26, 0.28), m.uniform(1.4, 1.65)))
 def arc_lamp(m: Maker, size: Size) -> None:
-    """A lamp that stands and leans over: an arc, or two arms to read by."""
+    """A floor lamp that leans over: an arc, or two arms to read by."""
     w, d, h = size
     r, q = w / 2, d / 2
     material, form = m.pick(m.metal, BLACK_STEEL, BRASS, WHITE_STEEL), 2 + m.weighted(0.5, 0.5)
@@ -138,8 +136,8 @@ def arc_lamp(m: Maker, size: Size) -> None:
                     of=material)
                 m.sphere((0.0, 0.05, 0.0), 0.03, n=12, of=OPAL)
         case 3:  # a reading lamp: two arms and a small head
-            m.revolve([(0.0, 0.0), (q, 0.0), (q - 0.005, 0.015), (0.012, 0.022), (0.01, 0.62 * h),
-                (0.0, 0.62 * h)], n=26, at=(-r + q, 0.0, 0.0), of=material)
+            m.turned([(q, 0.0), (q - 0.005, 0.015), (0.012, 0.022), (0.01, 0.62 * h)], n=26,
+                at=(-r + q, 0.0, 0.0), of=material)
             with m.of(material):
                 m.tube([(-r + q, 0.61 * h, 0.0), (-0.2 * r, h - 0.02, 0.0)], 0.009)
                 m.tube([(-0.22 * r, h - 0.014, 0.0), (r - 0.06, h - 0.16, 0.0)], 0.009)
@@ -182,9 +180,8 @@ def draw_table_lamp(m: Maker, size: Size) -> TableLamp:
 
 
 @family(group="table_lamp", nyu40=LAMP, place=Place.SURFACE, called="table_lamp", variants=36,
-    draw=draw_table_lamp,
-    size=lambda m: (*m.pick((0.2, 0.2), (0.24, 0.24), (0.28, 0.28), (0.32, 0.32)),
-    m.uniform(0.32, 0.52)))
+    draw=draw_table_lamp, size=lambda m: (*m.pick((0.2, 0.2), (0.24, 0.24), (0.28, 0.28),
+    (0.32, 0.32)), m.uniform(0.32, 0.52)))
 def shade_lamp(m: Maker, size: Size, p: TableLamp) -> None:
     """A lamp on a table: a shade on a foot of clay, glass, wood or metal, a ball, or a mushroom."""
     w, _d, h = size
@@ -201,13 +198,13 @@ def shade_lamp(m: Maker, size: Size, p: TableLamp) -> None:
                 m.tube([(0.0, middle - 0.02, 0.0), rim], 0.002, n=5, of=m.metal)
         case "ball":
             q = min(r, 0.3 * h)
-            m.revolve([(0.0, 0.0), (r, 0.0), (r, 0.012), (r * 0.3, 0.025), (r * 0.25, h - 1.9 * q),
-                (0.0, h - 1.9 * q)], n=24, of=p.body)
+            m.turned([(r, 0.0), (r, 0.012), (r * 0.3, 0.025), (r * 0.25, h - 1.9 * q)], n=24,
+                of=p.body)
             m.sphere((0.0, h - q, 0.0), q, n=20, of=OPAL)
         case "mushroom":
             with m.of(p.body):
-                m.revolve([(0.0, 0.0), (r * 0.6, 0.0), (r * 0.55, 0.02), (r * 0.25, 0.1 * h),
-                    (r * 0.2, 0.6 * h), (r * 0.3, 0.66 * h), (0.0, 0.66 * h)], n=22)
+                m.turned([(r * 0.6, 0.0), (r * 0.55, 0.02), (r * 0.25, 0.1 * h), (r * 0.2, 0.6 * h),
+                    (r * 0.3, 0.66 * h)], n=22)
                 m.revolve([(r * 0.93, 0.62 * h), (r, 0.63 * h), (r * 0.9, 0.8 * h),
                     (r * 0.6, 0.94 * h), (0.0, h), (0.0, h - 0.004), (r * 0.57, 0.93 * h),
                     (r * 0.87, 0.79 * h), (r * 0.93, 0.62 * h)], n=28)
@@ -223,7 +220,7 @@ def lamp_foot(m: Maker, kind: str, q: float, f: float) -> None:
         case "ball":
             m.sphere((0.0, q, 0.0), q, n=18)
         case "rod":
-            m.revolve([(0.0, 0.0), (q, 0.0), (q, 0.015), (0.012, 0.03), (0.01, f), (0.0, f)], n=24)
+            m.turned([(q, 0.0), (q, 0.015), (0.012, 0.03), (0.01, f)], n=24)
         case "block":
             m.loft(rings(rect, [(q * 1.5, q * 1.5, 0.006, 0.0), (q * 1.5, q * 1.5, 0.006, 0.75 * f),
                 (q * 0.5, q * 0.5, 0.006, 0.85 * f)], n=2))
@@ -237,9 +234,8 @@ def lamp_foot(m: Maker, kind: str, q: float, f: float) -> None:
             m.loft(rings(fluted, [(1.6 * q, 12, 0.08, 0.0), (2 * q, 12, 0.08, 0.4 * f),
                 (1.1 * q, 12, 0.08, 0.85 * f), (0.6 * q, 12, 0.08, 0.9 * f)]), sharp=70.0)
         case "baluster":
-            m.revolve([(0.0, 0.0), (q, 0.0), (q, 0.02), (q * 0.4, 0.06), (q * 0.55, 0.3 * f),
-                (q * 0.3, 0.5 * f), (q * 0.5, 0.7 * f), (q * 0.2, 0.9 * f), (q * 0.2, f),
-                (0.0, f)], n=20)
+            m.turned([(q, 0.0), (q, 0.02), (q * 0.4, 0.06), (q * 0.55, 0.3 * f), (q * 0.3, 0.5 * f),
+                (q * 0.5, 0.7 * f), (q * 0.2, 0.9 * f), (q * 0.2, f)], n=20)
 
 
 @family(group="table_lamp", nyu40=LAMP, place=Place.SURFACE, called="desk_lamp", variants=16,
@@ -251,13 +247,11 @@ def arm_lamp(m: Maker, size: Size) -> None:
     """
     w, _d, h = size
     r = w / 2
-    material = m.pick(
-        m.metal, BRASS, BLACK_STEEL, WHITE_STEEL, glossy("enamel", m.any_colour(), 0.35)
-    )
+    material = m.pick(m.metal, BRASS, BLACK_STEEL, WHITE_STEEL,
+        glossy("enamel", m.any_colour(), 0.35))
     with m.of(material):
         if m.chance(0.7):
-            m.revolve([(0.0, 0.0), (0.075, 0.0), (0.07, 0.02), (0.01, 0.026), (0.0, 0.026)], n=22,
-                at=(-r + 0.075, 0.0, 0.0))
+            m.turned([(0.075, 0.0), (0.07, 0.02), (0.01, 0.026)], n=22, at=(-r + 0.075, 0.0, 0.0))
         else:
             m.board(0.15, 0.15, 0.0, 0.018, 0.01, 0.003, x=-r + 0.075)
         if m.chance(0.6):
@@ -284,9 +278,8 @@ def arm_lamp(m: Maker, size: Size) -> None:
     m.pick(0.1, 0.13, 0.15, 0.5, 0.6, 0.7)))
 def hanging_lamp(m: Maker, size: Size) -> None:
     """A lamp under the ceiling: flat, or hung from a canopy if it is over 0.2 m high."""
-    material = m.pick(
-        m.metal, BLACK_STEEL, BRASS, WHITE_STEEL, glossy("enamel", m.style.accent, 0.3), m.timber
-    )
+    material = m.pick(m.metal, BLACK_STEEL, BRASS, WHITE_STEEL,
+        glossy("enamel", m.style.accent, 0.3), m.timber)
     fabric = shade_fabric(m)
     if size[2] < 0.2:
         flat_lamp(m, size, material, fabric)
@@ -302,8 +295,8 @@ def flat_lamp(m: Maker, size: Size, material: Material, fabric: Material) -> Non
     match form:
         case 0:  # a bowl at the ceiling
             m.cylinder(r, h - 0.025, h, n=32, of=material)
-            m.revolve([(0.0, 0.0), (r * 0.5, 0.1 * h), (r * 0.85, 0.4 * h),
-                (r * 0.95, h - 0.026), (0.0, h - 0.026)], n=32, of=OPAL)
+            m.revolve([(0.0, 0.0), (r * 0.5, 0.1 * h), (r * 0.85, 0.4 * h), (r * 0.95, h - 0.026),
+                (0.0, h - 0.026)], n=32, of=OPAL)
         case 1:  # a drum of cloth
             m.revolve([(r - 0.004, 0.0), (r, 0.0), (r, h), (0.0, h), (0.0, h - 0.004),
                 (r - 0.004, h - 0.004), (r - 0.004, 0.0)], n=32, of=fabric)
@@ -315,8 +308,7 @@ def flat_lamp(m: Maker, size: Size, material: Material, fabric: Material) -> Non
             m.box(2 * r, (h - 0.03, h), 0.06, 0.002, of=material)
             for x in (-0.7, 0.0, 0.7):
                 with m.moved(at=(x * r, 0.0, 0.0), turn=rotation_x(x * 0.5)):
-                    m.revolve([(0.0, h - 0.03), (0.012, h - 0.03), (0.03, h - 0.045),
-                        (0.032, 0.012), (0.0, 0.012)], of=material)
+                    m.turned([(0.012, h - 0.03), (0.03, h - 0.045), (0.032, 0.012)], of=material)
                     m.cylinder(0.026, 0.002, 0.0115, of=OPAL)
             m.cylinder(d / 2, h - 0.02, h - 0.001, n=24, of=material)
         case 4:  # a drum of glass in a rim
@@ -340,26 +332,24 @@ def hung_lamp(m: Maker, size: Size, material: Material, fabric: Material) -> Non
         m.rod(0.0, (low, h - 0.025), 0.0, 0.0035, n=6, of=RUBBER)
     match form:
         case 0:  # a cone of metal
-            m.revolve([(r, 0.0), (r * 0.55, 0.2 * h), (0.03, low), (0.0, low),
-                (0.0, low - 0.004), (0.027, low - 0.004), (r * 0.55 - 0.004, 0.2 * h - 0.002),
-                (r - 0.003, 0.0), (r, 0.0)], n=32, of=material)
+            m.revolve([(r, 0.0), (r * 0.55, 0.2 * h), (0.03, low), (0.0, low), (0.0, low - 0.004),
+                (0.027, low - 0.004), (r * 0.55 - 0.004, 0.2 * h - 0.002), (r - 0.003, 0.0),
+                (r, 0.0)], n=32, of=material)
             m.sphere((0.0, 0.14 * h, 0.0), 0.036, n=14, of=OPAL)
         case 1:  # a drum of cloth
             m.revolve([(r, 0.0), (r * 0.98, low), (r * 0.98 - 0.003, low), (r - 0.003, 0.0),
                 (r, 0.0)], n=32, of=fabric)
             m.sphere((0.0, 0.18 * h, 0.0), 0.045, n=14, of=OPAL)
             for k in range(3):
-                m.tube([(0.0, low - 0.004, 0.0), polar(r * 0.975, low - 0.004, 2.1 * k)],
-                    0.0025, n=5, of=material)
+                m.tube([(0.0, low - 0.004, 0.0), polar(r * 0.975, low - 0.004, 2.1 * k)], 0.0025,
+                    n=5, of=material)
         case 2:  # a dome
-            m.revolve([(r, 0.0), (r * 0.95, 0.12 * h), (r * 0.7, 0.26 * h), (0.03, low),
-                (0.0, low), (0.0, low - 0.004), (0.028, low - 0.005),
-                (r * 0.7 - 0.003, 0.26 * h - 0.004), (r * 0.95 - 0.004, 0.12 * h),
-                (r - 0.004, 0.0), (r, 0.0)], n=36, of=material)
+            m.revolve([(r, 0.0), (r * 0.95, 0.12 * h), (r * 0.7, 0.26 * h), (0.03, low), (0.0, low),
+                (0.0, low - 0.004), (0.028, low - 0.005), (r * 0.7 - 0.003, 0.26 * h - 0.004),
+                (r * 0.95 - 0.004, 0.12 * h), (r - 0.004, 0.0), (r, 0.0)], n=36, of=material)
             m.sphere((0.0, 0.16 * h, 0.0), 0.045, n=14, of=OPAL)
         case 3:  # a ball of opal, pressed
-            m.add(stretched(sphere((0, 0, 0), 1.0, n=22), (r, 0.5 * low, r)),
-                at=(0.0, 0.5 * low, 0.0), of=OPAL)
+            m.ellipsoid((r, 0.5 * low, r), n=22, at=(0.0, 0.5 * low, 0.0), of=OPAL)
             m.frustum((0.04, low - 0.006), (0.03, low + 0.02), of=material)
         case 4:
             basket_lamp(m, w, d, r, low, material)
@@ -388,13 +378,11 @@ def hung_lamp(m: Maker, size: Size, material: Material, fabric: Material) -> Non
 def basket_lamp(m: Maker, w: float, d: float, r: float, low: float, material: Material) -> None:
     """A basket of hoops round a bulb."""
     for k in range(7):
-        m.hoop(oval(w * sin(0.35 + 2.4 * k / 6) - 0.014,
-            d * sin(0.35 + 2.4 * k / 6) - 0.014, n=24), 0.007 + (low - 0.014) * k / 6,
-            0.006, n=5, of=m.pick(WICKER, WICKER, material))
+        m.hoop(oval(w * sin(0.35 + 2.4 * k / 6) - 0.014, d * sin(0.35 + 2.4 * k / 6) - 0.014, n=24),
+            0.007 + (low - 0.014) * k / 6, 0.006, n=5, of=m.pick(WICKER, WICKER, material))
     for k in range(10):
-        m.tube(bent([polar(0.04, low - 0.004, 0.628 * k),
-            polar(r - 0.01, 0.5 * low, 0.628 * k), polar(0.3 * r, 0.006, 0.628 * k)],
-            0.3, n=5), 0.003, n=4, of=WICKER)
+        m.tube(bent([polar(0.04, low - 0.004, 0.628 * k), polar(r - 0.01, 0.5 * low, 0.628 * k),
+            polar(0.3 * r, 0.006, 0.628 * k)], 0.3, n=5), 0.003, n=4, of=WICKER)
     m.sphere((0.0, 0.55 * low, 0.0), 0.045, n=14, of=OPAL)
 
 
@@ -404,12 +392,10 @@ def ball_cluster(m: Maker, h: float, d: float, r: float, material: Material) -> 
     for k in range(n):
         a, y = 2 * pi * k / n, 0.0 if k == 0 else h * m.uniform(0.0, 0.35)
         x, z, q = (r - 0.06) * cos(a), (d / 2 - 0.06) * sin(a), 0.06
-        m.tube([(x, y + 2 * q - 0.004, z), (x, h - 0.1, z), polar(0.02, h - 0.026, a)],
-            0.003, n=5, of=RUBBER)
+        m.tube([(x, y + 2 * q - 0.004, z), (x, h - 0.1, z), polar(0.02, h - 0.026, a)], 0.003, n=5,
+            of=RUBBER)
         m.sphere((x, y + q, z), q, n=14, of=OPAL)
-        m.frustum(
-            (0.018, 0.0), (0.014, 0.03), n=12, at=(x, y + 2 * q - 0.008, z), of=material
-        )
+        m.frustum((0.018, 0.0), (0.014, 0.03), n=12, at=(x, y + 2 * q - 0.008, z), of=material)
 
 
 def arm_chandelier(m: Maker, r: float, low: float, material: Material) -> None:
@@ -419,13 +405,12 @@ def arm_chandelier(m: Maker, r: float, low: float, material: Material) -> None:
     m.rod(0.0, (0.4 * low, low + 0.02), 0.0, 0.008, of=material)
     for k in range(n):
         a = 2 * pi * k / n
-        m.tube(bent([(0.0, 0.4 * low, 0.0), polar(0.5 * r, 0.02, a),
-            polar(r - 0.03, 0.1 * low, a), polar(r - 0.03, 0.45 * low, a)], 0.08, n=4),
-            0.006, n=7, of=material)
-        m.frustum((0.022, 0.45 * low), (0.026, 0.5 * low), n=12,
-            at=polar(r - 0.03, 0.0, a), of=material)
-        m.revolve([(0.0, 0.505 * low), (0.014, 0.505 * low), (0.02, 0.65 * low),
-            (0.0, 0.85 * low)], n=12, at=polar(r - 0.03, 0.0, a), of=OPAL)
+        m.tube(bent([(0.0, 0.4 * low, 0.0), polar(0.5 * r, 0.02, a), polar(r - 0.03, 0.1 * low, a),
+            polar(r - 0.03, 0.45 * low, a)], 0.08, n=4), 0.006, n=7, of=material)
+        m.frustum((0.022, 0.45 * low), (0.026, 0.5 * low), n=12, at=polar(r - 0.03, 0.0, a),
+            of=material)
+        m.revolve([(0.0, 0.505 * low), (0.014, 0.505 * low), (0.02, 0.65 * low), (0.0, 0.85 * low)],
+            n=12, at=polar(r - 0.03, 0.0, a), of=OPAL)
     m.revolve([(0.0, 0.0), (0.012, 0.006), (0.0, 0.3 * low)], n=10, of=material)
 
 
@@ -433,15 +418,13 @@ def bar_lamp(m: Maker, h: float, d: float, r: float, low: float, material: Mater
     """A bar with three shades."""
     m.box(2 * r, (low - 0.02, low), 0.024, 0.002, of=material)
     for x in (-0.5, 0.5):
-        m.tube(
-            [(x * r, low - 0.002, 0.0), (0.0, h - 0.026, 0.0)], 0.002, n=5, of=material
-        )
+        m.tube([(x * r, low - 0.002, 0.0), (0.0, h - 0.026, 0.0)], 0.002, n=5, of=material)
     for x in (-0.72, 0.0, 0.72):
         with m.moved(at=(x * r, 0.0, 0.0)):
             m.rod(0.0, (0.5 * low, low - 0.018), 0.0, 0.003, n=5, of=RUBBER)
-            m.revolve([(0.075, 0.0), (0.06, 0.3 * low), (0.015, 0.55 * low),
-                (0.0, 0.55 * low), (0.0, 0.53 * low), (0.013, 0.53 * low),
-                (0.057, 0.3 * low), (0.072, 0.0), (0.075, 0.0)], n=20, of=material)
+            m.revolve([(0.075, 0.0), (0.06, 0.3 * low), (0.015, 0.55 * low), (0.0, 0.55 * low),
+                (0.0, 0.53 * low), (0.013, 0.53 * low), (0.057, 0.3 * low), (0.072, 0.0),
+                (0.075, 0.0)], n=20, of=material)
             m.sphere((0.0, 0.2 * low, 0.0), 0.03, n=10, of=OPAL)
     m.cylinder(d / 2, h - 0.012, h - 0.001, n=24, of=material)
 

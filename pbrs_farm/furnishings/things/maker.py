@@ -1,6 +1,6 @@
-"""How generated things are written: functions that draw and add solids; no effects.
+"""Generated furniture and items: functions that draw numbers and add solids; no effects.
 
-A thing is a function with a decorator. It draws numbers and materials from its maker and adds
+`@thing` decorates a function that draws numbers and materials from its maker and adds
 solids, which are plain functions of bodies.py and cloth.py:
 
     @thing(group="vase")
@@ -10,12 +10,12 @@ solids, which are plain functions of bodies.py and cloth.py:
         with m.of(glass() if m.chance(0.3) else m.china()):
             m.add(vessel([(0, 0), (r, 0), (r, tall)], 0.004))
 
-A function without a decorator is a part that several things share; it takes the maker too. With
+A function without a decorator is a shared part; it takes the maker too. With
 `@family` a function describes furniture of the generated catalogue: it also takes the size that was
-drawn for a variation, and pbrs_farm.plugin has these names for packages of one's own.
+drawn for a variation. pbrs_farm.plugin exports these names for other packages.
 
-Metres, y up. What stands has its back at -z and its front at +z; what hangs has its back at z = 0. The
-order of draws decides what a seed gives: a draw put in between changes all that follow.
+Metres, y up. Furniture has its back at -z and its front at +z; wall items have their back at z = 0. The
+order of draws decides the result of a seed: an inserted draw changes all later ones.
 """
 
 from __future__ import annotations
@@ -61,9 +61,9 @@ _PAINT_SHARES = (0.42, 0.18, 0.2, 0.1, 0.1)
 
 
 class Maker(Shapes):
-    """What a thing is made with: random draws, the materials of a home's style, and its parts so far.
+    """Random draws, the materials of a home's style, and the parts added so far.
 
-    rng: every draw of the thing comes from it. style: the home's or the room's taste.
+    rng: source of all draws. style: of the home or the room.
     """
 
     def __init__(self, rng: np.random.Generator, style: Style) -> None:
@@ -86,7 +86,7 @@ class Maker(Shapes):
         return int(self.rng.integers(low, high))
 
     def chance(self, share: float) -> bool:
-        """True in that share (0..1) of all cases."""
+        """True with that probability (0..1)."""
         return bool(self.rng.random() < share)
 
     def pick(self, *choices: T) -> T:
@@ -129,15 +129,15 @@ class Maker(Shapes):
 
     def textile(self, n: int | None = None) -> Rgb:
         """A colour of the style's cloth; n: of the n calmest alone."""
-        known = self.style.textiles
-        return known[int(self.rng.integers(len(known) if n is None else min(n, len(known))))]
+        colours = self.style.textiles
+        return colours[int(self.rng.integers(len(colours) if n is None else min(n, len(colours))))]
 
     def cloth(self) -> Material:
         """Cloth of one of those colours."""
         return plain("fabric", self.textile(), 0.95)
 
     def any_colour(self) -> Rgb:
-        """A colour for a small thing: of the style, calm or loud, or any at all."""
+        """A colour for a small item: of the style, calm or loud, or any at all."""
         return any_colour(self.rng, self.style)
 
     def colour_within(self, low: float, high: float) -> Rgb:
@@ -152,8 +152,8 @@ class Maker(Shapes):
 
     def paint(self) -> Rgb:
         """A colour that furniture is painted with: whites and greys more often than colours."""
-        known = COLOURS[_PAINTS[int(self.rng.choice(5, p=_PAINT_SHARES))]]
-        return known[int(self.rng.integers(len(known)))]
+        colours = COLOURS[_PAINTS[int(self.rng.choice(5, p=_PAINT_SHARES))]]
+        return colours[int(self.rng.integers(len(colours)))]
 
     def finish(self, whites: int = 1) -> Material:
         """A finish for furniture: timber, white lacquer or paint; whites: weight of white."""
@@ -170,7 +170,7 @@ class Maker(Shapes):
         name: str = "",
         mirrored: str = "",
     ) -> None:
-        """Add a solid to the thing.
+        """Add a solid to the item.
 
         of: its material; by default that of the nearest enclosing `with m.of(...)`. turn: a
         rotation (3, 3) about the origin. at: the position of its origin after that, metres. name:
@@ -191,38 +191,38 @@ class Maker(Shapes):
 
     @contextmanager
     def of(self, material: Material) -> Iterator[None]:
-        """What is added inside is of this material, unless it names its own."""
+        """Material of the solids added inside, unless they name another."""
         outer, self._parts = self._parts, []
         yield
-        outer += [(solid, material if own is None else own) for solid, own in self._parts]
+        outer += [(solid, material if given is None else given) for solid, given in self._parts]
         self._parts = outer
 
     @contextmanager
     def moved(self, *, at: Triple | None = None, turn: F64 | None = None) -> Iterator[None]:
-        """What is added inside is turned and then moved together, as a solid is by `add`."""
+        """Turn and then move the solids and joints added inside, as `add` does."""
         outer, self._parts = self._parts, []
-        known, self._joints = self._joints, []
+        outer_joints, self._joints = self._joints, []
         yield
         inner, self._parts = self._parts, outer
-        for solid, own in inner:
-            self.add(solid, of=own, at=at, turn=turn)
+        for solid, given in inner:
+            self.add(solid, of=given, at=at, turn=turn)
         matrix = np.eye(4)
         matrix[:3, :3] = np.eye(3) if turn is None else turn
         matrix[:3, 3] = at or (0.0, 0.0, 0.0)
-        self._joints = [*known, *(joint.placed(matrix) for joint in self._joints)]
+        self._joints = [*outer_joints, *(joint.placed(matrix) for joint in self._joints)]
 
     @contextmanager
     def hinged(self, name: str, *, at: Triple, axis: Triple, upper_rad: float) -> Iterator[None]:
-        """What is added inside is a part that turns about an axis, anticlockwise, shut as it is added.
+        """Make the solids added inside a part that turns anticlockwise about an axis, from shut.
 
-        name: what it is: "door", "lid"; a number tells it from others. at: a point of the axis.
+        name: "door" or "lid"; a number is appended. at: a point of the axis.
         """
         with self._part(name, JointKind.REVOLUTE, at, axis, upper_rad):
             yield
 
     @contextmanager
     def sliding(self, name: str, *, along: Triple, upper_m: float) -> Iterator[None]:
-        """What is added inside is a part that slides along an axis, shut as it is added."""
+        """Make the solids added inside a part that slides along an axis, from shut."""
         with self._part(name, JointKind.PRISMATIC, (0.0, 0.0, 0.0), along, upper_m):
             yield
 
@@ -235,11 +235,11 @@ class Maker(Shapes):
         inner, self._parts = self._parts, outer
         self._counted[name] += 1
         part = f"{name} {self._counted[name]}"
-        self._parts += [(replace(solid, part=part), own) for solid, own in inner]
+        self._parts += [(replace(solid, part=part), given) for solid, given in inner]
         self._joints.append(Joint(part, kind, at, axis, upper))
 
     def joints(self) -> tuple[Joint, ...]:
-        """The joints of what was added, by the names of their parts, with what the parts weigh."""
+        """The joints by the names of their parts, with the masses of the parts."""
         return tuple(replace(joint, mass_kg=self._mass_kg(joint.part)) for joint in self._joints)
 
     def _mass_kg(self, part: str) -> float:
@@ -250,7 +250,7 @@ class Maker(Shapes):
         )
 
     def finished(self, file: str, name: str) -> list[Part]:
-        """All parts; BadInput where there is none, or one without a material."""
+        """All parts; BadInput if there are no parts, or one has no material."""
         parts = [(solid, material) for solid, material in self._parts if material is not None]
         if not parts or len(parts) != len(self._parts):
             raise BadInput(file, name, "has nothing in it, or a part without a material")
@@ -259,11 +259,11 @@ class Maker(Shapes):
 
 @dataclass(frozen=True, slots=True)
 class Thing(Generic[P]):
-    """A thing that a function describes; what the function takes after the maker, `make` takes too."""
+    """An item that a function describes; `make` takes the function's arguments after the maker."""
 
     name: str
-    called: str  # what its pieces are named after
-    group: str  # what it is, as Piece.group
+    called: str  # name of its pieces
+    group: str  # as Piece.group
     nyu40: int
     place: Place
     build: Callable[Concatenate[Maker, P], None]
@@ -271,7 +271,7 @@ class Thing(Generic[P]):
     def make(
         self, rng: np.random.Generator, style: Style, *args: P.args, **kwargs: P.kwargs
     ) -> Model:
-        """One of them as a piece of the catalogue and its shape; BadInput where it has no solids."""
+        """A piece of the catalogue and its shape; BadInput if it has no solids."""
         m = Maker(rng, style)
         self.build(m, *args, **kwargs)
         return put_together(m, self)
@@ -279,7 +279,7 @@ class Thing(Generic[P]):
 
 @dataclass(frozen=True, slots=True)
 class Family:
-    """Furniture of the generated catalogue: as many variations of one thing.
+    """Furniture of the generated catalogue, in a number of variations.
 
     A set (a kitchen) shares values between its families. They follow the size in the arguments of
     `draw_size`, `draw` and `build`; the drawn parameters are the last argument of `build`.
@@ -317,7 +317,7 @@ class Family:
     ) -> Model:
         """A variation of that size; BadInput where it has no solids.
 
-        change: returns the parameters to build from, given those that were drawn.
+        change: maps the drawn parameters to those to build from.
         """
         m = Maker(rng, style)
         if self.draw is None:
@@ -332,7 +332,7 @@ D = TypeVar("D", Thing[...], Family)
 
 
 def put_together(m: Maker, of: Thing[...] | Family) -> Model:
-    """What was added, as a piece and its shape."""
+    """Assemble the added parts into a piece and its shape."""
     parts, name = m.finished(of.build.__module__, of.name), m.name or of.called
     if of.place in (Place.WALL, Place.CEILING):
         return hanging_piece(name, of.group, of.nyu40, parts, (), of.place, m.joints())
@@ -344,10 +344,10 @@ def put_together(m: Maker, of: Thing[...] | Family) -> Model:
 def thing(
     *, group: str, nyu40: int = OTHERPROP, place: Place = Place.SURFACE, called: str = ""
 ) -> Callable[[Callable[Concatenate[Maker, P], None]], Thing[P]]:
-    """The decorator of a function that describes a thing.
+    """Decorator for a function that describes an item.
 
-    group: what it is; docs/dress/catalogue.md lists all. nyu40: its class. place: where it stands or hangs.
-    called: what its pieces are named after, the function's name unless given.
+    group: as docs/dress/catalogue.md lists them. nyu40: its class. place: floor, surface, wall or ceiling.
+    called: the name of its pieces, by default the function's name.
     """
 
     def described(build: Callable[Concatenate[Maker, P], None]) -> Thing[P]:
@@ -367,7 +367,7 @@ def family(
     of_set: Callable[[Maker], Any] | None = None,
     draw: Callable[..., Any] | None = None,
 ) -> Callable[[Callable[..., None]], Family]:
-    """The decorator of a function that describes a family of the generated catalogue.
+    """Decorator for a function that describes a family of the generated catalogue.
 
     variants: how many there are. size: draws width, depth and height of one. called: the name of
     its pieces, by default the function's name. of_set: draws what families of a set (the units of
@@ -386,16 +386,16 @@ def family(
 
 
 def described_in(modules: Iterable[ModuleType], kind: type[D]) -> dict[str, D]:
-    """The things or families of some modules by name, in the order they are written.
+    """The items or families of some modules by name, in the order of their definitions.
 
-    kind: Thing or Family. BadInput where two have one name.
+    kind: Thing or Family. BadInput if two have the same name.
     """
-    found: dict[str, D] = {}
+    result: dict[str, D] = {}
     for module in modules:
         for value in vars(module).values():
             if not isinstance(value, kind) or value.build.__module__ != module.__name__:
                 continue
-            if value.name in found:
+            if value.name in result:
                 raise BadInput(module.__name__, value.name, "is the name of another thing already")
-            found[value.name] = value
-    return found
+            result[value.name] = value
+    return result

@@ -1,4 +1,4 @@
-"""What generated things are made of; no effects. Equal materials are shared in the house."""
+"""Materials of generated items; no effects. Equal materials are shared in the house."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def plain(name: str, colour: Rgb, roughness: float) -> Material:
 
 
 def glossy(name: str, colour: Rgb, roughness: float = 0.35) -> Material:
-    """A lacquer, enamel or glaze of one colour, which the part `parts` leaves as it is."""
+    """A lacquer, enamel or glaze of one colour, which the dress pass `parts` leaves unchanged."""
     return Material(
         f"coated {name}",
         diffuse=_printable(colour),
@@ -37,8 +37,8 @@ def metal(style: Style) -> Material:
 
 
 def any_colour(rng: np.random.Generator, style: Style) -> Rgb:
-    """A colour for a small thing: of the style, calm or loud, or any at all."""
-    # Three of ten are of textiles, a quarter of any hue, the rest accent, small things, wall.
+    """A colour for a small item: of the style, calm or loud, or any at all."""
+    # 30 % textiles, 25 % any hue, 15 % each accent, small items, wall
     kind = rng.random()
     if kind < 0.3:
         return style.textiles[int(rng.integers(len(style.textiles)))]

@@ -1,4 +1,4 @@
-"""Small things for their looks; no effects."""
+"""Ornaments; no effects."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy import cos, pi, sin
 from pbrs_farm.core.frames import LYING_ALONG_Z, rotation_x, rotation_y, rotation_z
 from pbrs_farm.core.house import Material, Surface
 from pbrs_farm.dress.style import shade
-from pbrs_farm.furnishings.things.bodies import revolve, sphere, stretched
+from pbrs_farm.furnishings.things.bodies import revolve
 from pbrs_farm.furnishings.things.maker import Maker, thing
 from pbrs_farm.furnishings.things.materials import glass, plain
 from pbrs_farm.furnishings.things.outlines import bent, oval, rect, ring_path, rings, scaled
@@ -20,42 +20,42 @@ from pbrs_farm.furnishings.things.outlines import bent, oval, rect, ring_path, r
 
 @thing(group="ornament")
 def ornament(m: Maker) -> None:
-    """A small thing for its looks.
+    """An ornament.
 
     An animal, a house, a globe, a boat, a camera, a stack of pebbles and many more.
     """
     form = m.integers(0, 24)
     material = m.metal if m.chance(0.25) else plain("ornament", m.any_colour(), m.uniform(0.2, 0.8))
     grain = plain("ornament wood", m.wood, 0.5)
-    own = grain if m.chance(0.4) else material
+    body = grain if m.chance(0.4) else material
     s = m.uniform(0.85, 1.2)
     match form:
         case 0:
             m.add(sculpture(m), of=material)
         case 1:
-            bird(m, s, own)
+            bird(m, s, body)
         case 2:
-            cat(m, s, own)
+            cat(m, s, body)
         case 3:
-            elephant(m, s, own)
+            elephant(m, s, body)
         case 4:
-            little_house(m, material, own, grain)
+            little_house(m, material, body, grain)
         case 5:
             globe(m, grain)
         case 6:
             hourglass(m, grain)
         case 7:
-            pyramid(m, own)
+            pyramid(m, body)
         case 8:
             ring_sculpture(m, material, grain)
         case 9:
             arch(m)
         case 10:
-            wooden_tree(m, own, grain)
+            wooden_tree(m, body, grain)
         case 11:
             pebbles(m)
         case 12:
-            boat(m, s, own, grain)
+            boat(m, s, body, grain)
         case 13:
             camera(m)
         case 14:
@@ -63,19 +63,19 @@ def ornament(m: Maker) -> None:
         case 15:
             bust(m, material, grain)
         case 16:
-            treasure_chest(m, own)
+            treasure_chest(m, body)
         case 17:
             cube_puzzle(m)
         case 18:
-            snow_globe(m, own)
+            snow_globe(m, body)
         case 19:
-            bead_string(m, own)
+            bead_string(m, body)
         case 20:
             metronome(m, grain)
         case 21:
             toy_car_model(m, material)
         case 22:
-            horse(m, s, own)
+            horse(m, s, body)
         case 23:
             blocks(m, material, grain)
 
@@ -84,28 +84,26 @@ def bird(m: Maker, s: float, own: Material) -> None:
     """A bird."""
     m.name = "bird"
     with m.of(own):
-        m.add(stretched(sphere((0, 0, 0), 1.0, n=14), (0.035 * s, 0.032 * s, 0.055 * s)),
-            turn=rotation_x(-0.35), at=(0, 0.062 * s, 0))
+        m.ellipsoid((0.035 * s, 0.032 * s, 0.055 * s), n=14, turn=rotation_x(-0.35),
+            at=(0, 0.062 * s, 0))
         m.sphere((0, 0.1 * s, 0.038 * s), 0.022 * s, n=12)
         m.revolve([(0, 0), (0.007 * s, 0), (0, 0.024 * s)], n=8, turn=LYING_ALONG_Z,
             at=(0, 0.1 * s, 0.055 * s))
-        m.add(stretched(sphere((0, 0, 0), 1.0, n=10), (0.014 * s, 0.006 * s, 0.045 * s)),
-            turn=rotation_x(0.5), at=(0, 0.05 * s, -0.06 * s))
-    m.revolve([(0, 0), (0.03 * s, 0), (0.028 * s, 0.006), (0.006, 0.01), (0.005, 0.04 * s),
-        (0, 0.04 * s)], n=14, of=m.metal)
+        m.ellipsoid((0.014 * s, 0.006 * s, 0.045 * s), n=10, turn=rotation_x(0.5),
+            at=(0, 0.05 * s, -0.06 * s))
+    m.turned([(0.03 * s, 0), (0.028 * s, 0.006), (0.006, 0.01), (0.005, 0.04 * s)], n=14,
+        of=m.metal)
 
 
 def cat(m: Maker, s: float, own: Material) -> None:
     """A cat."""
     m.name = "cat"
     with m.of(own):
-        m.revolve(scaled(s, s, [(0, 0), (0.042, 0), (0.046, 0.02), (0.034, 0.07),
-            (0.02, 0.1), (0, 0.105)]))
+        m.revolve(scaled(s, s, [(0, 0), (0.042, 0), (0.046, 0.02), (0.034, 0.07), (0.02, 0.1),
+            (0, 0.105)]))
         m.sphere((0, 0.12 * s, 0.008), 0.028 * s, n=12)
         for x in (-0.016, 0.016):
-            m.revolve(
-                [(0, 0), (0.011 * s, 0), (0, 0.026 * s)], n=8, at=(x * s, 0.137 * s, 0.005)
-            )
+            m.revolve([(0, 0), (0.011 * s, 0), (0, 0.026 * s)], n=8, at=(x * s, 0.137 * s, 0.005))
         m.tube(bent([(0.03 * s, 0.008, -0.03 * s), (0.07 * s, 0.008, -0.01),
             (0.05 * s, 0.008, 0.04 * s)], 0.03, n=3), 0.008, n=6)
 
@@ -118,11 +116,11 @@ def elephant(m: Maker, s: float, own: Material) -> None:
         for x, z in product((-0.02, 0.02), (-0.035, 0.03)):
             m.frustum((0.013 * s, 0), (0.012 * s, 0.06 * s), n=10, at=(x * s, 0, z * s))
         m.sphere((0, 0.105 * s, 0.055 * s), 0.028 * s, n=12)
-        m.tube(bent([(0, 0.1 * s, 0.075 * s), (0, 0.06 * s, 0.1 * s),
-            (0, 0.035 * s, 0.095 * s)], 0.02, n=3), 0.009 * s, end=0.005 * s)
+        m.tube(bent([(0, 0.1 * s, 0.075 * s), (0, 0.06 * s, 0.1 * s), (0, 0.035 * s, 0.095 * s)],
+            0.02, n=3), 0.009 * s, end=0.005 * s)
         for x in (-1.0, 1.0):
-            m.add(stretched(sphere((0, 0, 0), 1.0, n=10), (0.005, 0.025 * s, 0.02 * s)),
-                turn=rotation_y(x * 0.5), at=(x * 0.03 * s, 0.11 * s, 0.045 * s))
+            m.ellipsoid((0.005, 0.025 * s, 0.02 * s), n=10, turn=rotation_y(x * 0.5),
+                at=(x * 0.03 * s, 0.11 * s, 0.045 * s))
 
 
 def little_house(m: Maker, material: Material, own: Material, grain: Material) -> None:
@@ -130,8 +128,8 @@ def little_house(m: Maker, material: Material, own: Material, grain: Material) -
     m.name = "little_house"
     w, h, d = m.uniform(0.045, 0.065), m.uniform(0.07, 0.12), m.uniform(0.04, 0.06)
     m.box(w, h, d, 0.002, of=material)
-    m.loft(rings(rect, [(w + 0.012, d + 0.01, 0.0005, h),
-        (0.004, d + 0.01, 0.0005, h + w * m.uniform(0.6, 1.0))], n=1), sharp=20.0, of=own)
+    m.loft(rings(rect, [(w + 0.012, d + 0.01, 0.0005, h), (0.004, d + 0.01, 0.0005,
+        h + w * m.uniform(0.6, 1.0))], n=1), sharp=20.0, of=own)
     for x, y in product((-0.22, 0.22), (0.62, 0.8)):
         m.box(((x - 0.12) * w, (x + 0.12) * w), ((y - 0.06) * h, (y + 0.06) * h), 0.0008,
             against=d / 2, of=plain("window", (0.9, 0.82, 0.6), 0.5))
@@ -142,10 +140,9 @@ def globe(m: Maker, grain: Material) -> None:
     """A globe."""
     m.name = "globe"
     r = m.uniform(0.06, 0.1)
-    m.revolve([(0, 0), (r * 0.7, 0), (r * 0.66, 0.012), (r * 0.14, 0.025), (r * 0.1, 0.06),
-        (0, 0.06)], n=18, of=grain)
-    m.sphere((0, r + 0.07, 0), r, n=20, of=plain("globe",
-        m.pick((0.35, 0.5, 0.62), (0.75, 0.68, 0.5), (0.2, 0.3, 0.4)), 0.35))
+    m.turned([(r * 0.7, 0), (r * 0.66, 0.012), (r * 0.14, 0.025), (r * 0.1, 0.06)], n=18, of=grain)
+    m.sphere((0, r + 0.07, 0), r, n=20, of=plain("globe", m.pick((0.35, 0.5, 0.62),
+        (0.75, 0.68, 0.5), (0.2, 0.3, 0.4)), 0.35))
     with m.moved(turn=rotation_z(0.4), at=(0, r + 0.07, 0)):
         m.tube(bent([(0, -r - 0.01, 0), (0, -r - 0.01, -r - 0.01), (0, r + 0.01, -r - 0.01),
             (0, r + 0.01, 0)], r, n=6), 0.003, n=6, of=m.metal)
@@ -158,14 +155,13 @@ def hourglass(m: Maker, grain: Material) -> None:
     h, r = m.uniform(0.13, 0.2), m.uniform(0.03, 0.04)
     for y in (0.0, h - 0.012):
         m.cylinder(r + 0.012, 0, 0.012, n=18, at=(0, y, 0), of=grain)
-    m.revolve([(0, 0.0125), (r * 0.9, 0.0125), (r, 0.035), (r * 0.8, 0.36 * h),
-        (0.004, 0.5 * h), (r * 0.8, 0.64 * h), (r, h - 0.035), (r * 0.9, h - 0.0125),
-        (0, h - 0.0125)], n=18, of=glass())
+    m.turned([(r * 0.9, 0.0125), (r, 0.035), (r * 0.8, 0.36 * h), (0.004, 0.5 * h),
+        (r * 0.8, 0.64 * h), (r, h - 0.035), (r * 0.9, h - 0.0125)], n=18, of=glass())
     m.revolve([(0, 0.013), (r * 0.86, 0.013), (r * 0.8, 0.03), (0, 0.3 * h)],
         of=plain("sand", (0.8, 0.66, 0.45), 0.9))
     for k in range(3):
-        m.rod(cos(2.1 * k) * (r + 0.006), (0.006, h - 0.006), sin(2.1 * k) * (r + 0.006),
-            0.0035, n=6, of=grain)
+        m.rod(cos(2.1 * k) * (r + 0.006), (0.006, h - 0.006), sin(2.1 * k) * (r + 0.006), 0.0035,
+            n=6, of=grain)
 
 
 def pyramid(m: Maker, own: Material) -> None:
@@ -176,8 +172,8 @@ def pyramid(m: Maker, own: Material) -> None:
         m.loft(rings(rect, [(a, a, 0.001, 0), (a * 0.7, a * 0.7, 0.001, a * 2.2),
             (0.004, 0.004, 0.001, a * 2.8)], n=1), sharp=10.0, of=own)
     else:
-        m.loft(rings(oval, [(a * 1.4, a * 1.4, 0), (0.004, 0.004, a * 1.1)], n=4),
-            sharp=10.0, of=own)
+        m.loft(rings(oval, [(a * 1.4, a * 1.4, 0), (0.004, 0.004, a * 1.1)], n=4), sharp=10.0,
+            of=own)
 
 
 def ring_sculpture(m: Maker, material: Material, grain: Material) -> None:
@@ -198,8 +194,8 @@ def arch(m: Maker) -> None:
     w = m.uniform(0.1, 0.15)
     for k in range(m.integers(1, 4)):
         m.tube(bent([(-w / 2 + k * 0.022, 0, 0), (-w / 2 + k * 0.022, w - k * 0.022, 0),
-            (w / 2 - k * 0.022, w - k * 0.022, 0), (w / 2 - k * 0.022, 0, 0)],
-            w / 2 - k * 0.022, n=7), 0.009, of=plain("arch", m.any_colour(), 0.6))
+            (w / 2 - k * 0.022, w - k * 0.022, 0), (w / 2 - k * 0.022, 0, 0)], w / 2 - k * 0.022,
+            n=7), 0.009, of=plain("arch", m.any_colour(), 0.6))
 
 
 def wooden_tree(m: Maker, own: Material, grain: Material) -> None:
@@ -209,8 +205,8 @@ def wooden_tree(m: Maker, own: Material, grain: Material) -> None:
     m.rod(0, (0, 0.3 * h), 0, 0.008, of=grain)
     m.frustum((0.03, 0), (0.028, 0.008), n=14, of=grain)
     for k in range(3):
-        m.revolve([(0, 0), (0.05 - 0.012 * k, 0.0), (0.03 - 0.008 * k, 0.12 * h),
-            (0.006, 0.28 * h), (0, 0.28 * h)], at=(0, (0.2 + 0.24 * k) * h, 0), of=own)
+        m.turned([(0.05 - 0.012 * k, 0.0), (0.03 - 0.008 * k, 0.12 * h), (0.006, 0.28 * h)],
+            at=(0, (0.2 + 0.24 * k) * h, 0), of=own)
 
 
 def pebbles(m: Maker) -> None:
@@ -219,10 +215,10 @@ def pebbles(m: Maker) -> None:
     y = 0.0
     for k in range(m.integers(3, 6)):
         a, b = 0.05 - 0.008 * k, m.uniform(0.012, 0.019)
-        m.add(stretched(sphere((0, 0, 0), 1.0, n=14), (a * m.uniform(0.9, 1.1), b,
-            a * m.uniform(0.7, 0.9))), at=(m.uniform(-0.004, 0.004), y + b,
-            m.uniform(-0.004, 0.004)), turn=rotation_y(m.uniform(0, 3)),
-            of=plain("pebble", shade((0.5, 0.49, 0.47), m.uniform(0.6, 1.4)), 0.7))
+        m.ellipsoid((a * m.uniform(0.9, 1.1), b, a * m.uniform(0.7, 0.9)), n=14,
+            at=(m.uniform(-0.004, 0.004), y + b, m.uniform(-0.004, 0.004)),
+            turn=rotation_y(m.uniform(0, 3)), of=plain("pebble",
+            shade((0.5, 0.49, 0.47), m.uniform(0.6, 1.4)), 0.7))
         y += 1.9 * b
 
 
@@ -235,10 +231,9 @@ def boat(m: Maker, s: float, own: Material, grain: Material) -> None:
     m.rod(0, (0.04 * s, 0.25 * s), 0, 0.003, n=6, of=grain)
     sail = plain("sail", (0.9, 0.88, 0.82), 0.9)
     for x0, x1, top in ((0.006, 0.075, 0.24), (-0.07, -0.006, 0.2)):
-        m.loft([([(x0 * s, -0.001), (x0 * s, 0.001), (x1 * s, 0.001), (x1 * s, -0.001)],
-            0.06 * s), ([(-0.001 + (x0 if x0 > 0 else x1) * s, -0.001),
-            (-0.001 + (x0 if x0 > 0 else x1) * s, 0.001),
-            (0.001 + (x0 if x0 > 0 else x1) * s, 0.001),
+        m.loft([([(x0 * s, -0.001), (x0 * s, 0.001), (x1 * s, 0.001), (x1 * s, -0.001)], 0.06 * s),
+            ([(-0.001 + (x0 if x0 > 0 else x1) * s, -0.001), (-0.001 + (x0 if x0 > 0 else x1) * s,
+            0.001), (0.001 + (x0 if x0 > 0 else x1) * s, 0.001),
             (0.001 + (x0 if x0 > 0 else x1) * s, -0.001)], top * s)], sharp=10.0, of=sail)
 
 
@@ -249,9 +244,8 @@ def camera(m: Maker) -> None:
     m.box(0.13, 0.05, 0.032, 0.004, of=black)
     m.box(0.13, (0.05, 0.072), 0.03, 0.004, of=m.metal)
     m.box(0.04, (0.07, 0.085), 0.024, 0.003, of=m.metal)
-    m.revolve([(0, 0), (0.027, 0), (0.027, 0.02), (0.024, 0.021), (0.024, 0.035),
-        (0.018, 0.036), (0.014, 0.028), (0, 0.028)], n=20, turn=LYING_ALONG_Z,
-        at=(0.005, 0.034, 0.0155), of=black)
+    m.turned([(0.027, 0), (0.027, 0.02), (0.024, 0.021), (0.024, 0.035), (0.018, 0.036),
+        (0.014, 0.028)], n=20, turn=LYING_ALONG_Z, at=(0.005, 0.034, 0.0155), of=black)
     m.cylinder(0.009, 0, 0.007, n=12, at=(-0.045, 0.0715, 0), of=m.metal, mirrored="x")
 
 
@@ -262,9 +256,8 @@ def trophy(m: Maker, s: float) -> None:
     m.vessel([(0, 0.036), (0.026, 0.036), (0.01, 0.05), (0.008, 0.08 * s), (0.03, 0.1 * s),
         (0.045, 0.14 * s), (0.05, 0.18 * s)], 0.002, n=18, of=m.metal)
     for x in (-1.0, 1.0):
-        m.tube(bent([(x * 0.045, 0.17 * s, 0), (x * 0.08, 0.17 * s, 0),
-            (x * 0.075, 0.11 * s, 0), (x * 0.034, 0.105 * s, 0)], 0.02, n=3), 0.0035, n=6,
-            of=m.metal)
+        m.tube(bent([(x * 0.045, 0.17 * s, 0), (x * 0.08, 0.17 * s, 0), (x * 0.075, 0.11 * s, 0),
+            (x * 0.034, 0.105 * s, 0)], 0.02, n=3), 0.0035, n=6, of=m.metal)
 
 
 def bust(m: Maker, material: Material, grain: Material) -> None:
@@ -272,15 +265,11 @@ def bust(m: Maker, material: Material, grain: Material) -> None:
     m.name = "bust"
     m.box(0.08, 0.025, 0.07, 0.003, of=grain)
     with m.of(material):
-        m.loft([(oval(0.05, 0.045), 0.0255), (oval(0.12, 0.07), 0.06),
-            (oval(0.1, 0.06), 0.085), (oval(0.045, 0.045), 0.105),
-            (oval(0.042, 0.045, z=0.004), 0.13)])
-        m.add(stretched(sphere((0, 0, 0), 1.0, n=16), (0.034, 0.046, 0.04)),
-            at=(0, 0.165, 0.006))
-        m.add(stretched(sphere((0, 0, 0), 1.0, n=8), (0.006, 0.012, 0.009)),
-            at=(0, 0.163, 0.045))
-        m.add(stretched(sphere((0, 0, 0), 1.0, n=12), (0.036, 0.034, 0.038)),
-            at=(0, 0.182, -0.004))
+        m.loft([(oval(0.05, 0.045), 0.0255), (oval(0.12, 0.07), 0.06), (oval(0.1, 0.06), 0.085),
+            (oval(0.045, 0.045), 0.105), (oval(0.042, 0.045, z=0.004), 0.13)])
+        m.ellipsoid((0.034, 0.046, 0.04), n=16, at=(0, 0.165, 0.006))
+        m.ellipsoid((0.006, 0.012, 0.009), n=8, at=(0, 0.163, 0.045))
+        m.ellipsoid((0.036, 0.034, 0.038), n=12, at=(0, 0.182, -0.004))
 
 
 def treasure_chest(m: Maker, own: Material) -> None:
@@ -307,14 +296,12 @@ def cube_puzzle(m: Maker) -> None:
 def snow_globe(m: Maker, own: Material) -> None:
     """A snow globe."""
     m.name = "snow_globe"
-    m.revolve([(0, 0), (0.04, 0), (0.036, 0.02), (0.03, 0.025), (0, 0.025)], n=20, of=own)
+    m.turned([(0.04, 0), (0.036, 0.02), (0.03, 0.025)], n=20, of=own)
     m.revolve([(0, 0.0252), (0.024, 0.0252), (0.04, 0.045), (0.042, 0.062), (0.034, 0.088),
         (0.018, 0.1), (0, 0.103)], n=20, of=glass())
     m.revolve([(0, 0.0254), (0.022, 0.0254), (0.03, 0.038), (0, 0.043)], n=14,
         of=plain("snow", (0.93, 0.93, 0.93), 0.9))
-    m.revolve(
-        [(0, 0.04), (0.014, 0.042), (0, 0.08)], n=10, of=plain("fir", (0.1, 0.3, 0.18), 0.8)
-    )
+    m.revolve([(0, 0.04), (0.014, 0.042), (0, 0.08)], n=10, of=plain("fir", (0.1, 0.3, 0.18), 0.8))
 
 
 def bead_string(m: Maker, own: Material) -> None:
@@ -322,19 +309,17 @@ def bead_string(m: Maker, own: Material) -> None:
     m.name = "bead_string"
     n, r = m.integers(14, 20), m.uniform(0.009, 0.012)
     for k in range(n):
-        m.sphere((cos(2 * pi * k / n) * n * r * 0.33, r,
-            sin(2 * pi * k / n) * n * r * 0.33), r, n=8, of=own)
+        m.sphere((cos(2 * pi * k / n) * n * r * 0.33, r, sin(2 * pi * k / n) * n * r * 0.33), r,
+            n=8, of=own)
 
 
 def metronome(m: Maker, grain: Material) -> None:
     """A metronome."""
     m.name = "metronome"
     m.loft(rings(rect, [(0.11, 0.1, 0.004, 0), (0.11, 0.1, 0.004, 0.012),
-        (0.1, 0.09, 0.003, 0.0125), (0.05, 0.045, 0.003, 0.2), (0.03, 0.025, 0.003, 0.22)],
-        n=1), sharp=25.0, of=grain)
-    m.tube(
-        [(0, 0.05, 0.046), (m.uniform(-0.02, 0.02), 0.19, 0.034)], 0.0018, n=5, of=m.metal
-    )
+        (0.1, 0.09, 0.003, 0.0125), (0.05, 0.045, 0.003, 0.2), (0.03, 0.025, 0.003, 0.22)], n=1),
+        sharp=25.0, of=grain)
+    m.tube([(0, 0.05, 0.046), (m.uniform(-0.02, 0.02), 0.19, 0.034)], 0.0018, n=5, of=m.metal)
     m.box(0.018, (0.12, 0.14), (0.036, 0.044), 0.001, of=m.metal)
 
 
@@ -356,8 +341,7 @@ def horse(m: Maker, s: float, own: Material) -> None:
         m.rounded(0.044 * s, (0.08 * s, 0.125 * s), (-0.06 * s, 0.05 * s), 0.02 * s)
         for x, z in product((-0.013, 0.013), (-0.048, 0.04)):
             m.rod(x * s, (0, 0.09 * s), z * s, 0.006 * s, end=0.011 * s)
-        m.tube([(0, 0.105 * s, 0.04 * s), (0, 0.175 * s, 0.075 * s)], 0.02 * s, n=10,
-            end=0.013 * s)
+        m.tube([(0, 0.105 * s, 0.04 * s), (0, 0.175 * s, 0.075 * s)], 0.02 * s, n=10, end=0.013 * s)
         m.tube([(0, 0.178 * s, 0.065 * s), (0, 0.155 * s, 0.115 * s)], 0.015 * s, n=10,
             end=0.009 * s)
         m.tube(bent([(0, 0.115 * s, -0.055 * s), (0, 0.11 * s, -0.08 * s),

@@ -31,16 +31,16 @@ def rect(
 ) -> list[tuple[float, float]]:
     """A rectangle about (x, z) with round corners of radius r, n + 1 points a corner."""
     r = max(min(r, 0.49 * min(w, d)), 1e-4)
-    found = []
+    result = []
     for k, (sx, sz) in enumerate(((1, -1), (-1, -1), (-1, 1), (1, 1))):
         for t in np.pi / 2 * (k + np.arange(n + 1) / n):
-            found.append(
+            result.append(
                 (
                     float(x + sx * (w / 2 - r) + r * np.cos(t)),
                     float(z + sz * (d / 2 - r) - r * np.sin(t)),
                 )
             )
-    return found
+    return result
 
 
 def fluted(w: float, ribs: int, depth: float) -> list[tuple[float, float]]:
@@ -52,8 +52,8 @@ def fluted(w: float, ribs: int, depth: float) -> list[tuple[float, float]]:
 
 
 def gathered(w: float, d: float, fold: float, deep: float) -> list[tuple[float, float]]:
-    """A rectangle w by d whose sides go in and out by `deep`, a fold about so long: cloth that is gathered."""
-    found = []
+    """A rectangle w by d whose sides go in and out by `deep` every `fold` metres: gathered cloth."""
+    result = []
     for (x, z), (dx, dz), side in (
         ((-w / 2, d / 2), (1.0, 0.0), w),
         ((w / 2, d / 2), (0.0, -1.0), d),
@@ -64,8 +64,8 @@ def gathered(w: float, d: float, fold: float, deep: float) -> list[tuple[float, 
         for k in range(n):
             # In and out by turns; outwards is to the right of the way round.
             out, s = deep * (1.0 if k % 2 else -1.0), side * k / n
-            found.append((x + dx * s - dz * out, z + dz * s + dx * out))
-    return found
+            result.append((x + dx * s - dz * out, z + dz * s + dx * out))
+    return result
 
 
 def d_shape(
@@ -106,16 +106,16 @@ def scaled(
 def bent(points: Sequence[Triple], r: float, *, n: int = 4) -> list[Triple]:
     """The path with its corners rounded, r before and after each."""
     path = [np.asarray(p, np.float64) for p in points]
-    found = [path[0]]
+    result = [path[0]]
     for before, corner, after in zip(path, path[1:], path[2:], strict=False):
         to, off = before - corner, after - corner
         near = min(r, 0.49 * float(np.linalg.norm(to)), 0.49 * float(np.linalg.norm(off)))
         a = corner + to / np.linalg.norm(to) * near
         b = corner + off / np.linalg.norm(off) * near
         for t in np.linspace(0, 1, n + 1):
-            found.append((1 - t) ** 2 * a + 2 * t * (1 - t) * corner + t**2 * b)
-    found.append(path[-1])
-    return [(float(p[0]), float(p[1]), float(p[2])) for p in found]
+            result.append((1 - t) ** 2 * a + 2 * t * (1 - t) * corner + t**2 * b)
+    result.append(path[-1])
+    return [(float(p[0]), float(p[1]), float(p[2])) for p in result]
 
 
 def ring_path(r: float, *, y: float = 0.0, n: int = 24, share: float = 1.0) -> list[Triple]:

@@ -1,4 +1,4 @@
-"""Paper that stands and lies: cards and brochures, sheets on a floor; no effects."""
+"""Cards, brochures, and sheets on a floor; no effects."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from pbrs_farm.furnishings.things.maker import Maker, thing
 from pbrs_farm.furnishings.things.materials import plain
 
 # fmt: off
+
 
 _INK = plain("print", (0.3, 0.3, 0.32), 0.8)
 
@@ -43,7 +44,7 @@ def printed(m: Maker, w: float, h: float, z: float, ground: Material) -> None:
 
 @thing(group="papers", nyu40=PAPER)
 def standing_card(m: Maker) -> None:
-    """A card or brochure that stands open, upright like a book or like a tent; two or three of them."""
+    """One to three open cards or brochures, upright like a book or like a tent."""
     for k in range(m.pick(1, 1, 2, 3)):
         w, h = m.pick((0.105, 0.148), (0.148, 0.105), (0.1, 0.21), (0.148, 0.21), (0.12, 0.17))
         ground = white_paper(m) if m.chance(0.5) else plain("card", m.any_colour(), 0.5)

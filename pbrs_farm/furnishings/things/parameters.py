@@ -57,7 +57,7 @@ Front = Annotated[str, Choice("flat", "shaker", "grooved", "raised", "glazed")]
 def changed(drawn: P, given: Mapping[str, object], name: str) -> P:
     """The drawn parameters with those that the user gives.
 
-    name: of the thing, for messages. Raises BadInput for an unknown parameter and for a value that
+    name: of the item, for messages. Raises BadInput for an unknown parameter and for a value that
     does not fit.
     """
     hints = parameters_of(type(drawn))

@@ -1,4 +1,4 @@
-"""Plants in pots of the generated catalogue: on floors and on what stands there; no effects."""
+"""Potted plants of the generated catalogue, for floors and surfaces; no effects."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ from pbrs_farm.furnishings.things.outlines import Triple, bent, fluted, polar, r
 from pbrs_farm.furnishings.things.shapes import Pair
 
 # fmt: off
+
 
 _GREENS: Final = ((0.25, 0.43, 0.17), (0.32, 0.5, 0.22), (0.19, 0.35, 0.16), (0.41, 0.53, 0.26),
     (0.29, 0.42, 0.28))
@@ -91,9 +92,8 @@ def pot(m: Maker, w: float, d: float, tall: float) -> None:
             turned([(0.85 * r, 0.3 * tall), (r, 0.34 * tall), (r, tall)])
             for k in range(3):
                 a = 2 * pi * k / 3
-                m.tube(
-                    [polar(0.95 * r, 0.004, a), polar(0.6 * r, 0.36 * tall, a)], 0.012, of=m.timber
-                )
+                m.tube([polar(0.95 * r, 0.004, a), polar(0.6 * r, 0.36 * tall, a)], 0.012,
+                    of=m.timber)
         case 7:  # with grooves
             turned([(0.9 * r, 0.0), *((r * (1.0 if k % 2 else 0.95),
                 tall * (0.06 + 0.1 * k)) for k in range(9)), (r, tall)])
@@ -107,9 +107,8 @@ def _greens(m: Maker) -> tuple[Material, Material]:
     return old, plain("young leaf", mix(colour, (0.5, 0.6, 0.28), m.uniform(0.15, 0.4)), 0.55)
 
 
-def _of_leaves(
-    m: Maker, foot: float, n: int, each: Callable[[int], tuple[float, float, F64]]
-) -> None:
+def _of_leaves(m: Maker, foot: float, n: int, each: Callable[[int],
+    tuple[float, float, F64]]) -> None:
     """Leaves from one point: (turn about the stem, lift, grid) of each."""
     old, young = _greens(m)
     for k in range(n):
@@ -158,9 +157,8 @@ def palm(m: Maker, r: float, foot: float, h: float) -> None:
     for k in range(m.integers(6, 8)):
         a, out, y = _turn(k), r * m.uniform(0.6, 0.95), foot + (h - foot) * m.uniform(0.6, 1.0)
         # A curve that rises beside the stem and hangs over at its end.
-        ends = np.array(
-            [(0.0, foot - 0.02, 0.0), (0.2 * out, 1.15 * y, 0.0), (out, y - 0.3 * (y - foot), 0.0)]
-        )
+        ends = np.array([(0.0, foot - 0.02, 0.0), (0.2 * out, 1.15 * y, 0.0),
+            (out, y - 0.3 * (y - foot), 0.0)])
         curve = (1 - t) ** 2 * ends[0] + 2 * t * (1 - t) * ends[1] + t**2 * ends[2]
         way = [(float(x * cos(a)), float(up), float(-x * sin(a))) for x, up, _z in curve]
         m.tube(way, 0.005, n=4, end=0.002, of=old)
@@ -194,12 +192,12 @@ def tree(m: Maker, r: float, foot: float, h: float) -> None:
         t = (k + 0.5) / n
         y, ring = low + (h - low) * t, np.sin(pi * min(0.12 + 0.86 * t, 1.0)) ** 0.7
         a, out = _turn(k), (r - 0.7 * long) * ring * m.uniform(0.6, 1.0)
-        at = (float(top[0] * 0.3 + out * cos(a)), float(min(y, h - 0.12 * long)),
+        tip = (float(top[0] * 0.3 + out * cos(a)), float(min(y, h - 0.12 * long)),
             float(top[2] * 0.3 - out * sin(a)))
         if k % 3 == 0:
-            m.tube([(0.5 * way[-1][0], max(low - 0.02, foot), 0.5 * way[-1][2]), at], 0.004, n=4,
+            m.tube([(0.5 * way[-1][0], max(low - 0.02, foot), 0.5 * way[-1][2]), tip], 0.004, n=4,
                 of=_BARK)
-        _add_leaf(m, at, a + m.uniform(-0.5, 0.5), m.uniform(-0.4, 0.3),
+        _add_leaf(m, tip, a + m.uniform(-0.5, 0.5), m.uniform(-0.4, 0.3),
             leaf(long, long * m.pick(0.42, 0.58), droop=0.25, rows=3), young if t > 0.8 else old)
 
 
@@ -282,22 +280,21 @@ def _planted(m: Maker, size: Size, pot_share: float, grow: Grow, *, spread: floa
     tall = min(width * m.uniform(0.75, 1.1), 0.55 * h)
     pot(m, width, width, tall)
     foot = 0.955 * tall
-    own = Maker(m.rng, m.style)
-    grow(own, w / 2, foot, h)
-    parts = own.finished(__name__, grow.__name__)
+    maker = Maker(m.rng, m.style)
+    grow(maker, w / 2, foot, h)
+    parts = maker.finished(__name__, grow.__name__)
     points = np.concatenate([solid.positions for solid, _material in parts])
     low, high = points.min(0), points.max(0)
     scale = (spread * w / (high[0] - low[0]), (h - foot) / (high[1] - foot),
         spread * d / (high[2] - low[2]))
     for solid, material in parts:
-        centred = transformed(
-            solid, np.eye(3), (-(low[0] + high[0]) / 2, -foot, -(low[2] + high[2]) / 2)
-        )
+        centred = transformed(solid, np.eye(3), (-(low[0] + high[0]) / 2, -foot,
+            -(low[2] + high[2]) / 2))
         m.add(stretched(centred, scale), at=(0.0, foot, 0.0), of=material)
 
 
 def _round(width: Pair, height: Pair) -> Callable[[Maker], Size]:
-    """Sizes of plants as deep as they are wide."""
+    """Size function of plants with equal width and depth."""
     return lambda m: (*(m.uniform(*width),) * 2, m.uniform(*height))
 
 

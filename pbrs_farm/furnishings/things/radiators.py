@@ -19,9 +19,8 @@ from pbrs_farm.furnishings.things.outlines import bent
 def towel_radiator(m: Maker) -> None:
     """A ladder of tubes that towels are dried on, in groups with gaps between."""
     w, h = m.uniform(0.42, 0.56), m.uniform(0.9, 1.3)
-    with m.of(
-        plain("towel radiator", (0.12, 0.12, 0.13) if m.chance(0.2) else (0.92, 0.92, 0.91), 0.3)
-    ):
+    with m.of(plain("towel radiator", (0.12, 0.12, 0.13) if m.chance(0.2) else (0.92, 0.92, 0.91),
+        0.3)):
         for x in (-(w / 2 - 0.015), w / 2 - 0.015):
             m.cylinder(0.015, 0.0, h, n=12, at=(x, 0.0, 0.06))
             for y in (0.1, h - 0.1):
@@ -104,6 +103,5 @@ def panel_radiator(m: Maker, size: Size) -> None:
         m.box(0.03, (0.25 * h, 0.7 * h), (0.0, z0 + 0.001), x=-0.3 * w, mirrored="x")
     m.tube(bent([(hw - 0.04, 0.06, z0 + 0.02), (hw - 0.012, 0.06, z0 + 0.02),
         (hw - 0.012, 0.06, 0.002)], 0.01, n=2), 0.008, n=7, of=CHROME)
-    m.revolve([(0.0, 0.0), (0.02, 0.0), (0.022, 0.03), (0.016, 0.05), (0.0, 0.05)], n=12,
-        turn=rotation_z(-pi / 2), at=(hw - 0.05, 0.09 if form < 2 else h - 0.09, d - 0.022),
-        of=WHITE_STEEL)
+    m.turned([(0.02, 0.0), (0.022, 0.03), (0.016, 0.05)], n=12, turn=rotation_z(-pi / 2),
+        at=(hw - 0.05, 0.09 if form < 2 else h - 0.09, d - 0.022), of=WHITE_STEEL)

@@ -58,7 +58,7 @@ def stool(m: Maker) -> None:
     r, tall = m.uniform(0.15, 0.19), m.uniform(0.42, 0.5)
     white = plain("stool white", (0.88, 0.88, 0.86), 0.4)
     board = plain("stool " + m.style.wood.name, m.wood, 0.45)
-    m.revolve([(0, 0), (r - 0.006, 0), (r, 0.008), (r, 0.022), (r - 0.006, 0.03), (0, 0.03)], n=28,
+    m.turned([(r - 0.006, 0), (r, 0.008), (r, 0.022), (r - 0.006, 0.03)], n=28,
         at=(0, tall - 0.03, 0), of=board)
     leg, n = frustum((0.013, 0), (0.018, 1.0), n=12), m.integers(3, 5)
     with m.of(white if m.chance(0.3) else board):
@@ -83,9 +83,8 @@ def seat_legs(m: Maker, kind: str, w: float, d: float, high: float, material: Ma
                     (x, 0.008, hd - 0.08), (x, high + 0.01, hd - 0.08)], 0.03, n=3), 0.008,
                     of=material)
     if kind not in ("plinth", "sled"):
-        four_legs(
-            m, kind, w, d, high + 0.002, 0.05, 0.08, 0.03 if kind == "tapered" else 0.0, material
-        )
+        four_legs(m, kind, w, d, high + 0.002, 0.05, 0.08, 0.03 if kind == "tapered" else 0.0,
+            material)
     if w > 1.5 and kind not in ("plinth", "sled"):
         leg(m, kind, (0.0, 0.0), (0.0, 0.0), high + 0.002, 0.05, material)
 
@@ -106,7 +105,9 @@ class Sofa:
 
     seats: Annotated[int, Range(1, 5)]
     arms: Annotated[str, Choice("box", "round", "slope", "thin", "low", "wood")]
-    back: Annotated[str, Choice("cushions", "firm", "tufted", "one")]  # one: a single seat cushion, a plain back
+    back: Annotated[
+        str, Choice("cushions", "firm", "tufted", "one")
+    ]  # one: a single seat cushion, a plain back
     cloth: Material
     feet: Annotated[str, Choice("tapered", "square", "round", "sled", "plinth", "bun")]
     feet_material: Material
@@ -219,8 +220,8 @@ def sofa_arm(m: Maker, size: Size, p: Sofa, x: Pair) -> None:
         case "slope":
             upright = rect(wide, d - 0.01, 0.025, x=middle)
             m.loft([(rect(wide - 0.01, d - 0.02, 0.02, x=middle), low), (upright, low + 0.05),
-                (upright, p.seat_m), (rect(wide, d * 0.75, 0.025, x=middle, z=-d * 0.12), top - 0.02),
-                (rect(wide - 0.03, d * 0.7, 0.02, x=middle, z=-d * 0.12), top)])
+                (upright, p.seat_m), (rect(wide, d * 0.75, 0.025, x=middle, z=-d * 0.12),
+                top - 0.02), (rect(wide - 0.03, d * 0.7, 0.02, x=middle, z=-d * 0.12), top)])
         case "wood":
             with m.of(m.timber):
                 m.box((x[0] + 0.01, x[1] - 0.01), (top - 0.035, top), d - 0.04, 0.006)
@@ -231,7 +232,7 @@ def sofa_arm(m: Maker, size: Size, p: Sofa, x: Pair) -> None:
 @family(group="corner_sofa", nyu40=SOFA, place=Place.FLOOR, called="corner_sofa", variants=16,
     size=lambda m: (m.pick(2.2, 2.4, 2.6), m.pick(1.5, 1.6, 1.7), m.uniform(0.76, 0.86)))
 def chaise_sofa(m: Maker, size: Size) -> None:
-    """A sofa with one seat that is long enough to lie on."""
+    """A sofa with one seat long enough for a person at full length."""
     w, d, h = size
     hw, hd = w / 2, d / 2
     material, s = m.cloth(), m.pick(-1.0, 1.0)
@@ -333,8 +334,8 @@ def armchair(m: Maker, size: Size) -> None:
                     -hd + 0.205))
         case 4:  # a shell on four legs or a swivel foot
             if m.chance(0.35):
-                m.revolve([(0.0, 0.0), (0.26, 0.0), (0.25, 0.012), (0.03, 0.03), (0.03, 0.3),
-                    (0.0, 0.3)], n=28, of=m.pick(CHROME, BLACK_STEEL, STEEL))
+                m.turned([(0.26, 0.0), (0.25, 0.012), (0.03, 0.03), (0.03, 0.3)], n=28,
+                    of=m.pick(CHROME, BLACK_STEEL, STEEL))
             else:
                 four_legs(m, "tapered", w, d, 0.3, 0.04, 0.22, 0.14, feet_stuff)
             with m.of(material):
@@ -355,7 +356,8 @@ def tub_back(m: Maker, w: float, d: float, y: float, low: float, high: float, t:
 class Chair:
     """Parameters of a chair to eat at."""
 
-    back: Annotated[str, Choice("slats", "ladder", "spindles", "panel", "shell", "soft", "cross", "bent")]
+    back: Annotated[str, Choice("slats", "ladder", "spindles", "panel", "shell", "soft", "cross",
+        "bent")]
     frame: Material
     cloth: Material
     seat_m: Annotated[float, Range(0.35, 0.6)]  # height
@@ -375,9 +377,8 @@ def draw_chair(m: Maker, size: Size) -> Chair:
     """Draw a chair's parameters."""
     seat = m.uniform(0.44, 0.47)
     back = m.pick("slats", "ladder", "spindles", "panel", "shell", "soft", "cross", "bent")
-    frame = m.pick(
-        m.timber, m.timber, m.dark_timber, BLACK_STEEL, WHITE, glossy("paint", m.paint(), 0.4)
-    )
+    frame = m.pick(m.timber, m.timber, m.dark_timber, BLACK_STEEL, WHITE,
+        glossy("paint", m.paint(), 0.4))
     soft = m.cloth()
     p = Chair(back, frame, soft, seat, 0.033, False, 2 if back == "ladder" else 5, frame, False,
         soft, "tapered", (m.timber, m.timber), CHROME, soft)
@@ -590,9 +591,8 @@ def swivel_chair(m: Maker, size: Size) -> None:
     """A chair that turns, on five arms with castors: a seat, a back of cloth or slats, armrests on some."""
     w, d, h = size
     r, seat = min(w, d) / 2 - 0.02, m.uniform(0.45, 0.5)
-    black = plain(
-        "office plastic", m.pick((0.05, 0.05, 0.05), (0.05, 0.05, 0.05), (0.75, 0.75, 0.75)), 0.5
-    )
+    black = plain("office plastic", m.pick((0.05, 0.05, 0.05), (0.05, 0.05, 0.05),
+        (0.75, 0.75, 0.75)), 0.5)
     star = m.pick(black, black, CHROME, STEEL)
     cover = m.pick(plain("fabric", (0.07, 0.07, 0.08), 0.95),
         plain("fabric", (0.25, 0.26, 0.28), 0.95), m.cloth())
@@ -604,8 +604,8 @@ def swivel_chair(m: Maker, size: Size) -> None:
             m.tube([(r * x - z * (s - 0.008), 0.028, r * z + x * (s - 0.008)),
                 (r * x - z * (s + 0.008), 0.028, r * z + x * (s + 0.008))], 0.028, n=10, of=black)
         m.rod(r * x, (0.05, 0.075), r * z, 0.008, n=6, of=black)
-    m.revolve([(0.0, 0.07), (0.034, 0.07), (0.034, 0.2), (0.022, 0.205), (0.022, seat - 0.08),
-        (0.09, seat - 0.075), (0.09, seat - 0.055), (0.0, seat - 0.055)], n=14, of=star)
+    m.turned([(0.034, 0.07), (0.034, 0.2), (0.022, 0.205), (0.022, seat - 0.08),
+        (0.09, seat - 0.075), (0.09, seat - 0.055)], n=14, of=star)
     wide = 0.82 * w
     m.rounded(wide, (seat - 0.06, seat), 0.5, 0.028, z=0.01, of=cover)
     # A bar behind carries the back, which leans.

@@ -1,4 +1,4 @@
-"""Vocabulary of solids: one method for each, which builds a solid and adds it to the thing; no effects.
+"""Vocabulary of solids: each method builds one and adds it to the item; no effects.
 
 `Maker` inherits these methods. All take the keywords of `Put`. Metres, y up.
 
@@ -52,7 +52,7 @@ class Shapes:
         name: str = "",
         mirrored: str = "",
     ) -> None:
-        """Add a solid to the thing."""
+        """Add a solid to the item."""
         raise NotImplementedError
 
     def box(
@@ -133,6 +133,15 @@ class Shapes:
     def revolve(self, profile: Profile | F64, *, n: int = 16, **put: Unpack[Put]) -> None:
         """A turned solid: a (radius, height) profile about the vertical, n sides."""
         self.add(bodies.revolve(profile, n=n), **put)
+
+    def turned(self, profile: Profile, *, n: int = 16, **put: Unpack[Put]) -> None:
+        """A turned solid with flat ends: `revolve` of a profile that begins and ends beside the axis."""
+        closed = [(0.0, profile[0][1]), *profile, (0.0, profile[-1][1])]
+        self.add(bodies.revolve(closed, n=n), **put)
+
+    def ellipsoid(self, radii: Triple, *, n: int = 16, **put: Unpack[Put]) -> None:
+        """A ball about the origin with radii along x, y and z."""
+        self.add(bodies.stretched(bodies.sphere((0.0, 0.0, 0.0), 1.0, n=n), radii), **put)
 
     def vessel(self, outside: Profile, wall_m: float, *, n: int = 16, **put: Unpack[Put]) -> None:
         """A turned vessel, open at the top, from its outer profile."""

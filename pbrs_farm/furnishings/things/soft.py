@@ -16,7 +16,7 @@ from pbrs_farm.furnishings.things.outlines import rect, scaled
 
 @thing(group="pillow", nyu40=PILLOW)
 def cushion(m: Maker) -> None:
-    """A cushion for a sofa or a bed, lying flat.
+    """A flat cushion for a sofa or a bed.
 
     Square, long, round, a roll, with piping, with a button.
     """
@@ -72,7 +72,7 @@ def bed_pillow(m: Maker) -> None:
 
 def folded(m: Maker, w: float, h: float, d: float, n: int, colour: Rgb, name: str) -> None:
     """N layers of folded cloth on top of each other; h: of one."""
-    # A gap of half a per cent is between layers; each lies a little askew, and its folds are round.
+    # Layers have gaps of half a per cent, are turned a little, and have round folds.
     for k in range(n):
         x, z = w / 2 - abs(m.normal(0, 0.004)), d / 2 - abs(m.normal(0, 0.004))
         m.rounded(2 * x, h, 2 * z, 0.48 * h, n=1, turn=rotation_y(m.normal(0, 0.015)),
@@ -104,7 +104,7 @@ def folded_clothes(m: Maker) -> None:
     """A pile of folded shirts and jumpers."""
     y = 0.0
     for _k in range(m.integers(2, 6)):
-        # Any tint, drawn towards the style so that no pile stands out.
+        # any tint, mixed with the style so that no pile is conspicuous
         colour, h = (mix(m.colour_within(0.15, 0.85), m.style.textiles[0], 0.4),
             m.uniform(0.02, 0.035))
         with m.moved(at=(0, y, 0)):

@@ -1,4 +1,4 @@
-"""Bookcases, shelves, wardrobes, chests, cabinets and coat stands of the generated catalogue; no effects."""
+"""Storage furniture of the generated catalogue, and racks for coats; no effects."""
 
 from __future__ import annotations
 
@@ -37,12 +37,12 @@ from pbrs_farm.furnishings.things.shapes import Pair
 
 # fmt: off
 
+
 _SPLIT_M = 0.95  # wider shelves get an upright in the middle
 
 
-def case(
-    m: Maker, w: float, h: float, d: float, low: float, t: float, material: Material, has_back: bool
-) -> None:
+def case(m: Maker, w: float, h: float, d: float, low: float, t: float, material: Material,
+    has_back: bool) -> None:
     """Sides, top, bottom and back of boards t thick, from low to h."""
     hd = d / 2
     with m.of(material):
@@ -85,8 +85,8 @@ def draw_bookcase(m: Maker, size: Size) -> Bookcase:
     body = m.finish(whites=2)
     kind = m.pick("flat", "flat", "shaker", "raised", "grooved", "glazed")
     front, pull = m.pick(body, body, WHITE), m.pick("knob", "bar", "disc", "edge", "ring")
-    form = ("plain", "fronts_below", "crown", "staggered", "metal_frame")[
-        m.weighted(0.3, 0.24, 0.14, 0.12, 0.2)]
+    form = ("plain", "fronts_below", "crown", "staggered",
+        "metal_frame")[m.weighted(0.3, 0.24, 0.14, 0.12, 0.2)]
     t = m.pick(0.018, 0.022, 0.028)
     rows = max(2, round((h - 0.06) / m.uniform(0.3, 0.38)))
     p = Bookcase(form, body, front, kind, pull, m.metal, t, rows, "none", True, "square", body, 1,
@@ -286,11 +286,8 @@ class Wardrobe:
     mirror: Annotated[int, Range(-1, 5)]  # number of the part with a mirror, -1 for none
 
 
-_WARDROBE_COLUMNS = {
-    "door": ("door",),
-    "door_drawer": ("door", "drawer"),
-    "door_low_drawers": ("door", "low", "low"),
-}
+_WARDROBE_COLUMNS = {"door": ("door",), "door_drawer": ("door", "drawer"),
+    "door_low_drawers": ("door", "low", "low")}
 
 
 def draw_wardrobe(m: Maker, size: Size) -> Wardrobe:
@@ -306,8 +303,8 @@ def draw_wardrobe(m: Maker, size: Size) -> Wardrobe:
     p = Wardrobe("panels", max(2, round(w / 0.48)), body, front, kind, pull, m.metal, foot, crown,
         plinth, legs, "door", STEEL, -1)
     if number == 0:
-        return replace(p, form="hinged",
-            column=m.pick("door", "door", "door_drawer", "door_low_drawers"))
+        return replace(p, form="hinged", column=m.pick("door", "door", "door_drawer",
+            "door_low_drawers"))
     if number == 1:
         n = 2 if w < 1.6 else m.pick(2, 3)
         mirror = (-1, 0, 1)[m.weighted(0.4, 0.35, 0.25)]
@@ -373,8 +370,8 @@ def sliding_leaves(m: Maker, p: Wardrobe, x: Pair, y: Pair, z: Pair, inside: Ins
                     against=face + 0.0181, of=SILVERED)
             # The grips of a leaf behind another are flat, so that it slides past.
             grip = (face + 0.0182, face + (0.024 if k % 2 else 0.0196))
-            for left in (a + 0.003, b - 0.023):
-                m.box(0.02, (low + 0.031, top - 0.031), grip, 0.0006, left=left, of=p.rail)
+            for edge in (a + 0.003, b - 0.023):
+                m.box(0.02, (low + 0.031, top - 0.031), grip, 0.0006, left=edge, of=p.rail)
         space = (x[0] + k * w / n + (0.008 if k else 0.016),
             x[0] + (k + 1) * w / n - (0.008 if k < n - 1 else 0.016))
         if k:
@@ -466,7 +463,7 @@ def sideboard_cabinet(m: Maker, size: Size) -> None:
     size=lambda m: (*m.pick((0.46, 0.46), (0.5, 0.5), (0.8, 0.42), (0.9, 0.4), (1.0, 0.45),
     (0.7, 0.38)), m.pick(1.65, 1.7, 1.75, 1.8)))
 def coat_stand(m: Maker, size: Size) -> None:
-    """What coats hang on.
+    """A coat stand.
 
     A tree, a rail on posts, a ladder, a panel with hooks over a bench, a row of pegs on a frame.
     """
@@ -497,8 +494,7 @@ def coat_tree(m: Maker, w: float, h: float, d: float, material: Material) -> Non
         m.rod(0.0, (0.02, h - 0.06), 0.0, 0.018, n=12)
         m.sphere((0.0, h - 0.032, 0.0), 0.032, n=12)
         if foot == 0:
-            m.revolve([(0.0, 0.0), (d * 0.42, 0.0), (d * 0.42, 0.012), (0.03, 0.035),
-                (0.0, 0.035)], n=30)
+            m.turned([(d * 0.42, 0.0), (d * 0.42, 0.012), (0.03, 0.035)], n=30)
         else:
             for k in range(4):
                 m.tube(bent([(0.0, 0.28 if foot == 1 else 0.03, 0.0),
@@ -507,8 +503,8 @@ def coat_tree(m: Maker, w: float, h: float, d: float, material: Material) -> Non
         for k in range(2 * n):
             a, y, r = pi * k / n, h - (0.16 if k % 2 else 0.34), 0.5 * w - 0.012
             y = h - 0.18 if k % 2 else h - 0.34
-            m.tube(bent([(0.0, y - 0.04, 0.0), polar(0.6 * r, y - 0.01, a),
-                polar(r, y + 0.1, a)], 0.06, n=3), 0.009, n=6)
+            m.tube(bent([(0.0, y - 0.04, 0.0), polar(0.6 * r, y - 0.01, a), polar(r, y + 0.1, a)],
+                0.06, n=3), 0.009, n=6)
             m.sphere(polar(r, y + 0.105, a), 0.014, n=8)
 
 
@@ -518,12 +514,11 @@ def crossed_sticks(m: Maker, w: float, h: float, d: float, material: Material) -
         n = m.pick(4, 4, 8)
         for k in range(n):
             a, b = 2 * pi * k / n, 2 * pi * k / n + 2.2
-            m.tube([polar((0.47 * w, 0.47 * d), 0.006, a),
-                polar((0.4 * w, 0.4 * d), h - 0.006, b)], 0.015, end=0.011)
+            m.tube([polar((0.47 * w, 0.47 * d), 0.006, a), polar((0.4 * w, 0.4 * d), h - 0.006, b)],
+                0.015, end=0.011)
             for s in (0.8, 0.93):
-                m.tube([polar((s * 0.4 * w, s * 0.4 * d), s * h, b,
-                    x=(1 - s) * 0.47 * w * cos(a), z=(1 - s) * 0.47 * d * sin(a)),
-                    polar(0.06, s * h + 0.04, b,
+                m.tube([polar((s * 0.4 * w, s * 0.4 * d), s * h, b, x=(1 - s) * 0.47 * w * cos(a),
+                    z=(1 - s) * 0.47 * d * sin(a)), polar(0.06, s * h + 0.04, b,
                     x=(1 - s) * 0.47 * w * cos(a) + s * 0.4 * w * cos(b),
                     z=(1 - s) * 0.47 * d * sin(a) + s * 0.4 * d * sin(b))], 0.007, n=6)
         m.hoop(oval(0.2 * w, 0.2 * d, n=16), h * 0.5, 0.008)
@@ -538,9 +533,9 @@ def coat_post(m: Maker, w: float, h: float, d: float, material: Material) -> Non
         for k in range(3):
             m.tube([polar((0.3 * w, 0.3 * d), 0.5, 2.1 * k), (0.0, 0.5, 0.0)], 0.006, n=6)
         for k in range(6):
-            m.tube(bent([(0.0, h - 0.1, 0.0), polar((0.3 * w, 0.3 * d), h - 0.14,
-                k * 1.047), (0.5 * w * cos(k * 1.047) * 0.97, h - 0.05,
-                0.5 * d * sin(k * 1.047) * 0.97)], 0.05, n=3), 0.008, n=6)
+            m.tube(bent([(0.0, h - 0.1, 0.0), polar((0.3 * w, 0.3 * d), h - 0.14, k * 1.047),
+                (0.5 * w * cos(k * 1.047) * 0.97, h - 0.05, 0.5 * d * sin(k * 1.047) * 0.97)], 0.05,
+                n=3), 0.008, n=6)
 
 
 def coat_rail(m: Maker, w: float, h: float, hw: float, hd: float, material: Material) -> None:
@@ -549,8 +544,8 @@ def coat_rail(m: Maker, w: float, h: float, hw: float, hd: float, material: Mate
     with m.of(material):
         for s in (-1.0, 1.0):
             if is_a:
-                m.square_tube((s * (hw - 0.02), 0.006, hd - 0.02),
-                    (s * (hw - 0.02), h - 0.02, 0.0), 0.03, 0.03)
+                m.square_tube((s * (hw - 0.02), 0.006, hd - 0.02), (s * (hw - 0.02), h - 0.02, 0.0),
+                    0.03, 0.03)
                 m.square_tube((s * (hw - 0.02), 0.006, -hd + 0.02),
                     (s * (hw - 0.02), h - 0.02, 0.0), 0.03, 0.03)
             else:
@@ -561,38 +556,35 @@ def coat_rail(m: Maker, w: float, h: float, hw: float, hd: float, material: Mate
             m.box(w - 0.04, (0.16, 0.178), 0.04, z=z)
 
 
-def coat_panel(m: Maker, w: float, h: float, d: float, hw: float, hd: float, material: Material) -> None:
+def coat_panel(m: Maker, w: float, h: float, d: float, hw: float, hd: float,
+    material: Material) -> None:
     """A panel with hooks over a bench."""
     panel_of = m.pick(material, WHITE, m.timber)
     if m.chance(0.5):
         m.box(w, (0.44, h), 0.02, 0.003, against=-hd, of=panel_of)
     else:
         for k in range(8):
-            m.box((-hw + k * w / 8 + 0.001, -hw + (k + 1) * w / 8 - 0.004), (0.44, h), 0.02,
-                0.003, against=-hd, of=panel_of)
+            m.box((-hw + k * w / 8 + 0.001, -hw + (k + 1) * w / 8 - 0.004), (0.44, h), 0.02, 0.003,
+                against=-hd, of=panel_of)
         for y in (0.6, h - 0.2):
             m.box(w - 0.02, 0.05, 0.014, on=y, against=-hd + 0.002, of=panel_of)
     m.box(w, (0.42, 0.45), d, 0.003, of=panel_of)
-    m.box(
-        0.025, 0.42, (-hd + 0.005, hd - 0.01), left=0.01 - w / 2, mirrored="x", of=panel_of
-    )
+    m.box(0.025, 0.42, (-hd + 0.005, hd - 0.01), left=0.01 - w / 2, mirrored="x", of=panel_of)
     m.box(w - 0.07, (0.12, 0.138), (-hd + 0.01, hd - 0.02), of=panel_of)
     if m.chance(0.5):
-        m.rounded(
-            w - 0.01, (0.45, 0.49), (-hd + 0.025, hd - 0.004), 0.015, n=1, of=m.cloth()
-        )
+        m.rounded(w - 0.01, (0.45, 0.49), (-hd + 0.025, hd - 0.004), 0.015, n=1, of=m.cloth())
     hooks = m.pick(BLACK_STEEL, BRASS, CHROME, m.metal)
     n = m.integers(3, 7)
     for k in range(n):
         m.tube(bent([(-hw + w * (k + 0.5) / n, h - 0.18, -hd + 0.018),
-            (-hw + w * (k + 0.5) / n, h - 0.2, -hd + 0.07),
-            (-hw + w * (k + 0.5) / n, h - 0.15, -hd + 0.085)], 0.02, n=3), 0.006, n=6,
-            of=hooks)
+            (-hw + w * (k + 0.5) / n, h - 0.2, -hd + 0.07), (-hw + w * (k + 0.5) / n, h - 0.15,
+            -hd + 0.085)], 0.02, n=3), 0.006, n=6, of=hooks)
     if m.chance(0.6):
         m.box(w, (h - 0.02, h), 0.22, 0.003, against=-hd, of=panel_of)
 
 
-def coat_ladder(m: Maker, w: float, h: float, d: float, hw: float, hd: float, material: Material) -> None:
+def coat_ladder(m: Maker, w: float, h: float, d: float, hw: float, hd: float,
+    material: Material) -> None:
     """A ladder with pegs."""
     with m.of(material):
         for s in (-1.0, 1.0):

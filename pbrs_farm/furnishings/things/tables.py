@@ -31,10 +31,9 @@ from pbrs_farm.furnishings.things.shapes import on_side
 # fmt: off
 
 
-def under_top(
-    m: Maker, kind: str, w: float, d: float, high: float, material: Material, leg_kind: str, column: bool = True
-) -> None:
-    """What carries a top w by d at `high`.
+def under_top(m: Maker, kind: str, w: float, d: float, high: float, material: Material,
+    leg_kind: str, column: bool = True) -> None:
+    """Support for a top w by d at `high`.
 
     Four legs with or without rails, frames, trestles, one foot, crossed legs, panels.
     """
@@ -69,21 +68,19 @@ def under_top(
                 for s in (-1.0, 1.0):
                     x = s * (hw - 0.22)
                     for e, z in product((-1.0, 1.0), (-hd + 0.06, hd - 0.06)):
-                        m.square_tube(
-                            (x + e * 0.14, 0.008, z), (x + e * 0.03, high - 0.02, z), 0.03, 0.04
-                        )
+                        m.square_tube((x + e * 0.14, 0.008, z), (x + e * 0.03, high - 0.02, z),
+                            0.03, 0.04)
                     m.box(0.1, (high - 0.05, high), d - 0.06, 0.003, x=x)
                     m.box(0.22, (0.2, 0.235), 0.02, 0.002, x=x, against=0.05 - d / 2, mirrored="z")
         case "foot":
             with m.of(material):
                 r = 0.34 * min(w, d)
                 if column:
-                    m.revolve([(0.0, 0.0), (r, 0.0), (r, 0.012), (r * 0.3, 0.04), (0.045, 0.09),
-                        (0.04, high - 0.06), (r * 0.4, high - 0.005), (r * 0.4, high), (0.0, high)],
-                        n=28)
+                    m.turned([(r, 0.0), (r, 0.012), (r * 0.3, 0.04), (0.045, 0.09),
+                        (0.04, high - 0.06), (r * 0.4, high - 0.005), (r * 0.4, high)], n=28)
                 else:
-                    m.revolve([(0.0, 0.12), (0.05, 0.12), (0.035, 0.25), (0.06, 0.4),
-                        (0.045, high - 0.03), (0.1, high), (0.0, high)], n=18)
+                    m.turned([(0.05, 0.12), (0.035, 0.25), (0.06, 0.4), (0.045, high - 0.03),
+                        (0.1, high)], n=18)
                     for k in range(4):
                         m.tube(bent([(0.0, 0.2, 0.0), polar(0.5 * r, 0.16, k * pi / 2 + pi / 4),
                             polar(1.2 * r, 0.02, k * pi / 2 + pi / 4)], 0.1, n=3), 0.028, end=0.018)
@@ -93,9 +90,8 @@ def under_top(
                 m.box(w - 0.1, (high - 0.3, high), 0.024, 0.002)
 
 
-def top_of(
-    m: Maker, kind: str, w: float, d: float, low: float, high: float, material: Material
-) -> None:
+def top_of(m: Maker, kind: str, w: float, d: float, low: float, high: float,
+    material: Material) -> None:
     """A top w by d between low and high: rectangle, round corners, oval, or boards side by side."""
     with m.of(material):
         match kind:
@@ -118,7 +114,8 @@ class DiningTable:
     """Parameters of a dining table."""
 
     top: Annotated[str, Choice("rect", "round_rect", "round", "oval", "boards")]
-    under: Annotated[str, Choice("legs", "rails", "frames", "crossed", "trestles", "foot", "panels")]
+    under: Annotated[str, Choice("legs", "rails", "frames", "crossed", "trestles", "foot",
+        "panels")]
     legs: Legs
     top_m: Annotated[float, Range(0.01, 0.1)]  # thickness
     top_material: Material
@@ -242,7 +239,8 @@ def coffee_table(m: Maker, size: Size) -> None:
 class Desk:
     """Parameters of a desk."""
 
-    form: Annotated[str, Choice("legs", "drawers_left", "drawers_right", "drawers_both", "flaps", "shelf")]
+    form: Annotated[str, Choice("legs", "drawers_left", "drawers_right", "drawers_both", "flaps",
+        "shelf")]
     body: Material
     front: Material
     front_kind: Front
@@ -259,12 +257,8 @@ class Desk:
     back_panel: bool
 
 
-_DESK_COLUMNS = {
-    "low_drawers": ("low", "drawer", "drawer"),
-    "drawers": ("drawer", "drawer", "drawer"),
-    "low_door": ("low", "door"),
-    "door": ("door",),
-}
+_DESK_COLUMNS = {"low_drawers": ("low", "drawer", "drawer"),
+    "drawers": ("drawer", "drawer", "drawer"), "low_door": ("low", "door"), "door": ("door",)}
 
 
 def draw_desk(m: Maker, size: Size) -> Desk:
@@ -322,8 +316,8 @@ def desk(m: Maker, size: Size, p: Desk) -> None:
         case "flaps":
             x = (-hw + 0.02, hw - 0.02)
             hollow(m, x, (low - 0.11, y), (-hd + 0.02, hd - 0.05), 0.012, p.body)
-            fronts_of(m, look, x, (low - 0.11, low - 0.002), hd - 0.05, [("flap",)] * p.flaps, False,
-                Inside(-hd + 0.028))
+            fronts_of(m, look, x, (low - 0.11, low - 0.002), hd - 0.05, [("flap",)] * p.flaps,
+                False, Inside(-hd + 0.028))
             four_legs(m, p.legs[0], w, d, low - 0.108, 0.05, 0.06, 0.0, p.leg_materials[0])
         case "shelf":
             under_top(m, "panels", w, d, y, p.body, "square")
@@ -351,7 +345,7 @@ def desk_drawers(m: Maker, size: Size, p: Desk, look: Look) -> None:
 @family(group="nightstand", nyu40=NIGHT_STAND, place=Place.FLOOR, variants=40,
     size=lambda m: (m.uniform(0.36, 0.52), m.uniform(0.34, 0.42), m.uniform(0.42, 0.6)))
 def nightstand(m: Maker, size: Size) -> None:
-    """What stands beside a bed.
+    """A nightstand.
 
     Drawers, a niche, a door, on legs or a plinth, a round one, a stool, of wire.
     """
@@ -382,9 +376,8 @@ def nightstand(m: Maker, size: Size) -> None:
             mid, is_low = low + (h - low) * m.uniform(0.4, 0.55), m.chance(0.5)
             with m.of(body):
                 m.box(w - 0.01, (low, h - t), 0.008, against=-hd)
-                m.box(
-                    0.016, (low, h - t), (-hd + 0.008, hd - 0.045), left=0.005 - w / 2, mirrored="x"
-                )
+                m.box(0.016, (low, h - t), (-hd + 0.008, hd - 0.045), left=0.005 - w / 2,
+                    mirrored="x")
                 for y in (low, mid):
                     m.box(w - 0.042, 0.016, (-hd + 0.008, hd - 0.05), on=y)
             fronts_of(m, look, (-hw + 0.006, hw - 0.006), (low,
@@ -394,9 +387,8 @@ def nightstand(m: Maker, size: Size) -> None:
         case 2:  # round, with a rim
             m.disc(w, d, h - t, h, 0.004, of=body)
             if m.chance(0.5):
-                under_top(
-                    m, "foot", w, d, h - t + 0.001, m.pick(body, BLACK_STEEL, m.metal), "round"
-                )
+                under_top(m, "foot", w, d, h - t + 0.001, m.pick(body, BLACK_STEEL, m.metal),
+                    "round")
             else:
                 four_legs(m, "tapered", w * 0.8, d * 0.8, h - t + 0.001, 0.03, 0.06, 0.04, body)
                 m.disc(w * 0.7, d * 0.7, h * 0.4, h * 0.4 + 0.014, 0.003, n=28, of=body)
@@ -473,9 +465,8 @@ def screen(m: Maker, size: Size) -> None:
     """
     w, d, h = size
     hd = d / 2
-    black = glossy(
-        "screen case", m.pick((0.05, 0.05, 0.055), (0.05, 0.05, 0.055), (0.35, 0.35, 0.36)), 0.35
-    )
+    black = glossy("screen case", m.pick((0.05, 0.05, 0.055), (0.05, 0.05, 0.055),
+        (0.35, 0.35, 0.36)), 0.35)
     low, form, edge = (h - (w - 0.02) * 0.5625 - 0.025, m.weighted(0.35, 0.25, 0.2, 0.2),
         m.pick(0.008, 0.012, 0.025))
     m.box(w, (low, h), 0.024, 0.003, of=black)

@@ -6,7 +6,7 @@ from itertools import product
 
 from pbrs_farm.core.classes import PAPER
 from pbrs_farm.core.frames import LYING_ALONG_Z, rotation_x, rotation_y, rotation_z
-from pbrs_farm.furnishings.things.bodies import bevelled, sphere, stretched
+from pbrs_farm.furnishings.things.bodies import bevelled
 from pbrs_farm.furnishings.things.maker import Maker, thing
 from pbrs_farm.furnishings.things.materials import STEEL, plain
 from pbrs_farm.furnishings.things.outlines import fluted, oval, rect, rings
@@ -31,7 +31,7 @@ def one_plate(m: Maker) -> None:
 def pile(m: Maker, n: int) -> None:
     """Plates of one form on top of each other."""
     r, glaze, form = m.uniform(0.1, 0.14), m.china(), m.integers(0, 6)
-    # A deep one stands alone.
+    # A deep plate has no others.
     form = 0 if form == 4 and n > 1 else form
     sides = 24 if n == 1 else 16
     # Flat in the middle, then the rim, and the inside; plates nest 6.3 mm apart.
@@ -39,12 +39,11 @@ def pile(m: Maker, n: int) -> None:
         with m.moved(at=(0, 0.0066 * k, 0)), m.of(glaze):
             match form:
                 case 0:  # flat
-                    m.revolve([(0, 0), (r * 0.6, 0), (r * 0.72, 0.006), (r, 0.02),
-                        (r - 0.002, 0.0225), (r * 0.7, 0.0095), (r * 0.6, 0.005), (0, 0.005)],
-                        n=sides)
+                    m.turned([(r * 0.6, 0), (r * 0.72, 0.006), (r, 0.02), (r - 0.002, 0.0225),
+                        (r * 0.7, 0.0095), (r * 0.6, 0.005)], n=sides)
                 case 1:  # deep
-                    m.revolve([(0, 0), (r * 0.55, 0), (r, 0.026), (r - 0.002, 0.028),
-                        (r * 0.55, 0.005), (0, 0.005)], n=sides)
+                    m.turned([(r * 0.55, 0), (r, 0.026), (r - 0.002, 0.028), (r * 0.55, 0.005)],
+                        n=sides)
                 case 2:  # square
                     m.loft(rings(rect, [(1.2 * r, 1.2 * r, 0.01, 0),
                         (1.9 * r, 1.9 * r, 0.02, 0.016), (1.9 * r - 0.003, 1.9 * r - 0.003, 0.019,
@@ -53,26 +52,24 @@ def pile(m: Maker, n: int) -> None:
                     m.loft(rings(oval, [(1.6 * r, 1.0 * r, 0), (2.4 * r, 1.6 * r, 0.018),
                         (2.4 * r - 0.004, 1.6 * r - 0.004, 0.02), (1.6 * r, 1.0 * r, 0.005)], n=18))
                 case 4:  # with a well
-                    m.revolve([(0, 0), (r * 0.5, 0), (r * 0.6, 0.026), (r * 0.95, 0.034),
-                        (r * 0.95 - 0.002, 0.036), (r * 0.58, 0.03), (r * 0.47, 0.005), (0, 0.005)],
-                        n=sides)
+                    m.turned([(r * 0.5, 0), (r * 0.6, 0.026), (r * 0.95, 0.034),
+                        (r * 0.95 - 0.002, 0.036), (r * 0.58, 0.03), (r * 0.47, 0.005)], n=sides)
                 case 5:  # fluted
                     m.loft(rings(fluted, [(1.3 * r, 10, 0.03, 0), (2 * r, 10, 0.06, 0.019),
                         (2 * r - 0.004, 10, 0.06, 0.021), (1.3 * r, 10, 0.03, 0.005)]), sharp=70.0)
     # Some have a spoon, a fork or crumbs on them.
     if n == 1 and m.chance(0.25):
         m.tube([(-0.5 * r, 0.012, 0.01), (0.6 * r, 0.026, 0.0)], 0.0025, n=5, of=m.metal)
-        m.add(stretched(sphere((0, 0, 0), 1.0, n=8), (0.022, 0.004, 0.013)),
-            at=(-0.55 * r, 0.0125, 0.01), of=m.metal)
+        m.ellipsoid((0.022, 0.004, 0.013), n=8, at=(-0.55 * r, 0.0125, 0.01), of=m.metal)
 
 
 @thing(group="kitchen_tool")
 def mills(m: Maker) -> None:
     """Salt and pepper."""
-    # Foot, waist, head, and the knob that is turned.
+    # foot, waist, head and turning knob
     for k, colour in enumerate((m.dark_wood, (0.85, 0.84, 0.8))):
-        m.revolve([(0, 0), (0.024, 0), (0.02, 0.03), (0.024, 0.07), (0.018, 0.082), (0.02, 0.1),
-            (0.012, 0.11), (0, 0.11)], n=12, at=(0.055 * k, 0, 0), of=plain("mill", colour, 0.35))
+        m.turned([(0.024, 0), (0.02, 0.03), (0.024, 0.07), (0.018, 0.082), (0.02, 0.1),
+            (0.012, 0.11)], n=12, at=(0.055 * k, 0, 0), of=plain("mill", colour, 0.35))
 
 
 @thing(group="pot_pan")
@@ -95,18 +92,18 @@ def pan(m: Maker) -> None:
     """A frying pan, its handle to the front."""
     r, black = m.uniform(0.11, 0.14), plain("black iron", (0.06, 0.06, 0.065), 0.35)
     m.vessel([(0, 0), (r * 0.85, 0), (r, 0.045)], 0.003, n=20, of=black)
-    # The handle lies along +z, turned a little.
+    # The handle is along +z, turned a little.
     with m.moved(turn=rotation_y(m.uniform(-0.5, 0.5))), m.of(black):
-        m.revolve([(0, 0), (0.011, 0.0), (0.009, 0.1), (0.012, 0.18), (0, 0.18)], n=8,
-            turn=LYING_ALONG_Z, at=(0, 0.035, r * 0.97))
+        m.turned([(0.011, 0.0), (0.009, 0.1), (0.012, 0.18)], n=8, turn=LYING_ALONG_Z,
+            at=(0, 0.035, r * 0.97))
 
 
 @thing(group="kitchen_tool", nyu40=PAPER)
 def kitchen_roll(m: Maker) -> None:
     """A roll of kitchen paper."""
     # The paper, and the cardboard core 2 mm above it.
-    m.revolve([(0, 0), (0.055, 0), (0.055, 0.23), (0.02, 0.23), (0.02, 0.232), (0, 0.232)], n=18,
-        name="roll", of=plain("tissue", (0.92, 0.92, 0.9), 0.95))
+    m.turned([(0.055, 0), (0.055, 0.23), (0.02, 0.23), (0.02, 0.232)], n=18, name="roll",
+        of=plain("tissue", (0.92, 0.92, 0.9), 0.95))
 
 
 @thing(group="cutlery")
@@ -127,9 +124,9 @@ def cutlery(m: Maker) -> None:
                     material, high = (m.pick(STEEL, plain("spoon wood", m.wood, 0.6),
                         plain("nylon", (0.05, 0.05, 0.05), 0.5)), tall + m.uniform(0.06, 0.13))
                     m.tube([(-r * 0.5, 0.012, 0), (r * 0.62, high, 0)], 0.005, n=6, of=material)
-                    m.add(stretched(sphere((0, 0, 0), 1.0, n=10), (0.008, 0.036, 0.024)),
-                        turn=rotation_z(-0.3), at=(r * 0.62 + 0.008, high + 0.028, 0), of=material)
-        case 1:  # the block leans back; handles stand out of its top
+                    m.ellipsoid((0.008, 0.036, 0.024), n=10, turn=rotation_z(-0.3),
+                        at=(r * 0.62 + 0.008, high + 0.028, 0), of=material)
+        case 1:  # the block leans back; handles come out of its top
             m.name = "knife_block"
             m.loft([(rect(0.1, 0.12, 0.006, n=1), 0), (rect(0.1, 0.1, 0.006, n=1, z=-0.04), 0.2)],
                 sharp=20.0, of=plain("block wood", m.pick(m.wood, m.dark_wood), 0.5))
@@ -138,9 +135,8 @@ def cutlery(m: Maker) -> None:
                     turn=rotation_x(-0.2), at=(-0.03 + 0.03 * i, 0.195, -0.06 + 0.04 * k), of=grip)
         case 2:
             m.name, w, d = "board_and_knife", m.uniform(0.28, 0.38), m.uniform(0.18, 0.24)
-            m.box(
-                w, 0.018, d, 0.004, of=plain("board wood", m.pick(m.wood, (0.8, 0.64, 0.42)), 0.6)
-            )
+            m.box(w, 0.018, d, 0.004, of=plain("board wood", m.pick(m.wood, (0.8, 0.64, 0.42)),
+                0.6))
             with m.moved(turn=rotation_y(m.uniform(-0.5, 0.5)), at=(0, 0.0183, 0)):
                 m.loft([([(-0.1, -0.012), (-0.1, 0.012), (0.05, 0.016), (0.06, -0.012)], 0.0),
                     ([(-0.1, -0.012), (-0.1, -0.01), (0.05, -0.01), (0.06, -0.012)], 0.002)],
@@ -152,9 +148,8 @@ def cutlery(m: Maker) -> None:
                 m.box(0.012, 0.005, (0.0, 0.105), 0.0015, x=x, of=grip)
                 match head:
                     case "knife":
-                        m.box(
-                            0.014, 0.002, 0.1048, 0.0007, left=x - 0.008, against=-0.105, of=STEEL
-                        )
+                        m.box(0.014, 0.002, 0.1048, 0.0007, left=x - 0.008, against=-0.105,
+                            of=STEEL)
                     case "fork":
                         m.box(0.004, 0.003, 0.0448, 0.0008, x=x, against=-0.045, of=STEEL)
                         m.box(0.022, 0.003, 0.0148, 0.001, x=x, against=-0.06, of=STEEL)
@@ -162,5 +157,4 @@ def cutlery(m: Maker) -> None:
                             m.box(0.003, 0.0025, 0.0398, 0.0007, x=x + t, against=-0.1, of=STEEL)
                     case "spoon":
                         m.box(0.004, 0.003, 0.0448, 0.0008, x=x, against=-0.045, of=STEEL)
-                        m.add(stretched(sphere((0, 0, 0), 1.0, n=10), (0.018, 0.004, 0.028)),
-                            at=(x, 0.004, -0.072), of=STEEL)
+                        m.ellipsoid((0.018, 0.004, 0.028), n=10, at=(x, 0.004, -0.072), of=STEEL)

@@ -1,4 +1,4 @@
-"""The small things that are generated, by name; no effects. maker.py says how they are written."""
+"""Generated small items by name; no effects. maker.py describes how to write them."""
 
 from __future__ import annotations
 
@@ -56,4 +56,4 @@ THINGS: Final[Mapping[str, Thing[[]]]] = described_in(
     ),
     Thing,
 )
-"""What lies about: a style and a generator make one of them."""
+"""Items that a generator and a style make."""

@@ -8,7 +8,6 @@ from numpy import pi
 
 from pbrs_farm.core.frames import LYING_ALONG_Z, rotation_y, rotation_z
 from pbrs_farm.core.house import Material
-from pbrs_farm.furnishings.things.bodies import sphere, stretched
 from pbrs_farm.furnishings.things.maker import Maker, thing
 from pbrs_farm.furnishings.things.materials import plain
 from pbrs_farm.furnishings.things.outlines import bent, oval, rect, rings, scaled
@@ -23,36 +22,36 @@ def toy(m: Maker) -> None:
     A bear, blocks, a train, a car, stacked rings, a robot, a top, a plane, a rocket, a house, a drum, an animal on wheels.
     """
     form, s = m.integers(0, 13), m.uniform(0.85, 1.2)
-    own, other, third = (plain("toy", m.any_colour(), 0.5), plain("toy", m.any_colour(), 0.5),
+    body, second, third = (plain("toy", m.any_colour(), 0.5), plain("toy", m.any_colour(), 0.5),
         plain("toy", m.any_colour(), 0.5))
     grain = plain("toy wood", m.wood, 0.6)
     match form:
         case 0:
             bear(m, s)
         case 1:
-            toy_blocks(m, own, other, third, grain)
+            toy_blocks(m, body, second, third, grain)
         case 2:
-            toy_train(m, own, other, third, grain)
+            toy_train(m, body, second, third, grain)
         case 3:
-            toy_car(m, s, own, other)
+            toy_car(m, s, body, second)
         case 4:
-            stacking_rings(m, s, own, other, third, grain)
+            stacking_rings(m, s, body, second, third, grain)
         case 5:
-            robot(m, own, other, third)
+            robot(m, body, second, third)
         case 6:
-            plane(m, own, other, third, grain)
+            plane(m, body, second, third, grain)
         case 7:
-            rocket(m, own, other, third)
+            rocket(m, body, second, third)
         case 8:
-            doll_house(m, own, grain)
+            doll_house(m, body, grain)
         case 9:
-            drum(m, own, other, grain)
+            drum(m, body, second, grain)
         case 10:
-            pull_animal(m, own, other, third, grain)
+            pull_animal(m, body, second, third, grain)
         case 11:
-            puzzle_box(m, own, other, third)
+            puzzle_box(m, body, second, third)
         case 12:
-            dinosaur(m, own, other)
+            dinosaur(m, body, second)
 
 
 def bear(m: Maker, s: float) -> None:
@@ -60,18 +59,16 @@ def bear(m: Maker, s: float) -> None:
     m.name, fur = ("bear", plain("fur", m.pick((0.5, 0.33, 0.2), (0.75, 0.62, 0.45),
         (0.4, 0.4, 0.42), (0.9, 0.87, 0.8)), 0.98))
     with m.of(fur):
-        m.add(stretched(sphere((0, 0, 0), 1.0, n=14), (0.075 * s, 0.085 * s, 0.065 * s)),
-            at=(0, 0.085 * s, 0))
+        m.ellipsoid((0.075 * s, 0.085 * s, 0.065 * s), n=14, at=(0, 0.085 * s, 0))
         m.sphere((0, 0.2 * s, 0.01), 0.062 * s, n=14)
         for x in (-1.0, 1.0):
             m.sphere((x * 0.05 * s, 0.25 * s, 0), 0.022 * s, n=10)
-            m.add(stretched(sphere((0, 0, 0), 1.0, n=10), (0.03 * s, 0.03 * s, 0.06 * s)),
-                turn=rotation_y(x * 0.4), at=(x * 0.055 * s, 0.031 * s, 0.07 * s))
-            m.add(stretched(sphere((0, 0, 0), 1.0, n=10), (0.024 * s, 0.055 * s,
-                0.026 * s)), turn=rotation_z(x * 0.7), at=(x * 0.088 * s, 0.12 * s,
-                0.02 * s))
-    m.add(stretched(sphere((0, 0, 0), 1.0, n=10), (0.028 * s, 0.022 * s, 0.022 * s)),
-        at=(0, 0.188 * s, 0.062 * s), of=plain("snout", (0.85, 0.75, 0.6), 0.98))
+            m.ellipsoid((0.03 * s, 0.03 * s, 0.06 * s), n=10, turn=rotation_y(x * 0.4),
+                at=(x * 0.055 * s, 0.031 * s, 0.07 * s))
+            m.ellipsoid((0.024 * s, 0.055 * s, 0.026 * s), n=10, turn=rotation_z(x * 0.7),
+                at=(x * 0.088 * s, 0.12 * s, 0.02 * s))
+    m.ellipsoid((0.028 * s, 0.022 * s, 0.022 * s), n=10, at=(0, 0.188 * s, 0.062 * s),
+        of=plain("snout", (0.85, 0.75, 0.6), 0.98))
     for x, y, r in ((-0.022, 0.218, 0.007), (0.022, 0.218, 0.007), (0.0, 0.196, 0.009)):
         m.sphere((x * s, y * s, (0.068 if r < 0.008 else 0.083) * s), r * s, n=8,
             of=plain("button", (0.05, 0.04, 0.04), 0.3))
@@ -112,18 +109,18 @@ def toy_car(m: Maker, s: float, own: Material, other: Material) -> None:
         m.rod(((x - 0.008) * s, (x + 0.008) * s), 0.02, z * s, 0.02, n=14,
             of=plain("tyre", (0.06, 0.06, 0.06), 0.8))
     for x in (-0.025, 0.025):
-        m.sphere((x * s, 0.036 * s, 0.089 * s), 0.008, n=8,
-            of=plain("lamp", (0.95, 0.9, 0.7), 0.2))
+        m.sphere((x * s, 0.036 * s, 0.089 * s), 0.008, n=8, of=plain("lamp", (0.95, 0.9, 0.7), 0.2))
 
 
-def stacking_rings(m: Maker, s: float, own: Material, other: Material, third: Material, grain: Material) -> None:
+def stacking_rings(m: Maker, s: float, own: Material, other: Material, third: Material,
+    grain: Material) -> None:
     """Stacking rings."""
     m.name = "stacking_rings"
-    m.revolve([(0, 0), (0.06, 0), (0.058, 0.012), (0.012, 0.014), (0.01, 0.15 * s),
-        (0, 0.16 * s)], n=18, of=grain)
+    m.revolve([(0, 0), (0.06, 0), (0.058, 0.012), (0.012, 0.014), (0.01, 0.15 * s), (0, 0.16 * s)],
+        n=18, of=grain)
     for k in range(5):
-        m.hoop(oval(0.085 - 0.011 * k, 0.085 - 0.011 * k, n=18), 0.03 + 0.0255 * s * k,
-            0.0125 * s, n=7, of=m.pick(own, other, third))
+        m.hoop(oval(0.085 - 0.011 * k, 0.085 - 0.011 * k, n=18), 0.03 + 0.0255 * s * k, 0.0125 * s,
+            n=7, of=m.pick(own, other, third))
 
 
 def robot(m: Maker, own: Material, other: Material, third: Material) -> None:
@@ -135,9 +132,7 @@ def robot(m: Maker, own: Material, other: Material, third: Material) -> None:
         m.box(0.02, (0.08, 0.145), 0.024, 0.003, left=-0.062, mirrored="x")
     m.box(0.06, (0.156, 0.205), 0.05, 0.004, of=other)
     for x in (-0.013, 0.013):
-        m.cylinder(
-            0.008, 0, 0.004, n=10, turn=LYING_ALONG_Z, at=(x, 0.185, 0.025), of=third
-        )
+        m.cylinder(0.008, 0, 0.004, n=10, turn=LYING_ALONG_Z, at=(x, 0.185, 0.025), of=third)
     m.rod(0, (0.2, 0.235), 0, 0.003, n=6, of=third)
     m.sphere((0, 0.237, 0), 0.007, n=8, of=third)
     m.box(0.024, (0.14, 0.157), 0.024, 0.002, of=third)
@@ -151,10 +146,10 @@ def plane(m: Maker, own: Material, other: Material, third: Material, grain: Mate
     m.box(0.26, (0.042, 0.05), (0.0, 0.055), 0.003, of=other)
     m.box(0.1, (0.042, 0.048), 0.03, 0.002, against=-0.1, of=other)
     m.box(0.006, (0.045, 0.09), 0.035, 0.001, against=-0.105, of=third)
-    m.revolve([(0, 0), (0.01, 0), (0, 0.018)], n=10, turn=LYING_ALONG_Z,
-        at=(0, 0.045, 0.089), of=third)
-    m.box(0.12, (0.041, 0.049), (0.095, 0.099), 0.001, turn=rotation_z(0.3),
-        at=(0.013, 0, 0), of=grain)
+    m.revolve([(0, 0), (0.01, 0), (0, 0.018)], n=10, turn=LYING_ALONG_Z, at=(0, 0.045, 0.089),
+        of=third)
+    m.box(0.12, (0.041, 0.049), (0.095, 0.099), 0.001, turn=rotation_z(0.3), at=(0.013, 0, 0),
+        of=grain)
     for x in (-0.035, 0.035):
         m.rod((x - 0.006, x + 0.006), 0.014, 0.04, 0.014, n=10, of=third)
     for x in (-0.035, 0.035):
@@ -164,14 +159,14 @@ def plane(m: Maker, own: Material, other: Material, third: Material, grain: Mate
 def rocket(m: Maker, own: Material, other: Material, third: Material) -> None:
     """A rocket."""
     m.name = "rocket"
-    m.revolve([(0, 0.02), (0.03, 0.02), (0.04, 0.08), (0.038, 0.15), (0.02, 0.2),
-        (0, 0.225)], n=18, of=own)
+    m.revolve([(0, 0.02), (0.03, 0.02), (0.04, 0.08), (0.038, 0.15), (0.02, 0.2), (0, 0.225)], n=18,
+        of=own)
     m.revolve([(0.037, 0.148), (0.0385, 0.148), (0.021, 0.2), (0, 0.228), (0, 0.224),
         (0.018, 0.199), (0.037, 0.148)], n=18, of=other)
     for k in range(3):
         m.loft([([(0.02, -0.003), (0.02, 0.003), (0.07, 0.003), (0.07, -0.003)], 0.0),
-            ([(0.02, -0.003), (0.02, 0.003), (0.045, 0.003), (0.045, -0.003)], 0.08)],
-            sharp=10.0, turn=rotation_y(2.0944 * k), of=third)
+            ([(0.02, -0.003), (0.02, 0.003), (0.045, 0.003), (0.045, -0.003)], 0.08)], sharp=10.0,
+            turn=rotation_y(2.0944 * k), of=third)
     m.cylinder(0.013, 0, 0.004, n=12, turn=LYING_ALONG_Z, at=(0, 0.12, 0.0375),
         of=plain("window", (0.6, 0.8, 0.9), 0.2))
 
@@ -186,8 +181,8 @@ def doll_house(m: Maker, own: Material, grain: Material) -> None:
         for y in (0.0, h / 2):
             m.box(w - 0.016, 0.008, (-d / 2 + 0.006, d / 2), on=y)
         m.box(0.008, (0.008, h / 2), (-d / 2 + 0.006, d / 2))
-    m.loft(rings(rect, [(w + 0.03, d + 0.02, 0.001, h + 0.0002),
-        (0.01, d + 0.02, 0.001, h + 0.1)], n=1), sharp=20.0, of=own)
+    m.loft(rings(rect, [(w + 0.03, d + 0.02, 0.001, h + 0.0002), (0.01, d + 0.02, 0.001, h + 0.1)],
+        n=1), sharp=20.0, of=own)
 
 
 def drum(m: Maker, own: Material, other: Material, grain: Material) -> None:
@@ -198,8 +193,8 @@ def drum(m: Maker, own: Material, other: Material, grain: Material) -> None:
     for y in (0.01, h - 0.006):
         m.hoop(oval(2 * r, 2 * r, n=24), y, 0.007, of=other)
     for k in range(2):
-        m.tube([(-0.1, h + 0.009, -0.02 + 0.04 * k), (0.11, h + 0.012, 0.02 - 0.01 * k)],
-            0.004, n=6, of=grain)
+        m.tube([(-0.1, h + 0.009, -0.02 + 0.04 * k), (0.11, h + 0.012, 0.02 - 0.01 * k)], 0.004,
+            n=6, of=grain)
 
 
 def pull_animal(m: Maker, own: Material, other: Material, third: Material, grain: Material) -> None:
@@ -215,10 +210,9 @@ def pull_animal(m: Maker, own: Material, other: Material, third: Material, grain
             m.box(0.04, (0.0322, 0.07), 0.024, 0.003, z=z)
         m.rounded(0.04, (0.085, 0.13), (0.035, 0.09), 0.018)
     for x in (-1.0, 1.0):
-        m.add(stretched(sphere((0, 0, 0), 1.0, n=8), (0.005, 0.022, 0.013)),
-            at=(x * 0.022, 0.115, 0.05), of=other)
-    m.tube(bent([(0, 0.026, 0.08), (0.01, 0.012, 0.13), (0.05, 0.006, 0.16),
-        (0.02, 0.006, 0.21)], 0.04, n=4), 0.003, n=5, of=third)
+        m.ellipsoid((0.005, 0.022, 0.013), n=8, at=(x * 0.022, 0.115, 0.05), of=other)
+    m.tube(bent([(0, 0.026, 0.08), (0.01, 0.012, 0.13), (0.05, 0.006, 0.16), (0.02, 0.006, 0.21)],
+        0.04, n=4), 0.003, n=5, of=third)
 
 
 def puzzle_box(m: Maker, own: Material, other: Material, third: Material) -> None:
@@ -236,41 +230,41 @@ def dinosaur(m: Maker, own: Material, other: Material) -> None:
     m.name = "dinosaur"
     with m.of(own):
         m.rounded(0.06, (0.04, 0.1), 0.1, 0.028)
-        m.tube(bent([(0, 0.075, 0.04), (0, 0.1, 0.09), (0, 0.19, 0.1), (0, 0.2, 0.14)],
-            0.04, n=4), 0.022, end=0.014)
-        m.tube(bent([(0, 0.075, -0.04), (0, 0.05, -0.1), (0, 0.02, -0.17)], 0.05, n=4),
-            0.024, end=0.004)
+        m.tube(bent([(0, 0.075, 0.04), (0, 0.1, 0.09), (0, 0.19, 0.1), (0, 0.2, 0.14)], 0.04, n=4),
+            0.022, end=0.014)
+        m.tube(bent([(0, 0.075, -0.04), (0, 0.05, -0.1), (0, 0.02, -0.17)], 0.05, n=4), 0.024,
+            end=0.004)
         for x, z in product((-0.02, 0.02), (-0.033, 0.033)):
             m.tube([(x * 1.2, 0, z), (x, 0.06, z)], 0.011, end=0.014)
         for k in range(5):
-            m.revolve([(0, 0), (0.01, 0), (0, 0.024)], n=6,
-                at=(0, 0.096 - 0.002 * (k - 2) * (k - 2), -0.04 + 0.02 * k), of=other)
+            m.revolve([(0, 0), (0.01, 0), (0, 0.024)], n=6, at=(0,
+                0.096 - 0.002 * (k - 2) * (k - 2), -0.04 + 0.02 * k), of=other)
 
 
 @thing(group="ball")
 def ball(m: Maker) -> None:
     """A ball: plain, of two colours, with rings, with seams."""
     form, r = m.integers(0, 4), m.uniform(0.05, 0.115)
-    own, other = (plain("ball", m.any_colour(), 0.45), plain("ball",
+    body, second = (plain("ball", m.any_colour(), 0.45), plain("ball",
         m.pick((0.9, 0.9, 0.88), (0.08, 0.08, 0.09), m.any_colour()), 0.45))
     match form:
         case 0:  # plain
-            m.sphere((0, r, 0), r, n=18, of=own)
+            m.sphere((0, r, 0), r, n=18, of=body)
         case 1:
             m.name = "ball_of_two_colours"
             m.revolve(scaled(r, r, [(0, 0), (0.38, 0.08), (0.71, 0.3), (0.93, 0.63), (1, 1),
-                (0, 1)]), n=22, of=own)
+                (0, 1)]), n=22, of=body)
             m.revolve(scaled(r, r, [(0, 1), (1, 1), (0.93, 1.37), (0.71, 1.7), (0.38, 1.92),
-                (0, 2)]), n=22, of=other)
+                (0, 2)]), n=22, of=second)
         case 2:
             m.name = "ringed_ball"
-            m.sphere((0, r, 0), r, n=18, of=own)
+            m.sphere((0, r, 0), r, n=18, of=body)
             for y in (0.62, 1.0, 1.38):
                 m.hoop(oval(2 * r * (1 - (1 - y) * (1 - y)) ** 0.5,
-                    2 * r * (1 - (1 - y) * (1 - y)) ** 0.5, n=22), y * r, 0.03 * r, n=5, of=other)
+                    2 * r * (1 - (1 - y) * (1 - y)) ** 0.5, n=22), y * r, 0.03 * r, n=5, of=second)
         case 3:
             m.name = "basket_ball"
-            m.sphere((0, r, 0), r, n=18, of=own)
+            m.sphere((0, r, 0), r, n=18, of=body)
             for a in (0.0, pi / 2):
                 m.hoop(oval(2 * r, 2 * r, n=24), 0.0, 0.012 * r, n=5,
-                    turn=rotation_y(a) @ rotation_z(pi / 2), at=(0, r, 0), of=other)
+                    turn=rotation_y(a) @ rotation_z(pi / 2), at=(0, r, 0), of=second)

@@ -76,9 +76,8 @@ def vase(m: Maker) -> None:
                 m.tube(bent([(r * 0.45, 0.88 * tall, 0.0), (r * 1.35, 0.9 * tall, 0.0),
                     (r * 1.25, 0.35 * tall, 0.0), (r * 0.8, 0.3 * tall, 0.0)], 0.04, n=4), 0.008)
             case 11:  # a jar with its lid
-                m.revolve([(0, 0), (r * 0.7, 0), (r * 0.75, 0.01), (r, 0.4 * tall),
-                    (r * 1.05, 0.6 * tall), (r * 0.8, 0.76 * tall), (r * 0.5, 0.8 * tall),
-                    (0, 0.8 * tall)], n=22)
+                m.turned([(r * 0.7, 0), (r * 0.75, 0.01), (r, 0.4 * tall), (r * 1.05, 0.6 * tall),
+                    (r * 0.8, 0.76 * tall), (r * 0.5, 0.8 * tall)], n=22)
                 m.revolve(scaled(r, tall, [(0, 0.8002), (0.58, 0.8002), (0.6, 0.84), (0.3, 0.92),
                     (0.12, 0.94), (0.14, 0.98), (0, 1)]), n=22)
             case 12:  # three bellies one above another
@@ -89,7 +88,7 @@ def vase(m: Maker) -> None:
                 a = 0.36 * tall
                 m.tube(ring_path(a, n=24), 0.028, n=10, turn=rotation_x(pi / 2),
                     at=(0.0, a + 0.04, 0.0))
-                m.revolve([(0, 0), (0.045, 0), (0.042, 0.012), (0.02, 0.03), (0, 0.03)], n=18)
+                m.turned([(0.045, 0), (0.042, 0.012), (0.02, 0.03)], n=18)
                 m.vessel([(0, 0), (0.02, 0), (0.016, 0.03), (0.024, 0.06)], 0.003,
                     at=(0.0, 2 * a + 0.05, 0.0))
             case 14:  # flat, as a pillow
@@ -107,14 +106,12 @@ def vase(m: Maker) -> None:
 
 def dry_twigs(m: Maker, tall: float) -> None:
     """Dry twigs that lean out of a vase."""
-    dry = plain(
-        "dry twig", m.pick((0.62, 0.5, 0.34), (0.75, 0.68, 0.52), (0.4, 0.28, 0.2)), 0.9
-    )
+    dry = plain("dry twig", m.pick((0.62, 0.5, 0.34), (0.75, 0.68, 0.52), (0.4, 0.28, 0.2)), 0.9)
     for k in range(m.integers(3, 7)):
         a, lean, top = (2.4 * k + m.uniform(0, 0.5), m.uniform(0.03, 0.09),
             tall * m.uniform(1.4, 2.0))
-        m.tube([(0.0, 0.02, 0.0), polar(0.003, 0.7 * tall, a), polar(lean, top, a)], 0.0022,
-            n=5, of=dry)
+        m.tube([(0.0, 0.02, 0.0), polar(0.003, 0.7 * tall, a), polar(lean, top, a)], 0.0022, n=5,
+            of=dry)
         if m.chance(0.6):
             m.sphere(polar(lean, top, a), 0.011, n=6, of=dry)
 
