@@ -1,4 +1,4 @@
-"""What lies before the windows of a home: ground, plants, buildings, hills; by a seed, no effects."""
+"""Views out of the windows of a home: ground, plants, buildings, hills; by a seed, no effects."""
 
 from pbrs_farm.furnishings.surroundings.surroundings import with_surroundings
 

@@ -31,7 +31,7 @@ _IRON: Final = SceneryMaterial("iron", rgb=(0.2, 0.2, 0.21))
 
 
 class Front(NamedTuple):
-    """Where a building's front stands: its left foot, along, outward (to the home), up."""
+    """Frame of a building's front: its left foot, along, outward (to the home), up."""
 
     foot: F64  # (3,)
     along: F64  # (3,) unit
@@ -71,51 +71,51 @@ class _Holes(NamedTuple):
     has_balcony: Any  # (N,) bool
 
 
-def block(scenery: Scenery, thing: str, rng: np.random.Generator, front: Front, own: Facade,
+def block(scenery: Scenery, thing: str, rng: np.random.Generator, front: Front, facade: Facade,
     rooms: SceneryMaterial, n_bays: int, n_storeys: int, *, depth_m: float = 10.0,
     is_lit: float = 0.3, has_balconies: bool = False) -> None:
     """A building of several storeys: a front with windows, sides, a roof and what sticks out.
 
     rooms: the look of `lit_rooms`, for windows of lit rooms.
     """
-    width = n_bays * own.bay_m
+    width = n_bays * facade.bay_m
     top = _PLINTH_M + n_storeys * STOREY_M
-    _body(scenery, thing, front, own, width, top, depth_m)
-    share = own.style.balconies if has_balconies else 0.0
-    holes = _front(scenery, thing, rng, front, own, n_bays, n_storeys, share)
+    _body(scenery, thing, front, facade, width, top, depth_m)
+    share = facade.style.balconies if has_balconies else 0.0
+    holes = _front(scenery, thing, rng, front, facade, n_bays, n_storeys, share)
     _lit_windows(scenery, thing, rng, front, holes, rooms, is_lit)
-    cornice = own.style.cornice_m
+    cornice = facade.style.cornice_m
     _front_box(
-        scenery, thing, own.trim, front, -0.1, width + 0.1, top - 0.1, top + 0.22, -0.1, cornice
+        scenery, thing, facade.trim, front, -0.1, width + 0.1, top - 0.1, top + 0.22, -0.1, cornice
     )
-    _front_box(scenery, thing, own.trim, front, -0.05, width + 0.05, top - 0.32, top - 0.1, -0.1,
+    _front_box(scenery, thing, facade.trim, front, -0.05, width + 0.05, top - 0.32, top - 0.1, -0.1,
         0.45 * cornice)
-    if own.style.surround_m:
+    if facade.style.surround_m:
         y = _PLINTH_M + STOREY_M
-        _front_box(scenery, thing, own.trim, front, 0, width, y - 0.1, y + 0.08, -0.05, 0.09)
+        _front_box(scenery, thing, facade.trim, front, 0, width, y - 0.1, y + 0.08, -0.05, 0.09)
     _front_box(scenery, thing, _IRON, front, 0.12, 0.22, 0, top, 0.02, 0.12)
-    if own.style.is_flat:
-        _flat_roof(scenery, thing, front, own, width, top, depth_m)
+    if facade.style.is_flat:
+        _flat_roof(scenery, thing, front, facade, width, top, depth_m)
     else:
-        _roof(scenery, thing, rng, front, own, width, top, depth_m)
+        _roof(scenery, thing, rng, front, facade, width, top, depth_m)
     for k in np.flatnonzero(holes.has_balcony):
-        _balcony(scenery, thing, front, own, holes.left[k] - 0.35, holes.right[k] + 0.35,
+        _balcony(scenery, thing, front, facade, holes.left[k] - 0.35, holes.right[k] + 0.35,
             holes.low[k] - 0.1)
 
 
-def house(scenery: Scenery, thing: str, rng: np.random.Generator, front: Front, own: Facade,
+def house(scenery: Scenery, thing: str, rng: np.random.Generator, front: Front, facade: Facade,
     rooms: SceneryMaterial, *, is_lit: float = 0.3) -> None:
     """A house of one or two storeys with a gable."""
     n_bays, n_storeys = int(rng.integers(3, 5)), int(rng.integers(1, 3))
-    width, depth = n_bays * own.bay_m, float(rng.uniform(7, 10))
+    width, depth = n_bays * facade.bay_m, float(rng.uniform(7, 10))
     top = _PLINTH_M + n_storeys * STOREY_M
     ridge = top + rng.uniform(0.32, 0.48) * width if rng.random() < 0.5 else 0.0
-    _body(scenery, thing, front, own, width, top, depth)
-    holes = _front(scenery, thing, rng, front, own, n_bays, n_storeys, 0.0)
+    _body(scenery, thing, front, facade, width, top, depth)
+    holes = _front(scenery, thing, rng, front, facade, n_bays, n_storeys, 0.0)
     _lit_windows(scenery, thing, rng, front, holes, rooms, is_lit)
     _front_box(scenery, thing, _IRON, front, width - 0.22, width - 0.12, 0, top, 0.02, 0.12)
     if not ridge:
-        _roof(scenery, thing, rng, front, own, width, top, depth)
+        _roof(scenery, thing, rng, front, facade, width, top, depth)
         return
     # The gable looks at the home, under slopes that reach over it.
     middle = width / 2
@@ -123,18 +123,18 @@ def house(scenery: Scenery, thing: str, rng: np.random.Generator, front: Front, 
         [front.at(0, top), front.at(width, top), front.at(middle, ridge), front.at(middle, ridge)]
     )
     uvs = np.array([[0, top], [width, top], [middle, ridge], [middle, ridge]])
-    scenery.add(thing, own.wall, gable[None], (uvs / own.wall.size_m)[None])
+    scenery.add(thing, facade.wall, gable[None], (uvs / facade.wall.size_m)[None])
     for s in (-_EAVES_M, width + _EAVES_M):
         eave = top - (ridge - top) * _EAVES_M / middle
         a, b = front.at(s, eave, _EAVES_M), front.at(middle, ridge + 0.05, _EAVES_M)
         c, d = front.at(middle, ridge + 0.05, -depth), front.at(s, eave, -depth)
-        _slope(scenery, thing, own, d, a, b, c)
+        _slope(scenery, thing, facade, d, a, b, c)
         low = np.stack([a, b, b - [0, 0.2, 0], a - [0, 0.2, 0]])
-        scenery.add(thing, own.trim, low[None])
+        scenery.add(thing, facade.trim, low[None])
 
 
 def _body(
-    scenery: Scenery, thing: str, front: Front, own: Facade, width: float, top: float, depth: float
+    scenery: Scenery, thing: str, front: Front, facade: Facade, width: float, top: float, depth: float
 ) -> None:
     """Sides without windows, and a plinth."""
     stone = SceneryMaterial("stone", rgb=(0.46, 0.45, 0.43))
@@ -143,17 +143,17 @@ def _body(
         side = np.stack(
             [front.at(s, y, o) for y, o in ((-0.5, 0), (-0.5, -depth), (top, -depth), (top, 0))]
         )
-        uvs = np.array([[0, -0.5], [depth, -0.5], [depth, top], [0, top]]) / own.wall.size_m
-        scenery.add(thing, own.wall, side[None], uvs[None])
+        uvs = np.array([[0, -0.5], [depth, -0.5], [depth, top], [0, top]]) / facade.wall.size_m
+        scenery.add(thing, facade.wall, side[None], uvs[None])
 
 
-def _front(scenery: Scenery, thing: str, rng: np.random.Generator, front: Front, own: Facade,
+def _front(scenery: Scenery, thing: str, rng: np.random.Generator, front: Front, facade: Facade,
     n_bays: int, n_storeys: int, balconies: float) -> _Holes:
     """The wall of a front, with windows that lie in it, and a door; the windows are returned."""
-    x0, y0, x1, y1 = own.window
+    x0, y0, x1, y1 = facade.window
     bay, storey = np.indices((n_bays, n_storeys), np.float64).reshape(2, -1)
     n = len(bay)
-    left, right = bay * own.bay_m + x0, bay * own.bay_m + x1
+    left, right = bay * facade.bay_m + x0, bay * facade.bay_m + x1
     floor = _PLINTH_M + storey * STOREY_M
     has_balcony = (storey > 0) & (rng.random(n) < balconies)
     # Windows of a balcony are doors, so they begin at its floor.
@@ -166,14 +166,14 @@ def _front(scenery: Scenery, thing: str, rng: np.random.Generator, front: Front,
     )
     low, high = np.where(is_door, 0.06, low), np.where(is_door, 0.06 + _DOOR_M[1], high)
     # The wall about each window of a bay, from the storey's floor to its ceiling.
-    a, b = bay * own.bay_m, (bay + 1) * own.bay_m
+    a, b = bay * facade.bay_m, (bay + 1) * facade.bay_m
     bottom, top = np.where(storey == 0, _PLINTH_M, floor), floor + STOREY_M
     at_sill = np.maximum(low, bottom)
     for s0, t0, s1, t1 in ((a, bottom, left, top), (right, bottom, b, top),
         (left, bottom, right, at_sill), (left, high, right, top)):
-        _add_wall(scenery, thing, own.wall, front, s0, t0, s1, t1)
-    # Reveals, and what stands in them.
-    inner = own.trim if own.style.surround_m else own.wall
+        _add_wall(scenery, thing, facade.wall, front, s0, t0, s1, t1)
+    # reveals and their contents
+    inner = facade.trim if facade.style.surround_m else facade.wall
     for p, q, r, t in ((left, low, left, high), (right, high, right, low),
         (left, high, right, high), (right, low, left, low)):
         reveal = np.stack([front.at(p, q), front.at(r, t), front.at(r, t, -_REVEAL_M),
@@ -185,11 +185,11 @@ def _front(scenery: Scenery, thing: str, rng: np.random.Generator, front: Front,
     unit = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
     uvs = corner[:, None] + unit * [1 / COLUMNS, 1 / ROWS]
     panes = _rectangles(front, left, low, right, high, -_REVEAL_M)
-    scenery.add(thing, own.windows, panes[is_glass], uvs[is_glass])
+    scenery.add(thing, facade.windows, panes[is_glass], uvs[is_glass])
     if is_door.any():
-        scenery.add(thing, own.door, panes[is_door], unit[None].astype(np.float64))
+        scenery.add(thing, facade.door, panes[is_door], unit[None].astype(np.float64))
     _about_windows(
-        scenery, thing, front, own, left[is_glass], low[is_glass], right[is_glass], high[is_glass]
+        scenery, thing, front, facade, left[is_glass], low[is_glass], right[is_glass], high[is_glass]
     )
     found = left, low, right, high, has_balcony
     return _Holes(*(v[is_glass] for v in found))
@@ -206,36 +206,36 @@ def _add_wall(scenery: Scenery, thing: str, look: SceneryMaterial, front: Front,
     )
 
 
-def _about_windows(scenery: Scenery, thing: str, front: Front, own: Facade, left: F64, low: F64,
+def _about_windows(scenery: Scenery, thing: str, front: Front, facade: Facade, left: F64, low: F64,
     right: F64, high: F64) -> None:
     """Sills, bands about windows or lintels over them, and shutters."""
     over = np.stack([front.at(left - 0.08, low), front.at(right + 0.08, low),
         front.at(right + 0.08, low, 0.1), front.at(left - 0.08, low, 0.1)], -2)
     lip = _rectangles(front, left - 0.08, low - 0.07, right + 0.08, low, 0.1)
-    scenery.add(thing, own.trim, np.concatenate([over, lip]))
-    band = own.style.surround_m
+    scenery.add(thing, facade.trim, np.concatenate([over, lip]))
+    band = facade.style.surround_m
     if band:
         for s0, t0, s1, t1 in ((left - band, low, left, high + band),
             (right, low, right + band, high + band), (left, high, right, high + band)):
-            scenery.add(thing, own.trim, _rectangles(front, s0, t0, s1, t1, 0.025))
-    elif own.style.wall == "brick":
+            scenery.add(thing, facade.trim, _rectangles(front, s0, t0, s1, t1, 0.025))
+    elif facade.style.wall == "brick":
         scenery.add(
-            thing, own.trim, _rectangles(front, left - 0.12, high, right + 0.12, high + 0.2, 0.015)
+            thing, facade.trim, _rectangles(front, left - 0.12, high, right + 0.12, high + 0.2, 0.015)
         )
-    if own.shutter is not None:
+    if facade.shutter is not None:
         half = (right - left) / 2
         for s0, s1 in ((left - band - half, left - band), (right + band, right + band + half)):
-            scenery.add(thing, own.shutter, _rectangles(front, s0, low, s1, high, 0.05))
+            scenery.add(thing, facade.shutter, _rectangles(front, s0, low, s1, high, 0.05))
 
 
 def _balcony(
-    scenery: Scenery, thing: str, front: Front, own: Facade, s0: float, s1: float, floor: float
+    scenery: Scenery, thing: str, front: Front, facade: Facade, s0: float, s1: float, floor: float
 ) -> None:
     """A slab with a railing of bars, of a modern building with a parapet."""
     out = 1.15
-    _front_box(scenery, thing, own.trim, front, s0, s1, floor - 0.16, floor, 0, out)
-    if own.style.is_flat:
-        _front_box(scenery, thing, own.wall, front, s0, s1, floor, floor + 0.95, out - 0.08, out)
+    _front_box(scenery, thing, facade.trim, front, s0, s1, floor - 0.16, floor, 0, out)
+    if facade.style.is_flat:
+        _front_box(scenery, thing, facade.wall, front, s0, s1, floor, floor + 0.95, out - 0.08, out)
         return
     rods = np.arange(s0, s1, 0.12)
     n = len(rods)
@@ -269,24 +269,24 @@ def _lit_windows(scenery: Scenery, thing: str, rng: np.random.Generator, front: 
         scenery.add(thing, rooms, quads, uvs)
 
 
-def _slope(scenery: Scenery, thing: str, own: Facade, a: F64, b: F64, c: F64, d: F64) -> None:
+def _slope(scenery: Scenery, thing: str, facade: Facade, a: F64, b: F64, c: F64, d: F64) -> None:
     """A slope of tiles, a to b along its eaves."""
     long_, up = float(np.linalg.norm(b - a)), float(np.linalg.norm(c - b))
-    uvs = np.array([[0, 0], [long_, 0], [long_, up], [0, up]]) / own.roof.size_m
-    scenery.add(thing, own.roof, np.stack([a, b, c, d])[None], uvs[None])
+    uvs = np.array([[0, 0], [long_, 0], [long_, up], [0, up]]) / facade.roof.size_m
+    scenery.add(thing, facade.roof, np.stack([a, b, c, d])[None], uvs[None])
 
 
 def _flat_roof(
-    scenery: Scenery, thing: str, front: Front, own: Facade, width: float, top: float, depth: float
+    scenery: Scenery, thing: str, front: Front, facade: Facade, width: float, top: float, depth: float
 ) -> None:
     """A roof that is not seen from below, and a housing on it."""
-    scenery.add(thing, own.trim, np.stack([front.at(s, top + 0.1, o) for s,
+    scenery.add(thing, facade.trim, np.stack([front.at(s, top + 0.1, o) for s,
         o in ((0, 0), (width, 0), (width, -depth), (0, -depth))])[None])
-    _front_box(scenery, thing, own.wall, front, 0.35 * width, 0.35 * width + 2.6, top, top + 2.2,
+    _front_box(scenery, thing, facade.wall, front, 0.35 * width, 0.35 * width + 2.6, top, top + 2.2,
         -5.5, -3.0)
 
 
-def _roof(scenery: Scenery, thing: str, rng: np.random.Generator, front: Front, own: Facade,
+def _roof(scenery: Scenery, thing: str, rng: np.random.Generator, front: Front, facade: Facade,
     width: float, top: float, depth: float) -> None:
     """Two slopes over eaves with a gutter, and chimneys."""
     ridge = top + rng.uniform(2.2, 3.6)
@@ -294,8 +294,8 @@ def _roof(scenery: Scenery, thing: str, rng: np.random.Generator, front: Front, 
     a, b = (front.at(s, top + 0.2 - drop, _EAVES_M) for s in (-0.2, width + 0.2))
     c, d = front.at(width + 0.2, ridge, -depth / 2), front.at(-0.2, ridge, -depth / 2)
     e, f = (front.at(s, top + 0.2 - drop, -depth - _EAVES_M) for s in (width + 0.2, -0.2))
-    _slope(scenery, thing, own, a, b, c, d)
-    _slope(scenery, thing, own, e, f, d, c)
+    _slope(scenery, thing, facade, a, b, c, d)
+    _slope(scenery, thing, facade, e, f, d, c)
     y = top + 0.2 - drop
     _front_box(scenery, thing, _IRON, front, -0.2, width + 0.2, y - 0.09, y + 0.03, _EAVES_M - 0.02,
         _EAVES_M + 0.1)
@@ -303,9 +303,9 @@ def _roof(scenery: Scenery, thing: str, rng: np.random.Generator, front: Front, 
         gable = np.stack([front.at(s, top, 0), front.at(s, top, -depth),
             front.at(s, ridge, -depth / 2), front.at(s, ridge, -depth / 2)])
         uvs = np.array([[0, top], [depth, top], [depth / 2, ridge], [depth / 2, ridge]])
-        scenery.add(thing, own.wall, gable[None], (uvs / own.wall.size_m)[None])
+        scenery.add(thing, facade.wall, gable[None], (uvs / facade.wall.size_m)[None])
     for s in rng.uniform(0.15, 0.85, int(rng.integers(1, 3))) * width:
-        _front_box(scenery, thing, own.wall, front, s, s + 0.7, ridge - 1.4, ridge + 0.9,
+        _front_box(scenery, thing, facade.wall, front, s, s + 0.7, ridge - 1.4, ridge + 0.9,
             -depth / 2 - 0.3, -depth / 2 + 0.4)
 
 
@@ -383,7 +383,7 @@ def railing(scenery: Scenery, thing: str, front: Front, length: float) -> None:
 
 
 def ground_looks(rng: np.random.Generator) -> dict[str, SceneryMaterial]:
-    """What the ground is made of."""
+    """Materials of the ground."""
     return {"lawn": SceneryMaterial("lawn", picture=mottled(rng, (0.030, 0.052, 0.014),
         (0.115, 0.155, 0.042), size=256, slope=1.0), size_m=(3.7, 3.7)),
         "asphalt": SceneryMaterial("asphalt", picture=mottled(rng, (0.045, 0.045, 0.048),

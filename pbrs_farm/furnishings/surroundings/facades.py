@@ -1,4 +1,4 @@
-"""How buildings outside look: walls, windows with what is behind them, doors, roofs, by style; no effects."""
+"""Facades of buildings outside: walls, windows, doors, roofs, by style; no effects."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ HOUSES: Final[tuple[Style, ...]] = (
 
 
 class Facade(NamedTuple):
-    """How a building's front is divided, and what it is made of."""
+    """Division and materials of a building's front."""
 
     style: Style
     wall: SceneryMaterial
@@ -221,7 +221,7 @@ def _windows(rng: np.random.Generator, bars: tuple[str, ...], frame: Rgb) -> F32
 
 
 def _draw_behind(rng: np.random.Generator, own: F32) -> None:
-    """What is seen in the panes of a window: a dark room, curtains, blinds, plants."""
+    """The view in the panes of a window: a dark room, curtains, blinds, plants."""
     high, wide = own.shape[:2]
     y, x = np.arange(high)[:, None] / high, np.arange(wide)[None] / wide
     # The room is a little lighter towards its ceiling and where its far wall is.

@@ -48,7 +48,7 @@ class Leaves(NamedTuple):
     species: Species
     outer: SceneryMaterial
     inner: SceneryMaterial  # the same in the shade of the others
-    solid: SceneryMaterial  # without holes, for what is dark behind leaves
+    solid: SceneryMaterial  # without holes, for the dark behind leaves
     bark: SceneryMaterial
 
 
@@ -102,7 +102,7 @@ def tree_line(rng: np.random.Generator) -> F32:
     picture = np.zeros((high, wide, 4), np.float32)
     grain = 1 + 0.35 * noise(rng, (high, wide), slope=0.7)
     edge = 0.12 * noise(rng, (1, wide), slope=1.0)[0]
-    # Far ones first: lower ones stand before them.
+    # Far ones first; lower ones cover them.
     for top in np.sort(rng.uniform(2, 55, 110)):
         own = SPECIES[int(rng.choice(len(SPECIES) - 2))]
         half, at = int(rng.uniform(14, 34)), int(rng.integers(0, wide))
@@ -172,7 +172,7 @@ def tree(
     outward = _directions(rng, n)
     places = clumps[which] + outward * (size[which] * rng.uniform(0.55, 1.05, n))[:, None]
     places[:, 1] = np.maximum(places[:, 1], 0.85 * crown_low)
-    # What is deep in the crown or below others is in their shade.
+    # Leaves deep in the crown or below others are in shade.
     from_middle = (places - middle) / np.array([radius, 0.55 * (height - crown_low), radius])
     is_outer = np.linalg.norm(from_middle, axis=1) + 0.35 * from_middle[:, 1] > 0.62
     looks = outward + 0.6 * from_middle
@@ -184,7 +184,7 @@ def tree(
 def bush(
     scenery: Scenery, thing: str, rng: np.random.Generator, foot: F64, size: float, leaves: Leaves
 ) -> None:
-    """A bush as wide as it is high."""
+    """A bush with equal width and height."""
     n = 90
     outward = _directions(rng, n)
     outward[:, 1] = np.abs(outward[:, 1])

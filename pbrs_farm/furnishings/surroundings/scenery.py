@@ -1,4 +1,4 @@
-"""Quads and textures of what lies outside, gathered by thing and material; no effects.
+"""Quads and textures of the outdoors, by item and material; no effects.
 
 Light takes these surfaces as both-sided and matte; a material whose name begins with LIT shines by
 itself (core/house.py).
@@ -36,7 +36,7 @@ T = TypeVar("T")
 
 
 class Drawn(Generic[T]):
-    """Looks that are drawn where they are asked for, each by a seed of its own."""
+    """Looks drawn on request, each by its seed."""
 
     def __init__(self, seed: int, n: int, draw: Callable[[np.random.Generator, int], T]) -> None:
         """draw: of number k, 0 to n - 1, with the generator of its seed."""
@@ -63,7 +63,7 @@ class SceneryMaterial(NamedTuple):
 
 
 class Scenery:
-    """Quads by thing and look; becomes items once all is there."""
+    """Quads by item and look, which become items in the end."""
 
     def __init__(self) -> None:
         self._looks: dict[str, SceneryMaterial] = {}
@@ -104,7 +104,7 @@ class Scenery:
 
     @property
     def n_faces(self) -> int:
-        """Triangles of all things."""
+        """Triangles of all items."""
         quads = (q for looks in self._quads.values() for rows in looks.values() for q, _ in rows)
         level = (surface for rows in self._level.values() for _name, surface in rows)
         return sum(2 * len(q) for q in quads) + sum(len(s.faces) for s in level)
@@ -213,5 +213,5 @@ def paved(rng: np.random.Generator, rgb: Rgb, n: int) -> F32:
 
 
 def lit(name: str, rgb: Rgb = (1.0, 1.0, 1.0), picture: F32 | None = None) -> SceneryMaterial:
-    """A look that shines by itself."""
+    """A look that emits light."""
     return SceneryMaterial(f"{LIT} {name}", rgb, picture)

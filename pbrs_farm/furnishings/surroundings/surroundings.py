@@ -1,4 +1,4 @@
-"""The pass: what lies before a repaired home's windows, by its storey and a seed; no effects.
+"""The pass that adds the outdoors to a repaired home, by its storey and a seed; no effects.
 
 Four sides lie about the bounding rectangle of the home's rooms, each a street, a garden, a court or a
 lawn with blocks; trees, roofs or hills close the horizon. Rooms have the light of what their
@@ -54,7 +54,7 @@ _WALL_M: Final = 0.3  # assumed thickness of the walls around rooms
 _REACH_M: Final = 46.0  # distance from the home to the horizon's ring
 _BELOW_FLOOR_M: Final = 0.15  # ground below the floor of a ground storey
 _BELOW_SILL_M: Final = 0.3
-_FRENCH_SILL_M, _FRENCH_HEIGHT_M = 0.25, 1.7  # of a window that one can walk through
+_FRENCH_SILL_M, _FRENCH_HEIGHT_M = 0.25, 1.7  # of a window used as a door
 _MOST_ROOMS: Final = 500
 
 KINDS: Final = ("street", "garden", "court", "blocks", "hills")
@@ -85,7 +85,7 @@ class _Side(NamedTuple):
 
 
 class _Place(NamedTuple):
-    """What all sides share."""
+    """Shared values of all sides."""
 
     scenery: Scenery
     rng: np.random.Generator
@@ -99,10 +99,10 @@ class _Place(NamedTuple):
 
 
 def with_surroundings(home: House, kind: str, seed: int) -> House:
-    """The house with what lies outside as items that are tagged OUTSIDE, after all others.
+    """The house with the outdoors as items tagged OUTSIDE, after all others.
 
     home: repaired. kind: of KINDS for all sides, or "drawn" by the seed, the storey and the home. A
-    home without rooms or windows stays as it is.
+    home without rooms or windows is unchanged.
     """
     rooms = home.rooms[:_MOST_ROOMS]
     windows = [o for o in home.openings if o.is_window]
@@ -142,9 +142,9 @@ def _walled_area(room: Room) -> BaseGeometry:
 def _level_of_ground(
     home: House, windows: list[Opening], rng: np.random.Generator
 ) -> tuple[float, int]:
-    """(y of the ground, storeys below the home): a flat lies on any storey of its building.
+    """(y of the ground, storeys below the home): a flat may be on any storey of its building.
 
-    A home of several storeys, or one with a garden or a garage, stands on the ground.
+    A home of several storeys, or with a garden or a garage, is on the ground.
     """
     kinds = {named_kind(text) for r in home.rooms for text in (*r.types, r.name)}
     words = {w for r in home.rooms for w in r.name.lower().split()}
@@ -172,7 +172,7 @@ def _sides(footprint: BaseGeometry, ground_y: float) -> list[_Side]:
 
 
 def _kinds(rng: np.random.Generator, kind: str, *, is_flat: bool) -> list[str]:
-    """What lies on each of the four sides."""
+    """The view on each of the four sides."""
     if kind != "drawn":
         return [kind] * 4
     front = int(rng.integers(0, 4))
@@ -222,7 +222,7 @@ def _lay_ground(
         elif kind == "court":
             name = "slabs" if place.rng.random() < 0.5 else "gravel"
             zones.append((name, _strip_of_side(side, 0.0, 13.0, side.half + 12.0), 0.0))
-    # What was named first lies on top: each zone takes what is still free.
+    # The first zone is on top: each takes the area that is still free.
     for name, area, above in zones:
         own = free.intersection(area)
         free = free.difference(area)

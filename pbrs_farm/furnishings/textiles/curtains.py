@@ -40,14 +40,14 @@ _BESIDE_M = (
 )  # widths of wall that a panel covers beside a window
 _DRAPED_M = (2.0, 1.5, 1.1, 0.8, 0.6)  # the same of one that covers as much of the wall as is free
 _MOST_OUT_M = 0.2  # greatest distance of the rod from the wall
-_OVER_THINGS_M = 0.4  # a short panel ends at least this far above what stands below it
+_OVER_THINGS_M = 0.4  # gap between a short panel and the furniture below it, metres
 _ROD_M = 0.012  # its radius
 _FLAT_M = 0.0015  # the wall is flat if it deviates less than this where brackets end
 
 
 @dataclass(frozen=True, slots=True)
 class WindowSide:
-    """A window as one room sees it, with what is in the way of cloth before it."""
+    """A window from one room, with the obstacles to cloth before it."""
 
     window: Passage
     side: int
@@ -56,7 +56,7 @@ class WindowSide:
     inward: F64
     floor_y: float
     ceiling_y: float
-    sticks_out_m: float  # how far the window's frame and handle stand out of the wall
+    sticks_out_m: float  # projection of the window's frame and handle from the wall
 
     @property
     def turn_rad(self) -> float:
@@ -123,7 +123,7 @@ def hang_curtains(
 ) -> bool:
     """A rod and two panels; False, with its reason counted, where they do not fit.
 
-    Both panels or none. What is hung is added to the house; the space does not follow and must be
+    Both panels or none. They are added to the house; the space does not follow and must be
     asked anew.
     """
     window = seen.window
@@ -214,7 +214,7 @@ def _is_opened_into(swept: Sequence[Swept], low: F64, high: F64) -> bool:
 def is_flat(free: BaseGeometry, seen: WindowSide, x: float) -> bool:
     """Whether the wall's face at x across the window is where it is at the window.
 
-    free is the plan area that no wall takes. Ask it on both sides of what is to hang, lest a rod
+    free is the plan area without walls. Ask it on both sides of the cloth, lest a rod
     end in a corner.
     """
     at = seen.origin + seen.along * x
@@ -239,7 +239,7 @@ class Cloth:
 def room_cloth(
     house: MutableHouse, style: Style, room: RoomSpace, rng: np.random.Generator
 ) -> Cloth:
-    """What the curtains of a room are made of: calm, light colours more often than loud ones."""
+    """Cloth of a room's curtains: calm, light colours more often than loud ones."""
     tint = style.textiles[
         int(min(rng.integers(len(style.textiles)), rng.integers(len(style.textiles))))
     ]

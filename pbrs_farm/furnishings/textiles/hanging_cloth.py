@@ -13,7 +13,7 @@ from pbrs_farm.geometry.solids import lathe
 _THICK_M = 0.003
 _COLUMNS_PER_FOLD = 10
 _ROWS = 9
-# Turns what stands upright so that it lies along +x.
+# turns an upright solid along +x
 _ALONG_X = np.array([[0.0, 1, 0], [-1, 0, 0], [0, 0, 1]])
 
 
@@ -60,7 +60,7 @@ def solid_sheet(name: str, middle: F64, uv: F64, thick_m: float = _THICK_M) -> S
     index = np.arange(n).reshape(rows, columns)
     a, b, c, d = index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]
     faces = np.concatenate([np.stack(t, -1).reshape(-1, 3) for t in ((a, b, c), (a, c, d))])
-    # Close the rim with vertices of its own, so that the sheet's shading stays smooth.
+    # Close the rim with separate vertices, so that the sheet's shading stays smooth.
     rim = np.concatenate([index[0, :-1], index[:-1, -1], index[-1, :0:-1], index[:0:-1, 0]])
     after = np.roll(rim, -1)
     rim_points = np.concatenate([front.reshape(-1, 3)[rim], back.reshape(-1, 3)[rim]])

@@ -48,7 +48,7 @@ def hang_towels(
     rng: np.random.Generator,
     share: float,
 ) -> None:
-    """A towel or two in a bathroom that has none, on the free wall nearest to the basin."""
+    """A towel or two in a bathroom without towels, on the free wall nearest to the basin."""
     space = house_space(house)
     room = space.room(room_id)
     has = any(house.items[n].nyu40 == TOWEL for n in room.items)
@@ -120,7 +120,7 @@ def _spot_near_basin(
 
 
 def add_textiles(house: MutableHouse, catalogue: Catalogue, style: Style, share: float) -> None:
-    """Hang curtains, blinds and towels, lay rugs. share: 0..1 of what rooms would get."""
+    """Hang curtains, blinds and towels, lay rugs. share: 0..1 of the full number."""
     cover_drawn_rugs(house, style, share)
     for room_id in [r.room.id for r in house_space(house).rooms]:
         room = house_space(house).room(room_id)

@@ -202,7 +202,7 @@ def _line_grid_rug(rng: np.random.Generator, size: Size, inks: Inks) -> F32:
 
 
 def _faded(rng: np.random.Generator, size: Size, inks: Inks) -> F32:
-    """A bordered rug that was dyed over in one colour and worn down in patches."""
+    """A bordered rug, dyed over in one colour and worn in patches."""
     old = _bordered(rng, size, inks)
     grey = old.mean(-1, keepdims=True)
     dyed = np.array(inks[3], np.float32) * (0.55 + 0.8 * grey)

@@ -40,7 +40,7 @@ _LEAST_M, _MOST_M = 0.3, 6.0  # least and greatest side of a rug
 
 def rug(rng: np.random.Generator, width: float, length: float, style: Style,
     patterns: Sequence[str] = tuple(RUGS), forms: Sequence[str] = _RUG_FORMS) -> Model:
-    """A rug with its length along x, lying with its back at y = 0, of one of the patterns and forms.
+    """A rug with its length along x and its back at y = 0, of one of the patterns and forms.
 
     Forms: sharp or rounded corners, fringed ends, oval (half of an oval: half).
     """
@@ -72,7 +72,7 @@ def _rug_outline(length: float, width: float, form: str) -> list[tuple[float, fl
     if form == "oval":
         return oval(length, width, n=40)
     if form == "half":
-        # The straight side lies at the door.
+        # The straight side is at the door.
         t = np.pi * np.arange(25) / 24
         return [(float(length / 2 * np.cos(a)), float(width * (0.5 - np.sin(a)))) for a in t]
     return rect(length, width, 0.08 if form == "rounded" else 0.0005)
@@ -81,7 +81,7 @@ def _rug_outline(length: float, width: float, form: str) -> list[tuple[float, fl
 def _slab(
     outline: list[tuple[float, float]], thick: float, size: tuple[float, float]
 ) -> tuple[Surface, Surface]:
-    """What lies within an outline: its upper face with a picture's coordinates, and the rest."""
+    """A slab with an outline: its upper face with a picture's coordinates, and the rest."""
     whole = loft([(outline, 0.0), (outline, thick)])
     is_top = np.isclose(whole.positions[whole.faces][:, :, 1], thick).all(1)
     uvs = whole.positions[:, [0, 2]] / [size[0], -size[1]] + 0.5
@@ -126,7 +126,7 @@ def _by_sofa(
         return
     box = max((house.items[n].oriented_box for n in sofas), key=lambda b: float(b.half[0]))
     front = box.axes[:, 2] * [1, 0, 1]
-    # In front of the sofa, its feet on the rug; round the table that stands there.
+    # In front of the sofa, its feet on the rug, round the table there.
     middle = box.centre + front * (float(box.half[2]) + 0.65)
     tables = [house.items[n].oriented_box.centre for n in _furniture_of_class(house, room,
         TABLE) if np.linalg.norm((house.items[n].oriented_box.centre - middle)[[0, 2]]) < 1.0]
@@ -171,7 +171,7 @@ def _by_table(
     if not large:
         return
     box = max(large, key=lambda b: float(b.half[0] * b.half[2]))
-    # The rug lies along the table's longer side, and 0.35 to 0.6 m out for chairs.
+    # The rug follows the table's longer side, 0.35 to 0.6 m larger for chairs.
     axis = 0 if box.half[0] >= box.half[2] else 2
     along = box.axes[:, axis]
     turn = float(np.arctan2(-along[2], along[0]))
@@ -226,7 +226,7 @@ def _doormats(
 
 
 def _furniture_of_class(house: MutableHouse, room: RoomSpace, nyu40: int) -> list[int]:
-    # Toys of the class stand on tables; furniture stands on the floor.
+    # Toys of the class are on tables; furniture is on the floor.
     floor = room.room.floor_y
     return [n for n in room.items if house.items[n].nyu40 == nyu40 and house.items[n].bounds[0,
         1] < floor + 0.3]
@@ -244,7 +244,7 @@ def _lay_largest(house: MutableHouse, space: HouseSpace, room: RoomSpace, style:
     forms: Sequence[str] = _RUG_FORMS, bare: bool = False, at_doors: bool = False) -> bool:
     """Lay the first size (width, length) that fits near the place; length goes across `turn`'s front.
 
-    bare: nothing may stand on it. at_doors: it may lie where a door swings.
+    bare: without furniture on it. at_doors: allowed where a door swings.
     """
     free = shapely.buffer(shapely.difference(room.area, room.walls), -from_wall, join_style="mitre")
     taken = _floor_mats(house, space, room)
@@ -284,7 +284,7 @@ def _rug_area(at: F64, turn: float, width: float, length: float) -> BaseGeometry
 
 
 def _floor_mats(house: MutableHouse, space: HouseSpace, room: RoomSpace) -> BaseGeometry:
-    """The plan area of rugs that lie in the room, and of low things that rugs would cut."""
+    """The plan area of rugs in the room, and of low items that a rug would cut."""
     shapes = []
     for n in room.items:
         low, high = space.bounds[n]

@@ -1,6 +1,6 @@
 """Every kind of procedural surface by name, and the material it gives a house.
 
-Effects: JPEGs are encoded through a temporary file; a house keeps what was made for it.
+Effects: JPEGs are encoded through a temporary file; a house caches its textures.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ SEEDS: Final = 8
 
 _TEXEL_M: Final = 0.0015  # greatest texel: what a camera of 640 pixels resolves from a metre away
 _STEP_PX: Final = 128
-_COARSE = (512, 512)  # pixels of one repeat of what is finer by itself
+_COARSE = (512, 512)  # pixels of one repeat of the finer detail
 _FLOOR_M = (2.0, 2.0)
 # fmt: off
 _SIZE_M: Final = {
@@ -87,7 +87,7 @@ _SIZE_M: Final = {
 
 @dataclass(frozen=True, slots=True)
 class Pattern:
-    """What a procedural surface looks like: equal patterns give equal pixels."""
+    """Look of a procedural surface: equal patterns give equal pixels."""
 
     family: str  # of FAMILIES
     seed: int
@@ -95,7 +95,7 @@ class Pattern:
     wood: Wood = WOODS["oak"]  # of wood
     variant: str = ""  # of tiles and wallpaper: how they are laid or printed
     darkness: float = 0.0  # of wood: -1 bleached .. 1 stained
-    photograph: str = ""  # id of a picture's texture that is shown instead: photographed()
+    photograph: str = ""  # id of the picture shown instead, from photographed()
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +108,7 @@ class PatternMaterial:
 
     @property
     def mean_rgb(self) -> Rgb:
-        """The mean linear colour; waits for a material that is still painted."""
+        """The mean linear colour; waits until the material is painted."""
         return self.mean()
 
 
@@ -183,7 +183,7 @@ def _painted(pattern: Pattern) -> Painted:
 
 
 def _tinted(house: MutableHouse, pattern: Pattern) -> Painted:
-    """The pattern painted in a grey that is lighter than its tint, times the tint's part of it."""
+    """The pattern painted in a grey lighter than its tint, times the tint's share."""
     tint = pattern.tints[0]
     grey = next((c for c in _LIGHTNESSES if c >= max(tint)), _LIGHTNESSES[-1])
     plain = replace(pattern, tints=((grey, grey, grey),))

@@ -29,7 +29,7 @@ class TileGrid:
 
 @dataclass(frozen=True, slots=True)
 class Laying:
-    """How many tiles one repeat has and how they are laid."""
+    """Number and bond of the tiles in one repeat."""
 
     rows: int
     columns: int
@@ -70,7 +70,7 @@ def tile_grid(
 
 @dataclass(frozen=True, slots=True)
 class Glaze:
-    """What tiles are made of."""
+    """Materials of tiles."""
 
     colours: tuple[Rgb, ...]
     pattern: str = "plain"  # "plain", "checker", "mixed"
@@ -128,7 +128,7 @@ def marble(rng: np.random.Generator, shape: Shape2, light: Rgb, vein: Rgb) -> F3
 
 
 def cut_from(rng: np.random.Generator, sheet: F32, grid: TileGrid) -> F32:
-    """The sheet (H, W, 3) cut into tiles, each from a place of its own."""
+    """The sheet (H, W, 3) cut into tiles, each from a different place."""
     rows, columns = sheet.shape[:2]
     y = np.arange(rows)[:, None] + rng.integers(0, rows, grid.n_tiles)[grid.tile]
     x = np.arange(columns)[None] + rng.integers(0, columns, grid.n_tiles)[grid.tile]

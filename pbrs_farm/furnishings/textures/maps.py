@@ -1,4 +1,4 @@
-"""What a procedural surface gives: colour, roughness and normals that repeat; no effects."""
+"""Maps of a procedural surface: colour, roughness and normals that repeat; no effects."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ def texture_from_pixels(name: str, pixels: Srgb8Image, quality: int) -> Texture:
 
 
 def encode_maps(maps: SurfaceMaps, name: str) -> tuple[Texture, Texture | None, Texture | None]:
-    """Colour, roughness and normal map as textures; the last two None where there is none."""
+    """Colour, roughness and normal map as textures; the last two may be None."""
     colour = texture_from_pixels(f"{name}.jpg", maps.colour, _COLOUR_QUALITY)
     rough = normal = None
     if not isinstance(maps.roughness, float):

@@ -33,7 +33,7 @@ def noise(
     spectrum = np.zeros((shape[0], gain.shape[1]), np.complex64)
     spectrum[rows] = rng.standard_normal(gain.shape, np.float32) * gain
     spectrum.imag[rows] = rng.standard_normal(gain.shape, np.float32) * gain
-    # Columns that are nothing need no transform of their own: the second one fills them in.
+    # Columns of zeros need no transform: the second one fills them in.
     field = np.fft.irfft(np.fft.ifft(spectrum, axis=0), shape[1], axis=1)
     field *= np.float32(1 / max(float(field.std()), 1e-12))
     return np.asarray(field, np.float32)
@@ -88,7 +88,7 @@ def smoothstep(low: float, high: float, x: F32) -> F32:
 
 
 def coverage(distance_m: F32, half_width_m: float, pixel_m: float) -> F32:
-    """How much of a pixel a line covers: box-filtered, exact for lines along the axes."""
+    """Share of a pixel that a line covers: box-filtered, exact for lines along the axes."""
     reach = (half_width_m + 0.5 * pixel_m - distance_m) / pixel_m
     return np.asarray(np.clip(reach, 0.0, min(1.0, 2.0 * half_width_m / pixel_m)), np.float32)
 

@@ -1,4 +1,4 @@
-"""What walls are clad with: matchboard, level boards, planks of wood, slats, panels in frames; no effects."""
+"""Cladding of walls: matchboard, level boards, planks of wood, slats, panels in frames; no effects."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def board_maps(
     edge = np.minimum(at % (along / n), along / n - at % (along / n)).astype(np.float32)
     groove = smoothstep(_GROOVE_M, 0.0005, edge)
     if not upright:
-        # The upper board laps over the lower one, which lies in its shade.
+        # The upper board laps over the lower one and shades it.
         groove = np.maximum(
             groove, 0.25 * smoothstep(0.02, 0.0, (at % (along / n)).astype(np.float32))
         )
@@ -102,12 +102,12 @@ def slat_maps(
 def panel_maps(
     rng: np.random.Generator, shape: Shape2, size_m: tuple[float, float], tint: Rgb
 ) -> SurfaceMaps:
-    """One panel in its frame under a cap, painted; panels stand side by side, the foot at v = 0."""
+    """One painted panel in its frame under a cap, repeated side by side, the foot at v = 0."""
     width, height = size_m
     x = (np.arange(shape[1], dtype=np.float32) + 0.5) * np.float32(width / shape[1])
     y = height - (np.arange(shape[0], dtype=np.float32) + 0.5) * np.float32(height / shape[0])
     rail = _RAIL_M * float(rng.uniform(0.85, 1.15))
-    # How far inside the panel's opening, negative on the frame.
+    # distance inside the panel's opening, negative on the frame
     across = np.minimum(x, width - x) - rail / 2
     up = np.minimum(y - _FOOT_M, height - _CAP_M - rail - y)
     inside = np.minimum(across[None], up[:, None])
@@ -116,7 +116,7 @@ def panel_maps(
     line = smoothstep(0.0025, 0.0, np.abs(inside)) + 0.6 * smoothstep(
         0.0025, 0.0, np.abs(inside - _BEVEL_M)
     )
-    # The cap stands out, with a shade below it and a light edge above.
+    # The cap projects, with a shade below it and a light edge above.
     below = smoothstep(_CAP_M + 0.012, _CAP_M, height - y) * (height - y > _CAP_M)
     cap = smoothstep(_CAP_M + 0.005, _CAP_M - 0.003, height - y)
     lip = np.asarray(0.5 * smoothstep(0.006, 0.0, np.abs(height - y - 0.022)), np.float32)

@@ -18,7 +18,7 @@ from pbrs_farm.images import decode_texture
 
 @dataclass(frozen=True, slots=True)
 class _Shown:
-    # Which pictures stand for a family, and how they reflect.
+    # Pictures for a family, and their reflectance.
     group: str
     roughness: float
     gloss: float

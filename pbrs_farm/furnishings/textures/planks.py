@@ -150,11 +150,11 @@ def plank_maps(
     pixel_m = size_m[0] / shape[1]
     sheet = wood_sheet(rng, wood, (512, shape[1]), pixel_m) if sheet is None else sheet
     n = layout.n_planks
-    # Cut each plank from a place of its own, one half of them turned round.
+    # Cut each plank from a different place, half of them turned round.
     rows = _start_of_planks(rng, layout.across, layout.plank, n, sheet.shape[0])
     columns = _start_of_planks(rng, layout.along, layout.plank, n, sheet.shape[1])
     tone = sampled(sheet.tone, rows, columns)
-    # Give each plank a brightness and a warmth of its own.
+    # Vary the brightness and warmth of each plank.
     light, dark = _stained(wood, darkness)
     colour = ramp(tone, dark, light)
     bright = 1.0 + np.clip(
@@ -181,7 +181,7 @@ def plank_maps(
 def _start_of_planks(
     rng: np.random.Generator, pixels: _INTS, plank: _INTS, n: int, most: int
 ) -> NDArray[np.int32]:
-    # Pixels of each plank from a start of its own, forwards or backwards.
+    # Pixels of each plank from a different start, forwards or backwards.
     turn, start = rng.choice([-1, 1], n).astype(np.int32), rng.integers(0, most, n, np.int32)
     return np.asarray(pixels.astype(np.int32) * turn[plank] + start[plank], np.int32)
 

@@ -56,7 +56,7 @@ def wood_sheet(
     knot_dark = np.zeros(shape, np.float32)
     for _ in range(round(knots * across_m * along_m)):
         phase, knot_dark = _with_knot(rng, phase, knot_dark, pixel_m)
-    # Fade rings that are finer than the pixels show.
+    # Fade rings finer than a pixel.
     slope = np.abs(np.roll(phase, -1, 0) - phase)
     slope = np.minimum(slope, np.abs(slope - n_rings))  # across the sheet's edge
     visible = np.exp(-((slope / 0.3) ** 2))
