@@ -55,14 +55,16 @@ class Leaves(NamedTuple):
 def leaves_of(rng: np.random.Generator, number: int) -> Leaves:
     """The looks of one of SPECIES."""
     own = SPECIES[number]
-    spray, dark = _spray(rng, own), tuple(0.3 * c for c in own.dark)
+    spray = _spray(rng, own)
+    r, g, b = own.dark
+    dark = (0.3 * r, 0.3 * g, 0.3 * b)
     return Leaves(
         own,
         SceneryMaterial(f"{own.name} leaves", picture=spray),
         SceneryMaterial(f"{own.name} leaves in shade", rgb=(_SHADE,) * 3, picture=spray),
         SceneryMaterial(
             f"{own.name} dark", picture=mottled(rng, dark, own.dark, size=64), size_m=(0.7, 0.7)
-        ),  # type: ignore[arg-type]
+        ),
         SceneryMaterial(
             f"{own.name} bark", picture=mottled(rng, *own.bark, size=64), size_m=(0.5, 0.5)
         ),
