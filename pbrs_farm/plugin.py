@@ -44,7 +44,6 @@ if TYPE_CHECKING:
     from pbrs_farm.core.house import Surface as Surface
     from pbrs_farm.core.house import Texture as Texture
     from pbrs_farm.core.keys import sha256 as sha256
-    from pbrs_farm.core.keys import view_id as view_id
     from pbrs_farm.core.layers import Layer as Layer
     from pbrs_farm.core.layers import optional_layer as optional_layer
     from pbrs_farm.core.lighting import LightForm as LightForm
@@ -54,6 +53,7 @@ if TYPE_CHECKING:
     from pbrs_farm.core.recipe import ReadFields as ReadFields
     from pbrs_farm.core.recipe import ToneFields as ToneFields
     from pbrs_farm.core.record import Record as Record
+    from pbrs_farm.core.shot import view_id as view_id
     from pbrs_farm.dress.mutable_house import MutableHouse as MutableHouse
     from pbrs_farm.dress.style import Style as Style
     from pbrs_farm.export.chosen_view import Choice as Choice
@@ -107,12 +107,13 @@ _MODULES: Final = {
         "Box", "House", "Item", "ItemKind", "Level", "LightPart", "Material", "MaterialKind", "Note",
         "Opening", "Room", "Source", "Surface", "Texture",
     ),
-    "core.keys": ("sha256", "view_id"),
+    "core.keys": ("sha256",),
     "core.layers": ("Layer", "optional_layer"),
     "core.lighting": ("LightForm", "PowerUnit"),
     "core.options": ("option",),
     "core.recipe": ("CameraFields", "ReadFields", "ToneFields"),
     "core.record": ("Record",),
+    "core.shot": ("view_id",),
     "dress.mutable_house": ("MutableHouse",),
     "dress.style": ("Style",),
     "furnishings.things.bodies": (

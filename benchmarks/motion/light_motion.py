@@ -18,6 +18,7 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import F64, Bools, RadianceImage
 from pbrs_farm.core.layers import LAYER
 from pbrs_farm.core.recipe import ToneFields, recipe_from_name
+from pbrs_farm.core.shot import Shot
 from pbrs_farm.formats.layer_file import layer_from_bytes
 from pbrs_farm.formats.radiance_exr import radiance_from_exr
 from pbrs_farm.prepare.source import resolve
@@ -71,7 +72,7 @@ class _Frame(NamedTuple):
 
 def _frame(house: Work, number: int, cpu: list[float]) -> _Frame:
     """Make a frame; add the CPU seconds of its light and pictures."""
-    work = replace(house, view_id=keys.frame_id(number), layers=LAYERS)
+    work = replace(house, view_id=Shot.of_frame(number).id, layers=LAYERS)
     for step in ("truth", "opengl_il"):
         run_step(step, work)
     began = time.process_time()

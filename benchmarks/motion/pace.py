@@ -17,7 +17,7 @@ from pbrs_farm.run.local_run import Run
 from pbrs_farm.run.plan import wanted
 from pbrs_farm.run.processes.render_task import Event
 from pbrs_farm.run.steps import camera_seed
-from pbrs_farm.run.view_light import light_seed, pilot_of_view
+from pbrs_farm.run.view_setup import ViewSetup
 from pbrs_farm.sample.walks.walk_sampler import sample_walk
 from pbrs_farm.store import MemoryStore
 from pbrs_farm.transport.light_scene import LightScene
@@ -60,17 +60,16 @@ def _light_reuse() -> float:
     geometry = geometry_from_house(house)
     seed = camera_seed(house.id, recipe)
     views = sample_walk(house, recipe.cameras, seed, geometry, Caster(geometry).first_hit).views
-    sky = CachedHouse(MemoryStore(), recipe, house.id, "").sky
-    scene = LightScene.load(house, decoded_textures(house)[0], recipe, sky)
+    cached = CachedHouse(MemoryStore(), recipe, house.id, "")
+    scene = LightScene.load(house, decoded_textures(house)[0], recipe, cached.sky)
     by_id = {view.id: view for view in views}
     cpu = []
     for view in views:
-        camera = view.camera.with_size(recipe.image.width_px, recipe.image.height_px)
+        setup = ViewSetup(cached, view, by_id)
         began = time.process_time()
-        # Seed it as the step `light` does: the pilot that frame 1 leaves is then frame 2's.
-        seed = light_seed(view, house.id, "")
-        pilot = pilot_of_view(view, by_id, camera, house.id, "")
-        scene.render(camera, view.room_id, recipe.light, seed, pilot=pilot)
+        # Use the seed of the step `light`: frame 2 then takes over the pilot of frame 1.
+        seed = setup.light_seed(view)
+        scene.render(setup.camera, view.room_id, recipe.light, seed, pilot=setup.pilot)
         cpu.append(time.process_time() - began)
     print("CPU of the frames' light:", [round(c, 2) for c in cpu], flush=True)
     return sum(cpu[1:]) / (len(cpu) - 1) / cpu[0]

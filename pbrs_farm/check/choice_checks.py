@@ -15,9 +15,9 @@ from pbrs_farm.check.certificate import Expect
 from pbrs_farm.check.checks import Check
 from pbrs_farm.check.plan import is_within
 from pbrs_farm.check.rules import judge
-from pbrs_farm.check.stored_house import eye_of_row
 from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.shot import Shot
 
 _COUNT_SHARE = 0.02  # of an item's pixels: those on its outline may fall either way
 _COUNT_PX = 6  # the same of a small item
@@ -36,7 +36,7 @@ def check_choice(case: HouseCase) -> None:
     ids = [row["id"] for row in rows]
     expect(len(set(ids)) == len(ids), "a view stands twice in cameras.json")
     n_views = report.get("n_views")
-    n_firsts = sum(not eye_of_row(row) for row in rows)
+    n_firsts = sum(not Shot.of_row(row["id"], row).eye for row in rows)
     expect(n_views in (len(rows), n_firsts), f"reports {n_views} views of {len(rows)}")
     in_marker = house.marker_facts("cameras").get("views")
     if in_marker:
@@ -103,7 +103,9 @@ def _check_view(case: HouseCase, row: Mapping[str, Any]) -> None:
         is_free = row["origin"] == "walk" or "rig" in row
         same &= is_free or is_within(room["polygon"], np.array([x, z]))
         expect(same, f"does not stand in room {row['room']}")
-    first = house.camera_rows.get(row["rig"]["instant"]) if eye_of_row(row) else None
+    first = (
+        house.camera_rows.get(row["rig"]["instant"]) if Shot.of_row(row["id"], row).eye else None
+    )
     if first is not None:
         # A rig is judged once an instant.
         same = (row["objects"], row["score"]) == (first["objects"], first["score"])
@@ -156,15 +158,18 @@ def _check_sequence(case: HouseCase, rows: list[dict[str, Any]]) -> None:
         place = f"{case.house.id} {row['id']} in cameras.json"
         frame = row.get("frame")
         if frame is not None:
-            eye = eye_of_row(row)
-            name = f"frame_{frame:05d}" + (eye and f"_{eye}")
+            name = Shot.of_frame(frame, Shot.of_row(row["id"], row).eye).id
             judge("frame", place, case.tally, row=row, name=name)
             if fields.get("source") == "walk":
                 time_s = frame / fields["walk_fps"]
                 judge("time of a frame", place, case.tally, row=row, time_s=time_s)
         if "rig" in row or fields.get("stereo_m") or recipe.get("rig"):
             _check_rig(case, row, place)
-    times = [row["time_s"] for row in rows if row.get("frame") is not None and not eye_of_row(row)]
+    times = [
+        row["time_s"]
+        for row in rows
+        if row.get("frame") is not None and not Shot.of_row(row["id"], row).eye
+    ]
     ascend = all(b > a for a, b in itertools.pairwise(times))
     case.expect("sequence")(ascend, "its frames do not follow each other in time")
 
@@ -209,7 +214,7 @@ def _check_rig(case: HouseCase, row: Mapping[str, Any], place: str) -> None:
     assert rig is not None
     instant, camera = str(rig["instant"]), str(rig["camera"])
     first = house.camera_rows.get(instant)
-    same = row["id"] in (instant, f"{instant}_{camera}") and first is not None
+    same = row["id"] in (instant, Shot.of_id(instant).partner(eye=camera).id) and first is not None
     if not expect(same, f"is no camera of the rig at {instant!r}"):
         return
     assert first is not None

@@ -218,12 +218,10 @@ def _check_light_facts(case: ViewCase) -> None:
     if not house.recipe:
         return
     fields = house.recipe["light"]
-    # All frames of one camera share a seed.
-    name, is_frame = view.folder.name, table.get("frame") is not None
-    name = ("clip_right" if name.endswith("_right") else "clip") if is_frame else name
     # light.groups adds layers and changes no picture.
     drawn = {**house.recipe, "light": {k: v for k, v in fields.items() if k != "groups"}}
-    seed = keys.seed(house.id, name, "light", _digest(drawn, groups_of_step("light")))
+    digest = _digest(drawn, groups_of_step("light"))
+    seed = view.shot.seed(house.id, "light", digest, per="eye")
     judge("light seed", place, tally, light=light, seed=seed)
     expect = case.expect("light facts")
     integrator, names = light.get("integrator"), INTEGRATORS[fields["integrator"]]

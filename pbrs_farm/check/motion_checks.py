@@ -20,7 +20,6 @@ from pbrs_farm.check.embree_caster import Rays
 from pbrs_farm.check.followed_points import SEEN, Followed, OtherView, follow_points, near_edge
 from pbrs_farm.check.pixel_checks import of_another_part
 from pbrs_farm.check.rules import judge
-from pbrs_farm.check.stored_house import eye_of_row
 from pbrs_farm.check.stored_view import StoredView
 from pbrs_farm.core.arrays import F64, I64, Bools
 
@@ -203,9 +202,7 @@ def _name_of_partner(
     """The id of the other of a pair, or of the frame before or after by the same camera of a rig."""
     rig, name = view.table.get("rig"), view.folder.name
     if relation != "stereo":
-        number = int(view.table["frame"]) + (1 if relation == "next" else -1)
-        eye = eye_of_row({"id": name, "rig": rig})
-        return f"frame_{number:05d}" + (eye and f"_{eye}")
+        return view.shot.partner(1 if relation == "next" else -1).id
     # The nearest of the instant's cameras beside it that have its orientation.
     row, beside = camera_rows.get(name, {}), list[tuple[float, str]]()
     for other_name, other in camera_rows.items():

@@ -5,7 +5,6 @@ Uses no House. A missing or damaged document is empty here: the checks of files 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -106,9 +105,3 @@ def _document(file: Path) -> dict[str, Any]:
         return stored_object(file)
     except BadFile:
         return {}
-
-
-def eye_of_row(row: Mapping[str, Any]) -> str:
-    """The camera of a rig that took a view of cameras.json; "" for the rig's first camera and without a rig."""
-    rig = row.get("rig")
-    return "" if rig is None or rig["instant"] == row["id"] else str(rig["camera"])

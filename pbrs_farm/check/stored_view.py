@@ -18,6 +18,7 @@ from pbrs_farm.check.stored_files import BadFile, stored_bytes, stored_object
 from pbrs_farm.core.arrays import F32, F64
 from pbrs_farm.core.errors import BadInput, BadRecipe
 from pbrs_farm.core.recipe import Recipe, recipe_from_json
+from pbrs_farm.core.shot import Shot
 from pbrs_farm.images import array_from_png, layers_from_exr
 
 
@@ -32,6 +33,11 @@ class StoredView:
     def place(self) -> str:
         """House and view, as messages name them."""
         return f"{self.folder.parent.parent.name}/{self.folder.name}"
+
+    @property
+    def shot(self) -> Shot:
+        """The view's take, frame and camera of a rig."""
+        return Shot.of_row(self.folder.name, self.table)
 
     @property
     def size(self) -> tuple[int, int]:

@@ -19,9 +19,9 @@ from pbrs_farm.check.checks import Check
 from pbrs_farm.check.embree_caster import Hits
 from pbrs_farm.check.followed_points import OtherView, is_seen
 from pbrs_farm.check.stored_files import BadFile, stored_bytes
-from pbrs_farm.check.stored_house import eye_of_row
 from pbrs_farm.check.stored_view import StoredView
 from pbrs_farm.core.arrays import F64, I64, Bools
+from pbrs_farm.core.shot import Shot
 
 _FILE = "tracks.npz"
 _MOST_FRAMES = 12  # of a film, spread over it, beside those in which points were chosen
@@ -76,7 +76,11 @@ def check_tracks(case: HouseCase) -> None:
     n, t = len(tracks["query_frame"]), len(tracks["frames"])
     shapes = {3: (n, t, 2), 2: (n, t), 1: (n,)}
     shaped = all(tracks[name].shape == shapes[axes] for name, axes in _SHAPES.items())
-    rows = [row for row in house.camera_rows.values() if "frame" in row and not eye_of_row(row)]
+    rows = [
+        row
+        for row in house.camera_rows.values()
+        if "frame" in row and not Shot.of_row(row["id"], row).eye
+    ]
     film = [str(row["id"]) for row in sorted(rows, key=lambda row: int(row["frame"]))]
     if not expect(shaped, "its arrays do not fit each other"):
         return

@@ -20,6 +20,7 @@ from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.frames import OPENCV_FROM_OPENGL
 from pbrs_farm.core.lenses import PINHOLE, Lens
 from pbrs_farm.core.pinhole_faces import PinholeFaces, faces_of_directions
+from pbrs_farm.core.shot import Shot
 
 # Full horizontal field of view of the published cameras: half-angle 0.5534 rad (docs/spec/suncg.md section 3).
 PAPER_HFOV_RAD = 2 * 0.5534
@@ -431,7 +432,7 @@ class RigPlace:
 class View:
     """A camera with its place in a house."""
 
-    id: str  # keys.view_id
+    id: str  # core/shot.py
     room_id: str
     sector: int
     camera: Camera
@@ -444,6 +445,7 @@ class View:
     rig: RigPlace | None = None  # where several cameras take each view together
 
     @property
-    def eye(self) -> str:
-        """The name of its camera in the rig; "" of the first one and where there is no rig."""
-        return "" if self.rig is None or self.rig.instant == self.id else self.rig.camera
+    def shot(self) -> Shot:
+        """Take, frame and camera of the rig, parsed from the id."""
+        is_first = self.rig is None or self.rig.instant == self.id
+        return Shot.of_id(self.id, () if is_first else (self.rig.camera,))

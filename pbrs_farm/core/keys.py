@@ -18,8 +18,6 @@ import re
 from dataclasses import dataclass
 from typing import Any, Final
 
-from pydantic import BaseModel
-
 from pbrs_farm.core.errors import BadInput
 
 RECIPE: Final = "recipe.json"
@@ -82,40 +80,6 @@ OBJECT_PREFIX: Final = "object_"
 def is_object(house: str) -> bool:
     """The id is of an object without context (paper section 4.1), not of a house."""
     return house.startswith(OBJECT_PREFIX)
-
-
-def view_id(room_id: str, sector: int, k: int | None = None) -> str:
-    """`<room>_<sector>`, `_<k>` when a sector has several.
-
-    Room and sector are those of the camera search; k numbers the views of a sector that keeps
-    several. Frames of a sequence and other cameras of a rig have ids of their own: `frame_id`,
-    `rig_view_id`.
-    """
-    return f"{room_id}_{sector}" if k is None else f"{room_id}_{sector}_{k}"
-
-
-def frame_id(number: int) -> str:
-    """Id of the view of a sequence's frame: `frame_00012`."""
-    return f"frame_{number:05d}"
-
-
-def rig_view_id(first: str, eye: str) -> str:
-    """Id of the view that a camera of a rig takes, of the one that the rig's first camera takes.
-
-    eye: the camera's name, as `View.eye` has it: "" is the first camera itself. A stereo pair is a
-    rig whose other camera is called right.
-    """
-    return f"{first}_{eye}" if eye else first
-
-
-def take_id(view: str) -> str:
-    """What a camera takes at one setting: all frames of a house's clip, both eyes of a pair.
-
-    What is drawn once a take, as the tone, takes its seed from this, so that a clip does not
-    flicker and both eyes agree.
-    """
-    left = view.removesuffix("_right")
-    return "clip" if left.startswith("frame_") else left
 
 
 def house_key(house: str, file: str = "") -> str:
@@ -187,11 +151,10 @@ def histogram_pack_key(house: str) -> str:
 def canonical_json(value: Any) -> str:
     """JSON with sorted keys and no spaces: equal values give equal text.
 
-    Pydantic models are dumped first. Characters beyond ASCII are escaped; floats are written as
-    Python's repr, so 1 and 1.0 differ. TypeError for values that JSON does not know, arrays among
-    them.
+    A pydantic model is dumped first. Characters beyond ASCII are escaped; floats are written as
+    Python's repr, so 1 and 1.0 differ. Raises TypeError for values without a JSON form, such as arrays.
     """
-    if isinstance(value, BaseModel):
+    if hasattr(value, "model_dump"):
         value = value.model_dump(mode="json")
     return json.dumps(value, sort_keys=True, separators=(",", ":"), ensure_ascii=True)
 

@@ -40,6 +40,7 @@ from pbrs_farm.core.recipe_fields import (
     ToneFields,
 )
 from pbrs_farm.core.rig_fields import RigFields, stereo_rig
+from pbrs_farm.core.shot import Shot
 from pbrs_farm.core.shown_text import hint_of_choice, near_names, question
 
 __all__ = [
@@ -130,6 +131,11 @@ class Recipe(FieldGroup):
         stereo_m = self.cameras.stereo_m
         return stereo_rig(stereo_m) if stereo_m > 0 else self.rig
 
+    def shot(self, view_id: str) -> Shot:
+        """The shot of a view of this recipe, by its id."""
+        rig = self.rig_in_use
+        return Shot.of_id(view_id, () if rig is None else rig.eyes)
+
     @property
     def lenses(self) -> dict[str, LensFields]:
         """The lens of all views, and those of a rig's cameras by their place in messages."""
@@ -167,15 +173,15 @@ class Recipe(FieldGroup):
         return f.model_copy(update=own)
 
     def camera_of(self, house_id: str, view_id: str, variant: int = 0) -> PictureCamera:
-        """The camera that takes one view's pictures: tone.camera's; of a variant, one that is drawn.
+        """The camera that develops one view: tone.camera, or a drawn one for a variant.
 
-        Both eyes of a pair and all frames of a clip have one camera with one error, since it is drawn
-        for the take. The same house, view and recipe seed give the same camera on every machine.
+        It is drawn once a take, so all cameras of a rig and all frames of a film share its errors. The
+        same house, view and recipe seed give the same camera on every machine.
 
             >>> recipe_from_name("fast").camera_of("a-1", "0_0_1").name
             'neutral'
         """
-        seed = keys.seed(house_id, keys.take_id(view_id), "camera", variant, self.seed)
+        seed = self.shot(view_id).seed(house_id, "camera", variant, self.seed, per="take")
         name = DRAWN if variant else self.tone.camera
         return picture_camera(name, self.tone, self.sensor, seed)
 

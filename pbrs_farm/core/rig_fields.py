@@ -106,6 +106,11 @@ class RigFields(FieldGroup):
             raise ValueError(f"two cameras are called {twice}")
         return self
 
+    @property
+    def eyes(self) -> tuple[str, ...]:
+        """`Shot.eye` of each camera: "" for the first, else its name."""
+        return ("", *(camera.name for camera in self.cameras[1:]))
+
 
 def stereo_rig(baseline_m: float) -> RigFields:
     """The rig of a stereo pair: a camera and one so far to its right."""

@@ -21,7 +21,6 @@ from pbrs_farm.core.house import ItemKind
 from pbrs_farm.export.chosen_view import Choice, ChosenView, intrinsics_of, opengl_normals
 from pbrs_farm.export.sequences import pose_opencv
 from pbrs_farm.formats.output_folder import ViewEntry
-from pbrs_farm.formats.view_json import eye_of, instant_of
 from pbrs_farm.selection.histogram_pack import BLACK
 from pbrs_farm.selection.quality import picture_quality
 from pbrs_farm.store.object_store import Store
@@ -158,8 +157,8 @@ def judged_by(entries: Sequence[ViewEntry], names: Sequence[str]) -> list[RuleVe
             raise BadInput("--by", name, "no such rule", hint=f"of {', '.join(REASONS)}")
     found: dict[tuple[str, str], RuleVerdict] = {}
     kept: dict[tuple[str, str], list[ChosenView]] = {}
-    for entry in sorted(entries, key=lambda e: (bool(eye_of(e.facts)), e.house.id, e.id)):
-        first = found.get((entry.house.id, instant_of(entry.facts)))
+    for entry in sorted(entries, key=lambda e: (e.shot.eye != "", e.house.id, e.id)):
+        first = found.get((entry.house.id, entry.shot.first.id))
         others = kept.setdefault((entry.house.id, entry.room_id), [])
         numbers, reason = (
             _judged(entry, names, others) if first is None else (first.numbers, first.reason)

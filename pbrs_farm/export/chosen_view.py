@@ -23,6 +23,7 @@ from pbrs_farm.core.lenses import PINHOLE, lens_from_table
 from pbrs_farm.core.lighting import Mode
 from pbrs_farm.core.record import Record
 from pbrs_farm.core.resampling import resized_any, resized_by_area, resized_nearest
+from pbrs_farm.core.shot import Shot
 from pbrs_farm.formats.class_map import ClassMap
 from pbrs_farm.formats.layer_file import layer_bytes, layer_from_bytes
 from pbrs_farm.formats.output_folder import OutputHouse, ViewEntry
@@ -118,6 +119,11 @@ class ChosenView:
     def id(self) -> str:
         """The view's id in its house."""
         return self.entry.id
+
+    @property
+    def shot(self) -> Shot:
+        """The view's take, frame and camera of a rig."""
+        return self.entry.shot
 
     @property
     def layers(self) -> tuple[Layer, ...]:

@@ -11,7 +11,6 @@ import numpy as np
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.export.chosen_view import ChosenView
-from pbrs_farm.formats.view_json import eye_of, instant_of
 
 _SAME_ROWS: Final = 1e-6  # of two cameras' rotation, and metres
 
@@ -50,11 +49,11 @@ def frames_by_house(views: Sequence[ChosenView]) -> dict[str, list[SequenceFrame
     """
     others: dict[tuple[str, str], dict[str, ChosenView]] = {}
     for view in views:
-        if eye := eye_of(view.facts):
-            others.setdefault((view.house.id, instant_of(view.facts)), {})[eye] = view
+        if view.shot.eye:
+            others.setdefault((view.house.id, view.shot.first.id), {})[view.shot.eye] = view
     frames: dict[str, list[SequenceFrame]] = {}
     for view in views:
-        if not eye_of(view.facts):
+        if not view.shot.eye:
             frame = SequenceFrame(view, others.get((view.house.id, view.id), {}))
             frames.setdefault(view.house.id, []).append(frame)
 

@@ -75,7 +75,7 @@ def rig_table(view: View) -> dict[str, Any]:
         "instant": rig.instant,
         "rig_from_camera_opencv": rig.rig_from_camera.tolist(),
     }
-    return {"rig": table, **({"left": rig.instant} if (rig.name, view.eye) == _RIGHT else {})}
+    return {"rig": table, **({"left": rig.instant} if (rig.name, view.shot.eye) == _RIGHT else {})}
 
 
 def _rig_place(row: Mapping[str, Any] | None) -> RigPlace | None:

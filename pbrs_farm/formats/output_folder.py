@@ -18,6 +18,7 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import Points2
 from pbrs_farm.core.checked_json import checked
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.shot import Shot, room_of_id
 from pbrs_farm.core.shown_text import MAX_MESSAGE, shown
 from pbrs_farm.regular_files import read_given
 from pbrs_farm.store.object_store import LAYOUT
@@ -52,6 +53,11 @@ class ViewEntry:
     room_name: str
     folder: Path
     facts: dict[str, Any] = field(default_factory=dict)  # view.json, {} if not written yet
+
+    @property
+    def shot(self) -> Shot:
+        """The view's take, frame and camera of a rig."""
+        return Shot.of_row(self.id, self.facts)
 
     def file(self, name: str) -> Path | None:
         """The view's file of that name, or None.
@@ -126,9 +132,7 @@ def _room_id(view_id: str, facts: dict[str, Any], house: OutputHouse) -> str:
     room = room.get("id", "") if isinstance(room, dict) else room
     if room:
         return str(room)
-    # Without view.json: the longest room id that the view's id begins with.
-    owners = [r for r in house.rooms if view_id.startswith(f"{r}_")]
-    return max(owners, key=len) if owners else view_id.rpartition("_")[0]
+    return room_of_id(view_id, house.rooms)
 
 
 def reasons_of(root: Path) -> dict[tuple[str, str], str]:

@@ -50,21 +50,6 @@ def view_description(
     }
 
 
-def eye_of(facts: Mapping[str, Any]) -> str:
-    """Which camera of a rig took the view of a view.json: "" of the rig's first one, else its name.
-
-    "" also where there is no rig.
-    """
-    rig = facts.get("rig")
-    return "" if rig is None or rig["instant"] == facts["view"] else str(rig["camera"])
-
-
-def instant_of(facts: Mapping[str, Any]) -> str:
-    """The id of the view that the rig's first camera took at the same instant; without a rig its own."""
-    rig = facts.get("rig")
-    return str(facts["view"] if rig is None else rig["instant"])
-
-
 def view_json(description: Mapping[str, Any]) -> bytes:
     """The file."""
     return json_bytes(description)

@@ -18,7 +18,6 @@ from pbrs_farm.export.chosen_view import PICTURES
 from pbrs_farm.formats.film_mp4 import film, film_pace
 from pbrs_farm.formats.layer_file import layer_from_bytes
 from pbrs_farm.formats.output_folder import ViewEntry
-from pbrs_farm.formats.view_json import eye_of
 from pbrs_farm.gallery import label_colours as colours
 from pbrs_farm.regular_files import read_regular
 
@@ -33,7 +32,7 @@ def sequences_of(views: Sequence[ViewEntry]) -> dict[str, list[ViewEntry]]:
     """
     found: dict[str, list[ViewEntry]] = {}
     for view in views:
-        if view.facts.get("frame") is not None and not eye_of(view.facts):
+        if view.facts.get("frame") is not None and not view.shot.eye:
             found.setdefault(view.house.id, []).append(view)
     return {house: sorted(own, key=lambda v: int(v.facts["frame"])) for house, own in found.items()}
 

@@ -26,6 +26,7 @@ from pbrs_farm.run.house_cache import CachedHouse
 from pbrs_farm.run.output_root import attribution
 from pbrs_farm.run.relight import linear_aovs
 from pbrs_farm.run.step_cache import StepOutput, Work
+from pbrs_farm.run.view_setup import ViewSetup
 from pbrs_farm.selection import scene_quality, view_record
 from pbrs_farm.selection.quality import ViewPlace
 from pbrs_farm.store.object_store import Store
@@ -48,18 +49,16 @@ _GROUPS_OF_ENDING: Final = {
     "": (Group.OUTDOOR, Group.INDOOR), "_outdoor": (Group.OUTDOOR,), "_indoor": (Group.INDOOR,),
 }  # fmt: skip
 
-HouseAndViews = Callable[[], tuple[CachedHouse, Mapping[str, View]]]
-
 _LAGS: Final = 4.0  # of what came earlier than so many lags less than 2 % is left
 _GLANCE_PX: Final = (32, 24)  # of the small pictures that tell how bright earlier frames are
 _GLANCE_SPP: Final = 16
 
 
-def develop_step(work: Work, cached: HouseAndViews) -> StepOutput:
+def develop_step(work: Work, setup: Callable[[], ViewSetup]) -> StepOutput:
     """The PNGs of the light modes: groups summed, denoised, white-balanced, tone-mapped.
 
-    By the camera that the recipe gives the view, and by one that is drawn for each variant. cached:
-    the house and its views by id, asked for only where earlier frames decide the exposure.
+    The recipe's camera develops the view, and a drawn one each variant. setup: loads the view and its
+    house; called only where earlier frames change the exposure.
     """
     key = keys.view_key(work.house_id, work.view_id or "", RADIANCE_EXR)
     radiance = radiance_from_exr(work.store.get(key), key)
@@ -68,7 +67,7 @@ def develop_step(work: Work, cached: HouseAndViews) -> StepOutput:
     if work.recipe.light.denoise:
         aovs = denoise_aovs(aovs, wraps=_wraps(work))
     camera = work.recipe.camera_of(work.house_id, work.view_id or "")
-    images = _taken(work, aovs, camera, 0, cached)
+    images = _taken(work, aovs, camera, 0, setup)
     # Write a PNG a mode; its exposure and white balance become facts.
     credit = attribution(work.store, work.house_id)
     files = {LAYER[m].file: layer_bytes(m, i.rgb_srgb8, credit) for m, i in images.items()}
@@ -80,7 +79,7 @@ def develop_step(work: Work, cached: HouseAndViews) -> StepOutput:
     variants = []
     for n in range(1, camera.tone.variants + 1):
         drawn = work.recipe.camera_of(work.house_id, work.view_id or "", n)
-        image = _taken(work, aovs, drawn, n, cached)[Mode.MLT_IL_OL]
+        image = _taken(work, aovs, drawn, n, setup)[Mode.MLT_IL_OL]
         name = f"mlt_il_ol.{n}"
         file = LAYER[name].file
         files[file] = layer_bytes(name, image.rgb_srgb8, credit)
@@ -120,10 +119,14 @@ def _intrinsic_layers(
 
 
 def _taken(
-    work: Work, aovs: LinearAovs, camera: PictureCamera, variant: int, cached: HouseAndViews
+    work: Work,
+    aovs: LinearAovs,
+    camera: PictureCamera,
+    variant: int,
+    setup: Callable[[], ViewSetup],
 ) -> dict[str, ToneMappedImage]:
     """Mode -> the picture of denoised light that a camera takes."""
-    shot = _sensor_shot(work, camera, variant, cached)
+    shot = _sensor_shot(work, camera, variant, setup)
     return develop(aovs, camera.tone, denoise=False, shot=shot, wraps=_wraps(work))
 
 
@@ -142,34 +145,23 @@ def _wraps(work: Work) -> bool:
 
 
 def _sensor_shot(
-    work: Work, camera: PictureCamera, variant: int, cached: HouseAndViews
+    work: Work, camera: PictureCamera, variant: int, setup: Callable[[], ViewSetup]
 ) -> SensorShot | None:
     fields, tone = camera.sensor, camera.tone
     if not fields.is_on:
         return None
-    names = [work.house_id, work.view_id or "", "sensor", work.recipe.digest("sensor")]
-    seed = keys.seed(*names, *([variant] if variant else []))
+    parts = ["sensor", work.recipe.digest("sensor"), *([variant] if variant else [])]
+    seed = work.recipe.shot(work.view_id or "").seed(work.house_id, *parts, per="view")
     if fields.lag_s == 0:
         return SensorShot(fields, seed)
-    house, views = cached()
-    view = views[work.view_id or ""]
-    if view.time_s is None:
-        return SensorShot(fields, seed)
-    # Glance at the frames of the same eye that are recent enough to count.
-    earlier = [
-        v
-        for v in views.values()
-        if v.time_s is not None and v.eye == view.eye
-        and 0 < view.time_s - v.time_s <= _LAGS * fields.lag_s
-    ]  # fmt: skip
-    earlier.sort(key=lambda v: v.time_s or 0.0)
+    now = setup()
+    earlier = now.earlier_frames(_LAGS * fields.lag_s)
     denoise = work.recipe.light.denoise
-    wanted = [
-        wanted_exposures(_glance(work, house, v), tone, denoise=denoise, wraps=_wraps(work))
-        for v in earlier
-    ]
-    times = [v.time_s - view.time_s for v in earlier if v.time_s is not None]
-    return SensorShot(fields, seed, tuple(wanted), tuple(times))
+    wanted = tuple(
+        wanted_exposures(_glance(work, now.house, view), tone, denoise=denoise, wraps=_wraps(work))
+        for _time_s, view in earlier
+    )
+    return SensorShot(fields, seed, wanted, tuple(time_s for time_s, _view in earlier))
 
 
 def _glance(work: Work, house: CachedHouse, view: View) -> LinearAovs:
@@ -180,7 +172,7 @@ def _glance(work: Work, house: CachedHouse, view: View) -> LinearAovs:
             "groups": "two",
         }
     )  # fmt: skip
-    seed = keys.seed(work.house_id, view.id, "glance", work.recipe.seed)
+    seed = view.shot.seed(work.house_id, "glance", work.recipe.seed, per="view")
     camera = view.camera.with_size(*_GLANCE_PX)
     light = house.light_scene.render(camera, view.room_id, fields, seed)
     return LinearAovs(light.outdoor, light.indoor, light.albedo, light.normal)

@@ -183,18 +183,18 @@ def lit_views(
 def chosen_views(rows: Iterable[tuple[str, str, float]], n_views: int, recipe: Recipe) -> list[str]:
     """The n_views views to make: the first frames of a sequence, else spread over rooms; 0 = all.
 
-    What the cameras of a rig take at one instant is one view, of which all pictures are made.
+    The cameras of a rig count as one view at each instant; all of them are made or none.
     """
-    all_rows, rig = list(rows), recipe.rig_in_use
-    eyes = [camera.name for camera in rig.cameras[1:]] if rig is not None else []
-    others = {keys.rig_view_id(row[0], eye) for row in all_rows for eye in eyes}
-    firsts = [row for row in all_rows if row[0] not in others]
+    all_rows = {row[0]: row for row in rows}
+    first_of = {view: recipe.shot(view).first.id for view in all_rows}
+    # A plugin's id may end like that of a rig's camera: then there is no such first view.
+    first_of = {view: first if first in all_rows else view for view, first in first_of.items()}
+    firsts = [row for view, row in all_rows.items() if first_of[view] == view]
     if source_of(recipe.cameras).is_sequence:
-        chosen = [view for view, _room, _score in firsts[: n_views or None]]
+        chosen = {view for view, _room, _score in firsts[: n_views or None]}
     else:
-        chosen = spread(firsts, n_views)
-    together = {keys.rig_view_id(first, eye) for first in chosen for eye in ("", *eyes)}
-    return [view for view, _room, _score in all_rows if view in together]
+        chosen = set(spread(firsts, n_views))
+    return [view for view in first_of if first_of[view] in chosen]
 
 
 def spread(view_rooms: Iterable[tuple[str, str, float]], n_views: int) -> list[str]:

@@ -180,7 +180,10 @@ def _extra(name: str, work: Work) -> object:
         found = ["diffuse"] * bool(work.layers_of("light")) + ["things blur"] * blurred
         return found or None
     if name == "develop":
-        return _extra_of_develop(work)
+        extra, shot = _extra_of_develop(work), work.recipe.shot(work.view_id or "")
+        # Stills of a rig share its drawn camera; once only a camera called right did.
+        is_alike = shot.frame is not None or shot.eye in ("", "right")
+        return extra if is_alike else ["camera of the rig", extra]
     if name == "cameras":
         chosen = _extra_of_cameras(work.recipe.cameras)
         # Stereo pairs tell of their rig.

@@ -21,7 +21,7 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import Bools
 from pbrs_farm.core.camera import Camera, Intrinsics, View
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.core.house import House, Room
+from pbrs_farm.core.house import House
 from pbrs_farm.core.layers import LAYER
 from pbrs_farm.core.lighting import ALL_MODES
 from pbrs_farm.core.recipe import Recipe, picture_groups
@@ -29,7 +29,7 @@ from pbrs_farm.crash_notes import note_step
 from pbrs_farm.formats.cameras_json import cameras_json
 from pbrs_farm.formats.illuminance_json import illuminance_json
 from pbrs_farm.formats.layer_file import layer_bytes
-from pbrs_farm.formats.marker import Marker, read_marker
+from pbrs_farm.formats.marker import read_marker
 from pbrs_farm.formats.radiance_exr import FILE as RADIANCE_EXR
 from pbrs_farm.formats.radiance_exr import radiance_exr
 from pbrs_farm.formats.serialise import json_bytes
@@ -38,34 +38,15 @@ from pbrs_farm.prepare.finished_house import finished_house
 from pbrs_farm.raycast.variant import llvm_of_variant
 from pbrs_farm.run import plan
 from pbrs_farm.run.develop_step import view_histogram
-from pbrs_farm.run.house_cache import CachedHouse
 from pbrs_farm.run.light_checkpoint import LightCheckpoint
 from pbrs_farm.run.step_cache import Outcome, StepOutput, Work, required_source, run_unless_done
+from pbrs_farm.run.view_setup import ViewSetup, cached_house, marker_of_house, view_setup
 from pbrs_farm.transport.scene_tables.material_rows import max_albedo
 
 if TYPE_CHECKING:
     from pbrs_farm.selection.quality import ViewPlace
     from pbrs_farm.transport.light_result import LightResult
     from pbrs_farm.truth.optical_flow import OtherTime, Relation
-
-
-def _cached_house(work: Work) -> CachedHouse:
-    """The house of this process, loaded anew when its house step was done anew."""
-    digest = work.inputs.get("house") or _marker_of_house(work, "house").digest
-    return work.house_cache.get(work.store, work.recipe, work.house_id, digest)
-
-
-def _marker_of_house(work: Work, step: str) -> Marker:
-    marker = read_marker(work.store, keys.marker_key(work.house_id, step))
-    if marker is None:
-        raise BadInput(work.house_id, step, "has not been done yet", hint="pbrs-farm step")
-    return marker
-
-
-def _view_at_size(work: Work, cached: CachedHouse) -> tuple[View, Camera]:
-    view = cached.view(work.view_id or "", work.inputs["cameras"])
-    image = work.recipe.image
-    return view, view.camera.with_size(image.width_px, image.height_px)
 
 
 def _house(work: Work) -> StepOutput:
@@ -101,7 +82,7 @@ def _cameras(work: Work) -> StepOutput:
     """cameras.json: around an object, else as the recipe's group `cameras` says."""
     from pbrs_farm.run.chosen_cameras import chosen_cameras
 
-    cached = _cached_house(work)
+    cached = cached_house(work)
     house = cached.house
     seed = camera_seed(work.house_id, work.recipe)
     if keys.is_object(work.house_id):
@@ -131,11 +112,6 @@ def _camera_output(views: Sequence[View], report: dict[str, Any], recipe: Recipe
     return StepOutput({"cameras.json": cameras_json(views, report)}, facts)
 
 
-def room_of(house: House, view: View) -> Room | None:
-    """The room a view belongs to; None for a camera outside every room, or around an object."""
-    return next((room for room in house.rooms if room.id == view.room_id), None)
-
-
 def camera_seed(house_id: str, recipe: Recipe) -> int:
     """The sampler's seed for a house under a recipe.
 
@@ -151,7 +127,7 @@ def _pairs(work: Work) -> StepOutput:
     from pbrs_farm.formats.pairs_parquet import FILE, pairs_parquet
     from pbrs_farm.truth.common_surface import pair_rows
 
-    cached = _cached_house(work)
+    cached = cached_house(work)
     views = list(cached.views(work.inputs["cameras"]).values())
     rows = [asdict(row) for row in pair_rows(views, cached.caster.first_hit)]
     return StepOutput({FILE: pairs_parquet(rows)}, {"n_pairs": len(rows)})
@@ -162,24 +138,23 @@ def _tracks(work: Work) -> StepOutput:
     from pbrs_farm.formats.tracks_npz import FILE, tracks_npz
     from pbrs_farm.truth.point_tracks import TrackFrame, point_tracks
 
-    cached = _cached_house(work)
-    views = cached.views(work.inputs["cameras"]).values()
-    film = sorted((v for v in views if v.frame is not None and not v.eye), key=_number_of_frame)
+    cached = cached_house(work)
+    views = cached.views(work.inputs["cameras"])
+    first = (view for view in views.values() if view.frame is not None and not view.shot.eye)
+    film = [ViewSetup(cached, view, views) for view in sorted(first, key=_number_of_frame)]
     if not film:
         return StepOutput({}, {"n_points": 0})
 
-    def frame(view: View) -> TrackFrame:
-        _view, camera = _view_at_size(replace(work, view_id=view.id), cached)
+    def frame(setup: ViewSetup) -> TrackFrame:
         return TrackFrame(
-            camera, view.time_s or 0.0, lambda: cached.at(view.time_s).caster.hit_record(camera),
-            lambda: cached.at(view.time_s).caster.first_hit,
+            setup.camera, setup.view.time_s or 0.0, lambda: setup.now.caster.hit_record(setup.camera),
+            lambda: setup.now.caster.first_hit,
         )  # fmt: skip
 
     moving, seed = cached.moving, keys.seed(work.house_id, "tracks", work.recipe.seed)
-    tracks = point_tracks(
-        [frame(view) for view in film], moving.moving_faces, moving.face_motions, seed
-    )
-    file = tracks_npz(tracks, [view.id for view in film])
+    frames = [frame(setup) for setup in film]
+    tracks = point_tracks(frames, moving.moving_faces, moving.face_motions, seed)
+    file = tracks_npz(tracks, [setup.view.id for setup in film])
     return StepOutput({FILE: file}, {"n_points": len(tracks.points), "n_frames": len(film)})
 
 
@@ -192,9 +167,8 @@ def _truth(work: Work) -> StepOutput:
     from pbrs_farm import truth
 
     # Cast one ray through each pixel's centre: all labels come from this record (rule 8).
-    cached = _cached_house(work)
-    view, camera = _view_at_size(work, cached)
-    now = cached.at(view.time_s)
+    setup = view_setup(work)
+    view, camera, now = setup.view, setup.camera, setup.now
     caster, house = now.caster, now.house
     hit = caster.hit_record(camera)
     # Derive the layers that every view has, and the table of what is seen.
@@ -202,17 +176,16 @@ def _truth(work: Work) -> StepOutput:
     table = truth.view_table(hit.item, house, camera, cut_outs=caster.cut_outs)
     if house.motions and view.time_s is not None:
         table["motion"] = truth.motion_table(house, view.time_s)
-    room = room_of(house, view)
-    if room is not None:
-        table["layout"] = truth.layout_table(room, camera, hit.depth_z)
+    if setup.room is not None:
+        table["layout"] = truth.layout_table(setup.room, camera, hit.depth_z)
     # Add the layers that were asked for; those behind glass cast once more without it.
     layers = work.layers_of("truth")
     if layers:
-        seed = keys.seed(work.house_id, view.id, "truth", work.recipe.seed)
-        partners, times = _partners(work, cached, view, table)
+        seed = view.shot.seed(work.house_id, "truth", work.recipe.seed, per="view")
+        partners, times = _partners(setup, layers, table)
         inputs = truth.LabelInputs(
             hit, house, now.geometry, camera,
-            lambda skip: caster.hit_record(camera, skip_faces=skip), cached.textures, seed,
+            lambda skip: caster.hit_record(camera, skip_faces=skip), setup.house.textures, seed,
             partners, caster.first_hit, times, max_albedo(work.recipe),
         )  # fmt: skip
         arrays |= truth.optional_layers(layers, inputs)
@@ -228,72 +201,63 @@ def _truth(work: Work) -> StepOutput:
 
 
 def _partners(
-    work: Work, cached: CachedHouse, view: View, table: dict[str, Any]
+    setup: ViewSetup, layers: Sequence[str], table: dict[str, Any]
 ) -> tuple[dict[Relation, Camera], dict[Relation, OtherTime]]:
     """The cameras of the partners that the layers need, and the house then, where it has moved.
 
     They are written into the table.
     """
-    needed = {LAYER[name].partner for name in work.layers_of("truth")} - {""}
+    needed = {LAYER[name].partner for name in layers} - {""}
     if not needed:
         return {}, {}
     from pbrs_farm.truth.optical_flow import OtherTime, partner_table, partners_of
 
-    found = partners_of(view, cached.views(work.inputs["cameras"]))
-    kept = {relation: other for relation, other in found.items() if relation in needed}
-    image = work.recipe.image
-    cameras = {r: o.camera.with_size(image.width_px, image.height_px) for r, o in kept.items()}
-    table["partners"] = partner_table(kept, cameras)
+    partners = {r: v for r, v in partners_of(setup.view, setup.views).items() if r in needed}
+    cameras = {relation: setup.at_size(view) for relation, view in partners.items()}
+    table["partners"] = partner_table(partners, cameras)
     times: dict[Relation, OtherTime] = {}
-    for relation, other in kept.items():
-        if cached.house.motions and other.time_s != view.time_s:
+    house, time_s = setup.house, setup.view.time_s
+    for relation, view in partners.items():
+        if house.house.motions and view.time_s != time_s:
             # Frames of a sequence have times.
+            assert time_s is not None
             assert view.time_s is not None
-            assert other.time_s is not None
-            moves = cached.moving.face_motions(view.time_s, other.time_s)
-            times[relation] = OtherTime(cached.at(other.time_s).caster.first_hit, *moves)
+            moves = house.moving.face_motions(time_s, view.time_s)
+            times[relation] = OtherTime(house.at(view.time_s).caster.first_hit, *moves)
     return cameras, times
 
 
 def _opengl(work: Work, mode: str) -> StepOutput:
-    cached = _cached_house(work)
-    view, camera = _view_at_size(work, cached)
-    rasterizer = cached.rasterizer_at(view.time_s)
+    setup = view_setup(work)
+    rasterizer = setup.house.rasterizer_at(setup.view.time_s)
     # Light by three fixed lights (OpenGL-DL) or by the lamps (OpenGL-IL).
     draw = rasterizer.render_dl if mode == "opengl_dl" else rasterizer.render_il
-    rgb = draw(camera)
+    rgb = draw(setup.camera)
     if keys.is_object(work.house_id):
-        rgb = np.where(_missed(cached, camera), np.uint8(0), rgb)
-    png = layer_bytes(mode, rgb, cached.house.source.attribution)
+        rgb = np.where(_missed(setup), np.uint8(0), rgb)
+    png = layer_bytes(mode, rgb, setup.house.house.source.attribution)
     return StepOutput({LAYER[mode].file: png}, {"renderer": rasterizer.name})
 
 
-def _missed(cached: CachedHouse, camera: Camera) -> Bools:
+def _missed(setup: ViewSetup) -> Bools:
     """(H, W, 1) bool: nothing is seen; of an object without context such pixels are 0."""
-    return np.asarray(cached.caster.item_buffer(camera) == 0)[..., None]
+    return np.asarray(setup.house.caster.item_buffer(setup.camera) == 0)[..., None]
 
 
 def _light(work: Work) -> StepOutput:
     """radiance.exr: both light groups (and each lamp) as linear images, with the denoiser's guides."""
-    from pbrs_farm.run.view_light import blurred, light_seed, noise_anchors, pilot_of_view
     from pbrs_farm.transport.lamp_layers import layer_name
 
-    # Render; the seed knows all that changes the picture and nothing else.
-    cached = _cached_house(work)
-    view, camera = _view_at_size(work, cached)
-    views = cached.views(work.inputs["cameras"])
-    if work.recipe.blur.is_on:
-        camera = blurred(camera, view, views, work.recipe.blur, cached.at(view.time_s).caster)
-    digest = work.recipe.picture_digest(*plan.STEPS["light"].groups)
-    seed = light_seed(view, work.house_id, digest)
-    # Go on from what a killed render of this step has kept.
+    setup = view_setup(work)
+    view = setup.view
+    # Resume from the checkpoint of a killed render of this step.
     unfinished = keys.unfinished_key(work.house_id, "light", view.id)
     checkpoint = LightCheckpoint(work.store, unfinished, work.digest, work.tell_share)
-    fields, pilot = work.recipe.light, pilot_of_view(view, views, camera, work.house_id, digest)
-    scene, anchors = cached.light_scene_at(view.time_s), noise_anchors(view, views, camera)
     layers = work.layers_of("light")
-    result = scene.render(
-        camera, view.room_id, fields, seed, checkpoint, pilot=pilot, anchors=anchors,
+    # The seed depends on everything that changes the picture and on nothing else.
+    result = setup.house.light_scene_at(view.time_s).render(
+        replace(setup.camera, blur=setup.blur), view.room_id, work.recipe.light,
+        setup.light_seed(view), checkpoint, pilot=setup.pilot, anchors=setup.anchors,
         splits_diffuse=bool(layers), shutter_s=work.recipe.blur.shutter_s,
     )  # fmt: skip
     # Name the images as the file does.
@@ -302,16 +266,14 @@ def _light(work: Work) -> StepOutput:
     images |= result.diffuse
     # Blacken what no ray hits: an object has no surroundings.
     if keys.is_object(work.house_id):
-        missed = _missed(cached, camera)
+        missed = _missed(setup)
         images = {name: np.where(missed, np.float32(0), image) for name, image in images.items()}
-    exr = radiance_exr(images, attribution=cached.house.source.attribution)
-    facts = _facts_of_light(work, cached, view, result) | ({"layers": layers} if layers else {})
+    exr = radiance_exr(images, attribution=setup.house.house.source.attribution)
+    facts = _facts_of_light(work, setup, result) | ({"layers": layers} if layers else {})
     return StepOutput({RADIANCE_EXR: exr}, facts, unfinished)
 
 
-def _facts_of_light(
-    work: Work, cached: CachedHouse, view: View, result: LightResult
-) -> dict[str, Any]:
+def _facts_of_light(work: Work, setup: ViewSetup, result: LightResult) -> dict[str, Any]:
     """What view.json says of a view's light."""
     from pbrs_farm.transport.illuminance import darkness_of_room
     from pbrs_farm.transport.light_result import darkness_of_picture
@@ -319,7 +281,8 @@ def _facts_of_light(
     facts = {**result.facts, "noise": result.noise}
     if result.spp:  # Metropolis counts mutations instead
         facts["spp"] = result.spp
-    scene = cached.light_scene_at(view.time_s)
+    cached, room = setup.house, setup.room
+    scene = cached.light_scene_at(setup.view.time_s)
     variant = scene.variant
     facts |= {"n_nonfinite": result.n_nonfinite, "variant": variant}
     if llvm := llvm_of_variant(variant):
@@ -331,10 +294,9 @@ def _facts_of_light(
         rows = facts["lamps"]
         facts["lamps"] = [row | {"name": items[row["instance"] - 1].name} for row in rows]
     # Repeat the room's row of illuminance.json.
-    room = room_of(cached.house, view)
     dark = [darkness_of_picture(result)]
     if room is not None:
-        illuminance = _marker_of_house(work, "illuminance").facts
+        illuminance = marker_of_house(work, "illuminance").facts
         facts["floor_lux"] = illuminance["floor_lux"].get(room.id)
         facts["warnings"] = illuminance["warnings"].get(room.id, [])
         dark += [darkness_of_room(room, facts["floor_lux"])] if facts["floor_lux"] else []
@@ -349,7 +311,7 @@ def _illuminance(work: Work) -> StepOutput:
     """illuminance.json: the mean illuminance of every room's floor by each light group."""
     from pbrs_farm.transport.illuminance import illuminance_record
 
-    cached = _cached_house(work)
+    cached = cached_house(work)
     seed = keys.seed(work.house_id, "floor_lux", work.recipe.seed)
     lux = cached.light_scene.floor_lux(cached.house, seed=seed)
     # Give the views of a room its row through the marker's facts.
@@ -366,18 +328,13 @@ def _develop(work: Work) -> StepOutput:
     """The PNGs of the light modes."""
     from pbrs_farm.run.develop_step import develop_step
 
-    def walk() -> tuple[CachedHouse, Mapping[str, View]]:
-        cached = _cached_house(work)
-        return cached, cached.views(_marker_of_house(work, "cameras").digest)
-
-    return develop_step(work, walk)
+    return develop_step(work, lambda: view_setup(work))
 
 
 def _view(work: Work) -> StepOutput:
     """view.json and histogram.json: what the other steps of the view have said and made."""
-    cached = _cached_house(work)
-    view = cached.view(work.view_id or "", work.inputs["cameras"])
-    facts = _facts_of_view(work)
+    setup = view_setup(work)
+    view, facts = setup.view, _facts_of_view(work)
     digest = work.recipe.digest(*picture_groups())
     description = view_description(
         view, work.house_id, facts, recipe_digest=digest, versions=versions()
@@ -386,14 +343,12 @@ def _view(work: Work) -> StepOutput:
     # Without any picture there is nothing to select by.
     rendered = [m for m in ALL_MODES if m.value in facts or (m.groups and "develop" in facts)]
     if rendered:
-        house = cached.house
-        room = room_of(house, view)
-        name = room.name if room is not None else ""
+        name = setup.room.name if setup.room is not None else ""
         place: ViewPlace = {
             "house": work.house_id, "view": view.id, "room": view.room_id, "room_type": name,
         }  # fmt: skip
         files["histogram.json"] = view_histogram(
-            work.store, place, rendered, description, house.notes, work.recipe.histogram
+            work.store, place, rendered, description, setup.house.house.notes, work.recipe.histogram
         )
     return StepOutput(files)
 

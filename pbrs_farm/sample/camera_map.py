@@ -146,7 +146,7 @@ def _level_marks(
         if len(room.polygon)
     ]
     # A walk is one line; of its frames a few say where they look.
-    own = [view for view in views if view.room_id in rooms and not view.eye]
+    own = [view for view in views if view.room_id in rooms and not view.shot.eye]
     frames = [view for view in own if view.frame is not None]
     marks += _walk(frames, panel)
     for view in own:

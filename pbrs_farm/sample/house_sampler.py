@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 
-from pbrs_farm.core import keys
 from pbrs_farm.core.camera import RigPlace, View
 from pbrs_farm.core.frames import OPENCV_FROM_OPENGL
 from pbrs_farm.core.house import House, geometry_from_house
@@ -114,16 +113,16 @@ def add_rig_views(views: Iterable[View], rig: RigFields | None) -> tuple[View, .
     """
     if rig is None:
         return tuple(views)
-    return tuple(_rig_view(view, rig, camera) for view in views for camera in rig.cameras)
+    cameras = tuple(zip(rig.eyes, rig.cameras, strict=True))
+    return tuple(_rig_view(view, rig, *camera) for view in views for camera in cameras)
 
 
-def _rig_view(view: View, rig: RigFields, camera: RigCamera) -> View:
+def _rig_view(view: View, rig: RigFields, eye: str, camera: RigCamera) -> View:
     # Both frames turn from OpenCV's axes, which the rig has, to OpenGL's.
     moved = OPENCV_FROM_OPENGL @ camera.rig_from_camera @ OPENCV_FROM_OPENGL
-    eye = "" if camera is rig.cameras[0] else camera.name
     return replace(
         view,
-        id=keys.rig_view_id(view.id, eye),
+        id=view.shot.partner(eye=eye).id,
         camera=replace(view.camera, world_from_camera=view.camera.world_from_camera @ moved),
         rig=RigPlace(rig.name, camera.name, view.id, camera.rig_from_camera),
     )

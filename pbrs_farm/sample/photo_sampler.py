@@ -16,12 +16,12 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import F32
 from pbrs_farm.core.camera import Camera, Intrinsics, View
 from pbrs_farm.core.classes import NYU13_NAMES
 from pbrs_farm.core.house import Geometry, House, Room
 from pbrs_farm.core.recipe import CameraFields
+from pbrs_farm.core.shot import view_id
 from pbrs_farm.sample.camera_report import REJECTIONS, RoomReport, SectorReport, Verdict
 from pbrs_farm.sample.candidates import grid_candidates
 from pbrs_farm.sample.eye_probes import EnclosureLimits, ItemCounter, count_items, enclosure_limits
@@ -150,7 +150,7 @@ class PhotoSampler:
         seen = [self._at_full_size[scored.room.id, number] for number in chosen]
         return [
             View(
-                id=keys.view_id(scored.room.id, sector, k if per_sector > 1 else None),
+                id=view_id(scored.room.id, sector, k if per_sector > 1 else None),
                 room_id=scored.room.id,
                 sector=sector,
                 camera=camera,

@@ -12,11 +12,11 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import F32, F64, Bools
 from pbrs_farm.core.camera import Intrinsics, View
 from pbrs_farm.core.house import Geometry, House, Room
 from pbrs_farm.core.recipe import CameraFields
+from pbrs_farm.core.shot import view_id
 from pbrs_farm.geometry.plan_surfaces import room_shape
 from pbrs_farm.sample import paper_rules, released_rules
 from pbrs_farm.sample.camera_report import REJECTIONS, RoomReport, SectorReport, Verdict
@@ -224,7 +224,7 @@ class RoomSampler:
         # List every object in the view, whatever the score count_items.
         columns = object_columns(self.house)
         return View(
-            id=keys.view_id(self.room.id, sector, k if several else None),
+            id=view_id(self.room.id, sector, k if several else None),
             room_id=self.room.id,
             sector=sector,
             camera=camera,

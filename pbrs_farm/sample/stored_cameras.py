@@ -9,10 +9,10 @@ from dataclasses import replace
 import numpy as np
 import shapely
 
-from pbrs_farm.core import keys
 from pbrs_farm.core.camera import Camera, Intrinsics, View
 from pbrs_farm.core.house import House, Room
 from pbrs_farm.core.recipe import CameraFields
+from pbrs_farm.core.shot import view_id
 from pbrs_farm.geometry.plan_surfaces import room_shape
 from pbrs_farm.sample.eye_probes import ItemCounter, count_items
 from pbrs_farm.sample.view_score import object_columns
@@ -69,7 +69,7 @@ def views_from_cameras(
         room = known.get(room_id or "") or room_of(house, camera)
         place = (OUTSIDE if room is None else room.id, sector_of(camera, fields.n_sectors))
         k = used[place] = used.get(place, -1) + 1
-        views.append(View(keys.view_id(*place, k), *place, camera, origin))
+        views.append(View(view_id(*place, k), *place, camera, origin))
     # Count what each sees, as the sampler does.
     for part, rows in count_items(counter, [v.camera for v in views], len(house.items)):
         score = rows[:, columns].sum(1)

@@ -14,6 +14,7 @@ from pbrs_farm.core.camera import Camera, View
 from pbrs_farm.core.errors import PbrsError
 from pbrs_farm.core.house import House
 from pbrs_farm.core.recipe import CameraFields, LensFields, RigFields
+from pbrs_farm.core.shot import Shot, view_id
 from pbrs_farm.core.table import Table
 from pbrs_farm.run.chosen_cameras import with_lens
 from pbrs_farm.sample.camera_report import CameraReport
@@ -141,7 +142,7 @@ def viewpoint_of(camera: Camera, house: House, fields: CameraFields) -> Viewpoin
     i = camera.intrinsics
     numbers = [*np.asarray(camera.world_from_camera).ravel().tolist(), i.fx, i.fy, i.cx, i.cy]
     mark = keys.digest(numbers, i.width_px, i.height_px, i.lens.table())[:8]
-    view = View(f"{keys.view_id(room_id, sector)}_{mark}", room_id, sector, camera, "given")
+    view = View(f"{view_id(room_id, sector)}_{mark}", room_id, sector, camera, "given")
     return Viewpoint(view)
 
 
@@ -152,7 +153,7 @@ def film_viewpoints(
     return [
         Viewpoint(
             replace(
-                one.view, id=keys.frame_id(k), origin="given", score=0.0, objects={}, frame=k,
+                one.view, id=Shot.of_frame(k).id, origin="given", score=0.0, objects={}, frame=k,
                 time_s=from_s + k / fps, rig=None,
             )
         )

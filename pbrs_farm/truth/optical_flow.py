@@ -13,7 +13,6 @@ from typing import Any, Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import F32, F64, I32, I64, Bools, FirstHit, HitRecord
 from pbrs_farm.core.camera import Camera, View
 from pbrs_farm.core.frames import opencv_world_from_camera, transform_points
@@ -209,7 +208,7 @@ def partners_of(view: View, views: Mapping[str, View]) -> dict[Relation, View]:
     # Frames are numbered; those of each camera of a rig are a sequence of their own.
     neighbours: tuple[tuple[Relation, int], ...] = (("next", 1), ("previous", -1))
     for relation, step in neighbours:
-        neighbour = views.get(keys.rig_view_id(keys.frame_id(view.frame + step), view.eye))
+        neighbour = views.get(view.shot.partner(step).id)
         if neighbour is not None:
             found[relation] = neighbour
     return found

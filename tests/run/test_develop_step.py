@@ -14,6 +14,7 @@ from pbrs_farm.formats.radiance_exr import FILE, radiance_exr
 from pbrs_farm.run import develop_step
 from pbrs_farm.run.house_cache import CachedHouse, HouseCache
 from pbrs_farm.run.step_cache import Work
+from pbrs_farm.run.view_setup import ViewSetup
 from pbrs_farm.store.memory_store import MemoryStore
 from pbrs_farm.transport.develop.mode_pictures import LinearAovs
 
@@ -52,7 +53,8 @@ def test_a_panorama_is_exposed_alike_wherever_earlier_frames_are_cut(
         work = Work(
             store, recipe_from_name("fast", LAG | lens), "home", HouseCache(), view_id="now"
         )
-        found = develop_step.develop_step(work, lambda: (cast(CachedHouse, None), views))
+        setup = ViewSetup(cast(CachedHouse, None), views["now"], views)
+        found = develop_step.develop_step(work, lambda: setup)
         return float(found.facts["mlt_ol"]["exposure"])
 
     def spread(lens: dict[str, str]) -> float:

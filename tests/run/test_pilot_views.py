@@ -7,12 +7,12 @@ import pytest
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.camera import Camera, Intrinsics, View
-from pbrs_farm.core.recipe import RepairFields, recipe_from_name
+from pbrs_farm.core.recipe import Recipe, RepairFields, recipe_from_name
 from pbrs_farm.core.rig_fields import stereo_rig
 from pbrs_farm.read.builtin.builtin_home import builtin_home
 from pbrs_farm.repair import repair
 from pbrs_farm.run.house_cache import CachedHouse, decoded_textures
-from pbrs_farm.run.view_light import light_seed, noise_anchors, pilot_of_view, pilot_view
+from pbrs_farm.run.view_setup import ViewSetup
 from pbrs_farm.sample.house_sampler import add_rig_views
 from pbrs_farm.store import MemoryStore
 from pbrs_farm.transport.light_scene import LightScene
@@ -28,21 +28,35 @@ def views() -> dict[str, View]:
     return {view.id: view for view in add_rig_views(frames, stereo_rig(0.065))}
 
 
+SMALL = {"light.spp": "4", "image.width_px": "24", "image.height_px": "18"}
+FAST = recipe_from_name("fast")
+
+
+def setup_of(view: View, every: dict[str, View], recipe: Recipe = FAST) -> ViewSetup:
+    return ViewSetup(CachedHouse(MemoryStore(), recipe, "home", ""), view, every)
+
+
 def test_ten_frames_have_one_pilot_left_and_right_apart() -> None:
     every = views()
-    leads = {pilot_view(view, every).id for view in every.values()}
-    assert leads == {f"frame_000{n}{side}" for n in ("00", "10") for side in ("", "_right")}
+    pilots = [pilot for v in every.values() if (pilot := setup_of(v, every).pilot)]
+    # Two cameras, and of each all frames but the first of ten.
+    assert len(pilots) == 2 * (9 + 1)
+    places = {(round(float(pilot.camera.eye[0]), 4), pilot.seed) for pilot in pilots}
+    firsts = [every[f"frame_000{n}{side}"] for n in ("00", "10") for side in ("", "_right")]
+    assert places == {
+        (round(float(v.camera.eye[0]), 4), setup_of(v, every).light_seed(v)) for v in firsts
+    }
 
 
 def test_a_view_that_is_no_frame_has_its_own() -> None:
     alone = View("0_0_1", "0_0", 1, next(iter(views().values())).camera)
-    assert pilot_of_view(alone, {alone.id: alone}, alone.camera, "home", "") is None
+    assert setup_of(alone, {alone.id: alone}).pilot is None
 
 
 def test_whichever_frame_is_rendered_first_changes_no_picture(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    recipe = recipe_from_name("preview", {"light.spp": "4"})
+    recipe = recipe_from_name("preview", SMALL)
     house, _report = repair(builtin_home(), RepairFields())
     sky = CachedHouse(MemoryStore(), recipe, house.id, "").sky
     every = views()
@@ -55,8 +69,7 @@ def test_whichever_frame_is_rendered_first_changes_no_picture(
         scene = LightScene.load(house, decoded_textures(house)[0], recipe, sky)
         return {
             v.id: scene.render(
-                v.camera, "0_0", recipe.light, 7,
-                pilot=pilot_of_view(v, every, v.camera, house.id, ""),
+                v.camera, "0_0", recipe.light, 7, pilot=setup_of(v, every, recipe).pilot,
             ).indoor
             for v in order
         }  # fmt: skip
@@ -69,26 +82,27 @@ def test_whichever_frame_is_rendered_first_changes_no_picture(
 
 def test_frames_of_an_eye_have_one_seed_and_other_views_their_own() -> None:
     every = views()
-    assert len({light_seed(view, "home", "x") for view in every.values()}) == 2
+    setup = setup_of(every["frame_00000"], every)
+    assert len({setup.light_seed(view) for view in every.values()}) == 2
     alone = View("0_0_1", "0_0", 1, every["frame_00000"].camera)
-    assert light_seed(alone, "home", "x") == keys.seed("home", "0_0_1", "light", "x")
+    seed = keys.seed("home", "0_0_1", "light", setup.light_digest)
+    assert setup.light_seed(alone) == seed
 
 
 def test_a_camera_that_stands_still_sees_its_noise_again() -> None:
     every = views()
     still = every["frame_00000"].camera
     every["frame_00001"] = replace(every["frame_00001"], camera=still)
-    recipe = recipe_from_name("preview", {"light.spp": "4"})
+    recipe = recipe_from_name("preview", SMALL)
     house, _report = repair(builtin_home(), RepairFields())
     sky = CachedHouse(MemoryStore(), recipe, house.id, "").sky
     scene = LightScene.load(house, decoded_textures(house)[0], recipe, sky)
     first, second = (
         scene.render(
-            still, "0_0", recipe.light, light_seed(view, house.id, ""),
-            pilot=pilot_of_view(view, every, still, house.id, ""),
-            anchors=noise_anchors(view, every, still),
+            still, "0_0", recipe.light, setup.light_seed(setup.view),
+            pilot=setup.pilot, anchors=setup.anchors,
         ).indoor
-        for view in (every["frame_00000"], every["frame_00001"])
+        for setup in (setup_of(every[f"frame_0000{k}"], every, recipe) for k in (0, 1))
     )  # fmt: skip
     # A share of the points goes over to the next anchor: one of the frames from one to the next.
     same = float((first == second).all(-1).mean())
@@ -99,4 +113,4 @@ def test_a_camera_that_stands_still_sees_its_noise_again() -> None:
 def test_a_view_that_is_no_frame_has_no_anchors() -> None:
     every = views()
     alone = View("0_0_1", "0_0", 1, every["frame_00000"].camera)
-    assert noise_anchors(alone, every | {alone.id: alone}, alone.camera) is None
+    assert setup_of(alone, every | {alone.id: alone}).anchors is None

@@ -170,7 +170,7 @@ def test_right_views_stand_a_baseline_to_the_right_and_keep_their_frame() -> Non
     pair = views()
     right = pair["frame_00001_right"]
     assert right.rig is not None
-    assert (right.frame, right.eye, right.rig.instant) == (1, "right", "frame_00001")
+    assert (right.frame, right.shot.eye, right.rig.instant) == (1, "right", "frame_00001")
     np.testing.assert_allclose(right.camera.eye, [0.165, 0, 0], atol=1e-12)
     assert add_rig_views([right], None) == (right,)
 

@@ -13,6 +13,7 @@ from pbrs_farm.board.root_reader import RootReader
 from pbrs_farm.core import keys
 from pbrs_farm.core.errors import PbrsError
 from pbrs_farm.core.layers import LAYERS
+from pbrs_farm.core.shot import room_of_id
 from pbrs_farm.core.shown_text import MAX_MESSAGE, shown
 
 LAYER_BIT: Final = {layer.name: 1 << k for k, layer in enumerate(LAYERS)}
@@ -80,7 +81,7 @@ def _view_row(
     facts: dict[str, Any] = {}
     if "view.json" in files:
         facts = reader.json_object(keys.view_key(house, view, "view.json"))
-    room = str(facts.get("room") or view.rpartition("_")[0])
+    room = str(facts.get("room") or room_of_id(view, rooms))
     warnings = facts.get("warnings")
     texts = [shown(w, MAX_MESSAGE) for w in warnings] if isinstance(warnings, list) else []
     return ViewRow(

@@ -13,7 +13,6 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.export.chosen_view import Choice, ChosenView, intrinsics_of, require_lens
 from pbrs_farm.export.form import Convention, ViewForm
 from pbrs_farm.export.sequences import pose_opencv, required_picture
-from pbrs_farm.formats.view_json import eye_of, instant_of
 
 _STEP_PX: Final = 16  # between the pixels of a view that give points
 _NO_POINT: Final = ("0.5 0.5 -1",)  # what a view sees that sees no surface: a pixel of no point
@@ -38,7 +37,7 @@ def write_colmap(views: list[ChosenView], out: Path, _choice: Choice) -> None:
             picture = required_picture(view, "colmap")
             (out / house / "images" / f"{view.id}.png").write_bytes(view.data(picture))
             # Cameras of a rig are sensors of their own, also where they are alike.
-            key = eye_of(view.facts), _camera_line(view)
+            key = view.shot.eye, _camera_line(view)
             camera = cameras.setdefault(key, len(cameras) + 1)
             sensors.append(camera)
             pixels, lines = _points_of(view, picture)
@@ -67,11 +66,11 @@ def _rig_lines(views: list[ChosenView], sensors: list[int]) -> tuple[list[str], 
     """
     instants: dict[str, list[tuple[int, int, ChosenView]]] = {}
     for image, (view, sensor) in enumerate(zip(views, sensors, strict=True), start=1):
-        instants.setdefault(instant_of(view.facts), []).append((image, sensor, view))
+        instants.setdefault(view.shot.first.id, []).append((image, sensor, view))
     rigs: dict[str, int] = {}
     frames: list[str] = []
     for number, taken in enumerate(instants.values(), start=1):
-        taken.sort(key=lambda row: (eye_of(row[2].facts) != "", row[1]))
+        taken.sort(key=lambda row: (row[2].shot.eye != "", row[1]))
         rig_from_first = _rig_from_camera(taken[0][2])
         line = f"{len(taken)} CAMERA {taken[0][1]}"
         for _image, sensor, view in taken[1:]:

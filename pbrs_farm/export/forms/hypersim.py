@@ -34,7 +34,6 @@ from pbrs_farm.export.sequences import pose_opencv
 from pbrs_farm.formats import hypersim
 from pbrs_farm.formats.radiance_exr import FILE as RADIANCE_EXR
 from pbrs_farm.formats.radiance_exr import radiance_from_exr
-from pbrs_farm.formats.view_json import eye_of
 from pbrs_farm.images import jpeg_from_array
 from pbrs_farm.regular_files import MAX_SCENE_BYTES, read_regular
 from pbrs_farm.run.relight import linear_aovs
@@ -93,7 +92,7 @@ def _trajectories(views: Iterable[ChosenView]) -> list[list[ChosenView]]:
     """The views by camera: those that are no frames, frames of a walk; each camera of a rig apart."""
     found: dict[tuple[bool, str], list[ChosenView]] = {}
     for view in views:
-        key = ("frame" in view.facts, eye_of(view.facts))
+        key = ("frame" in view.facts, view.shot.eye)
         found.setdefault(key, []).append(view)
     for (is_frame, _eye), own in found.items():
         if is_frame:

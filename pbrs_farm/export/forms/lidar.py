@@ -24,7 +24,6 @@ from pbrs_farm.export.chosen_view import Choice, ChosenView
 from pbrs_farm.export.export_homes import stored_house
 from pbrs_farm.export.form import Convention, ViewForm
 from pbrs_farm.export.sequences import pose_opencv
-from pbrs_farm.formats.view_json import eye_of
 from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.run.house_cache import decoded_textures
 from pbrs_farm.truth.lidar import LIDARS, LidarScan, LidarSensor, lidar_scan
@@ -56,7 +55,7 @@ def write_lidar(views: list[ChosenView], out: Path, choice: Choice) -> None:
     camera alone.
     """
     scanner = choice.of(LidarOptions).scanner
-    first_views = [view for view in views if not eye_of(view.facts)]
+    first_views = [view for view in views if not view.shot.eye]
     for house_id in dict.fromkeys(view.house.id for view in first_views):
         house_views = [view for view in first_views if view.house.id == house_id]
         _write_scans(out / house_id, house_views, scanner)

@@ -10,7 +10,6 @@ from typing import Final
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import F64, Bools, FirstHit
 from pbrs_farm.core.camera import Camera, Intrinsics, View
 from pbrs_farm.core.errors import BadInput
@@ -18,6 +17,7 @@ from pbrs_farm.core.frames import OPENCV_FROM_OPENGL
 from pbrs_farm.core.house import Geometry, House, ItemKind
 from pbrs_farm.core.mesh import triangle_corners, unit_normals
 from pbrs_farm.core.recipe import CameraFields
+from pbrs_farm.core.shot import Shot
 from pbrs_farm.sample.stored_cameras import OUTSIDE, room_of, sector_of
 
 MAX_ROWS: Final = 100_000
@@ -147,7 +147,7 @@ def trajectory_views(
         room = room_of(house, camera)
         views.append(
             View(
-                keys.frame_id(number),
+                Shot.of_frame(number).id,
                 OUTSIDE if room is None else room.id,
                 sector_of(camera, fields.n_sectors),
                 camera,

@@ -11,11 +11,11 @@ from typing import Final
 import numpy as np
 from scipy import ndimage
 
-from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import F64, I64, FirstHit
 from pbrs_farm.core.camera import Camera, Intrinsics, View
 from pbrs_farm.core.house import Geometry, House
 from pbrs_farm.core.recipe import CameraFields
+from pbrs_farm.core.shot import Shot
 from pbrs_farm.sample.camera_source import Sampling
 from pbrs_farm.sample.stored_cameras import OUTSIDE, sector_of
 from pbrs_farm.sample.walks.camera_shake import Shake, shake
@@ -105,7 +105,7 @@ def _views_of_walk(
         camera = Camera(intrinsics, pose)
         views.append(
             View(
-                keys.frame_id(number),
+                Shot.of_frame(number).id,
                 house.rooms[k].id if k >= 0 else before,
                 sector_of(camera, fields.n_sectors),
                 camera,

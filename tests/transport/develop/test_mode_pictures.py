@@ -2,10 +2,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from pbrs_farm.core import keys
 from pbrs_farm.core.optics_fields import SENSOR_PRESETS
 from pbrs_farm.core.picture_cameras import CAMERAS, ERRING
 from pbrs_farm.core.recipe import ToneFields, recipe_from_name
+from pbrs_farm.core.shot import Shot
 from pbrs_farm.transport.develop.mode_pictures import LinearAovs, denoise_aovs, wanted_exposures
 from pbrs_farm.transport.develop.tone_mapping import (
     add_glare,
@@ -169,13 +169,17 @@ def test_drawn_cameras_are_of_all_kinds_and_of_a_variant_another_each() -> None:
     assert len({plain.camera_of("h", "0_0_1", n).tone for n in range(1, 9)}) > 4
 
 
-def test_frames_of_a_clip_and_both_eyes_have_one_camera() -> None:
+def test_frames_of_a_clip_and_all_cameras_of_a_rig_have_one_camera() -> None:
     recipe = recipe_from_name("fast", {"tone.camera": "drawn"})
-    frames = {recipe.camera_of("h", keys.frame_id(k)) for k in range(9)}
+    frames = {recipe.camera_of("h", Shot.of_frame(k).id) for k in range(9)}
     assert len(frames) == 1
-    assert recipe.camera_of("h", "0_1_2") == recipe.camera_of(
-        "h", keys.rig_view_id("0_1_2", "right")
-    )
+    pair = recipe_from_name("fast", {"tone.camera": "drawn", "cameras.stereo_m": "0.1"})
+    assert recipe.camera_of("h", "0_1_2") == pair.camera_of("h", "0_1_2_right")
+    rig = '{"cameras": [{"name": "front"}, {"name": "back"}, {"name": "far_back"}]}'
+    three = recipe_from_name("fast", {"tone.camera": "drawn", "rig": rig})
+    for first in ("0_1_2", "frame_00004"):
+        of_rig = {three.camera_of("h", f"{first}{eye}") for eye in ("", "_back", "_far_back")}
+        assert of_rig == {recipe.camera_of("h", first)}
     others = {recipe.camera_of(h, v) for h in "gh" for v in ("0_1_2", "0_1_3", "0_1_4", "0_1_5")}
     assert len(others) > 4
 
