@@ -1,8 +1,8 @@
-"""What a plugin is written with: the names of this module, and those of `pbrs_farm`, stay from version to version.
+"""The stable names for plugins: they stay from version to version, as do those of `pbrs_farm`.
 
-Everything else in the package may move or change with any version. docs/plugins.md says what each kind
-of plugin gives; examples/plugins has a package of each. A name that must go is kept for one minor
-version, in which its use warns, and the changelog says what replaces it.
+Everything else in the package may move or change with any version. docs/plugins.md describes each kind of
+plugin; examples/plugins has a package of each. A removed name is kept for one minor version with a warning,
+and the changelog names its replacement.
 
     from pbrs_farm.plugin import BadHouse, Format, House
 

@@ -46,7 +46,7 @@ def triple(values: NDArray[np.floating]) -> tuple[float, float, float]:
 
 
 class SurfacePoints(NamedTuple):
-    """What only some layers read of the points that a hit record's rays hit; 0 = nothing."""
+    """Properties of the hit points that only some layers read; 0 = nothing."""
 
     position_world: NDArray[np.float32]  # (H, W, 3) metres
     shading_normal_world: UnitVectors  # (H, W, 3) interpolated, turned towards the camera
@@ -55,7 +55,7 @@ class SurfacePoints(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class HitRecord:
-    """What the ray through each pixel's centre hits first: the one source of every label (rule 8)."""
+    """First hit of the ray through each pixel's centre: the one source of every label (rule 8)."""
 
     face: NDArray[np.int32]  # (H, W) index into Geometry.faces, -1 = nothing
     item: ItemBuffer  # (H, W) instance id, 0 = nothing

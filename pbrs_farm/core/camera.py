@@ -1,7 +1,7 @@
 """Intrinsics, cameras and views; frozen values, no effects. The one place that makes rays.
 
 Inside the package a camera has OpenGL axes: x right, y up, looking along -z. Pixel (row 0,
-column 0) is top left and its centre lies at (0.5, 0.5).
+column 0) is top left with its centre at (0.5, 0.5).
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ PAPER_HFOV_RAD = 2 * 0.5534
 DEFAULT_SIZE: Final = (640, 480)
 """Width and height of pictures, pixels: of recipes that say none."""
 
-_OTHER_SIZE: Final = 0.2  # share that a principal point lies off the middle: no lens is so far off
-_SAME_SHARE: Final = 0.1  # of each other, two that are alike
+_OTHER_SIZE: Final = 0.2  # maximum offset of a principal point from the middle, share of the size
+_SAME_SHARE: Final = 0.1  # tolerance between two equal shares
 
 _FLIP: Final[F64] = np.diag(OPENCV_FROM_OPENGL)[:3]  # OpenGL's axes <-> OpenCV's
 
@@ -71,8 +71,7 @@ class Intrinsics:
     def zoomed(self, factor: float) -> Intrinsics:
         """The focal length times factor: above 1 a narrower field of view.
 
-        Size, principal point and lens stay: the picture is cut narrower about its principal point.
-        Not for panoramas, whose K says how the whole sphere lies on the pixels.
+        Size, principal point and lens stay. Not for panoramas, whose K maps the whole sphere to the pixels.
         """
         return replace(self, fx=self.fx * factor, fy=self.fy * factor)
 
@@ -109,9 +108,9 @@ def intrinsics_from_k(size: tuple[int, int] | None, k: Any, hfov_deg: float) -> 
     """Intrinsics of a picture of (width, height) from K (3, 3), or from a field of view.
 
     size: None = DEFAULT_SIZE, with a field of view alone. With K the field of view is ignored; without
-    it pixels are square and hfov_deg lies between 0 and 175. Raises BadInput for a size below 1 pixel,
-    such a field of view, a K that is not (3, 3) finite numbers or has a skew or a focal length that is
-    not positive, and a K of a picture of another size. The lens is a pinhole.
+    it pixels are square and hfov_deg is between 0 and 175. Raises BadInput for a size below 1 pixel, for
+    such a field of view, for a K that is not (3, 3) finite numbers or has a skew or a focal length that is
+    not positive, and for a K of another picture size. The lens is a pinhole.
     """
     if size is None and k is not None:
         raise BadInput("camera", "size", "is missing", hint="the size of the pictures K is of")
@@ -132,10 +131,10 @@ def intrinsics_from_k(size: tuple[int, int] | None, k: Any, hfov_deg: float) -> 
 
 
 def _check_size_of_k(width: int, height: int, cx: float, cy: float) -> None:
-    """Refuse a K whose principal point is the middle of a picture that is larger or smaller.
+    """Refuse a K whose principal point is the middle of a larger or smaller picture.
 
-    Off the middle by equal shares of width and height: a picture that was cut has others. So has one
-    whose width and height were mixed up: turned round it fits.
+    Then its offsets are equal shares of width and height. Cropped pictures have other offsets, and so have
+    pictures with width and height swapped, for which the swapped size fits.
     """
     across, down = 2 * cx / width, 2 * cy / height
     is_scaled = abs(across - down) < _SAME_SHARE * across
@@ -148,10 +147,10 @@ def _check_size_of_k(width: int, height: int, cx: float, cy: float) -> None:
 
 @dataclass(frozen=True, slots=True)
 class CameraBlur:
-    """What light alone shows of a camera: an aperture, and motion while the shutter is open."""
+    """Aperture, and motion while the shutter is open; for light only."""
 
     aperture_radius_m: float = 0.0  # of the entrance pupil; 0 = all depths are sharp
-    focus_m: float = 1.0  # depth_z that is sharp
+    focus_m: float = 1.0  # depth_z in focus
     # World frame, while the picture is taken: from the opening for the first row to the closing for
     # the last; the turn about the axis through the eye.
     velocity_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -159,7 +158,7 @@ class CameraBlur:
     # Shares of that time: each row is open for so long, and the last row opens so much after the first.
     open_share: float = 1.0
     rolling_share: float = 0.0
-    middle_share: float = 0.0  # from mid-shutter to the middle of the part that is looked at
+    middle_share: float = 0.0  # from mid-shutter to the middle of the rendered part
 
     def part(self, begin: float, end: float) -> CameraBlur:
         """The same camera while a part of its shutter's time passes, from share begin to share end."""
@@ -221,10 +220,9 @@ class Camera:
     ) -> Camera:
         """A camera at eye that looks at target, world metres, y up.
 
-        size: (width, height) in pixels; without it pictures have the size of the home's recipe.
-        hfov_deg: full horizontal field of view, unless K (3 x 3, pixels of the size given, x right, y
-        down) is given. Raises BadInput for a target at the eye, an up vector along the view, a K that
-        is none or of another size.
+        size: (width, height) in pixels; default: that of the home's recipe. hfov_deg: full horizontal field
+        of view, unless K (3 x 3, pixels of the given size, x right, y down) is given. Raises BadInput for a
+        target at the eye, an up vector along the view, an invalid K or one of another size.
 
             >>> Camera.look_at((1, 1.5, 2), (3, 1.5, 2), size=(640, 480), hfov_deg=70).towards.tolist()
             [1.0, 0.0, 0.0]
@@ -247,8 +245,8 @@ class Camera:
     ) -> Camera:
         """A camera from a (4, 4) pose with OpenCV's axes: x right, y down, z forward; metres, y up.
 
-        size, hfov_deg and K as of look_at. Raises BadInput for a pose that is no rigid motion, a K that
-        is none or of another size.
+        size, hfov_deg and K as of look_at. Raises BadInput for a pose that is not rigid, an invalid K or one
+        of another size.
 
             >>> Camera.from_opencv(np.diag([1, -1, -1, 1]), size=(64, 48)).eye.tolist()
             [0.0, 0.0, 0.0]
@@ -319,7 +317,7 @@ class Camera:
 
     @property
     def blind(self) -> Mask | None:
-        """(H, W) bool: the pixel has no ray (outside a fisheye's circle); None: every one has.
+        """(H, W) bool: the pixel has no ray (outside a fisheye's circle); None if every pixel has one.
 
         >>> Camera.look_at((0, 0, 0), (0, 0, -1)).blind is None
         True
@@ -362,7 +360,7 @@ class Camera:
 
 
 def camera_of_recipe(camera: Camera, width_px: int, height_px: int) -> Camera:
-    """The camera at the size of a recipe's pictures if it has none of its own, with square pixels."""
+    """The camera at its size, else at the size of a recipe's pictures, with square pixels."""
     if camera.has_own_size:
         return camera
     hfov_rad = 2 * math.atan(0.5 * camera.intrinsics.width_px / camera.intrinsics.fx)
@@ -438,7 +436,7 @@ class View:
     camera: Camera
     # "sampled", "stored" (placed by the home's author), "file" (the user's), "walk", "trajectory"
     origin: str = "sampled"
-    score: float = 0.0  # the sampler's; 0 where there is none
+    score: float = 0.0  # of the sampler; 0 without one
     objects: dict[int, int] = field(default_factory=dict)  # instance id -> pixels when scored
     frame: int | None = None  # number in a sequence, from 0
     time_s: float | None = None  # of that frame

@@ -1,7 +1,7 @@
-"""Furniture, things and surface pictures to dress a home with: Catalogue > Piece, Shape, Picture; no effects.
+"""Furniture, clutter and surface pictures to dress a home with: Catalogue > Piece, Shape, Picture; no effects.
 
-A shape stands in the piece's own frame: metres, the middle of its base at the origin, x to its
-right, y up, its front towards +z. What hangs on a wall has its back at z = 0 and grows to +z.
+The frame of a shape: metres, origin at the middle of its base, x to its right, y up, its front towards
++z. Shapes for walls have their back at z = 0 and extend to +z.
 """
 
 from __future__ import annotations
@@ -32,11 +32,11 @@ class Place(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Piece:
-    """One thing of a catalogue, as its entry describes it; its shape is loaded when it is used."""
+    """An entry of a catalogue; its shape is loaded at its first use."""
 
     id: str  # unique in the catalogue: `<library>#<its id there>`, `generated#<family>`
     name: str
-    group: str  # what it is: "chair", "table_lamp", "book"; docs/dress/catalogue.md lists all
+    group: str  # its kind: "chair", "table_lamp", "book"; docs/dress/catalogue.md lists all
     place: Place
     nyu40: int
     size: tuple[float, float, float]  # width, depth, height in metres
@@ -45,14 +45,14 @@ class Piece:
     creator: str = ""
     licence: str = ""  # "CC0", "CC-BY 3.0"
     of_set: str = ""  # pieces of one set are sold together; "" = it goes with any
-    low_m: float = 0.0  # of its base above the floor, where its library hangs it; 0 = it stands
+    low_m: float = 0.0  # height of its base on a wall, by its library; 0 = not hung
 
     @property
     def held_by(self) -> Place:
-        """What holds it: the place where it belongs, or a wall where its library hangs it there.
+        """Its support: the place of its group, or a wall if its library hangs it there.
 
-        Ask this, not `place`, where a thing is put: a cupboard that its library hangs 1.4 m up
-        belongs to the floor by its group, yet needs a wall.
+        Use this, not `place`, to put a piece: a cupboard that its library hangs 1.4 m up belongs to the floor
+        by its group, yet needs a wall.
         """
         hangs = self.low_m > 0 and self.place in (Place.FLOOR, Place.SURFACE)
         return Place.WALL if hangs else self.place
@@ -115,10 +115,9 @@ class Catalogue:
         return tuple(p for p in self.pieces if p.group in groups)
 
     def shape(self, piece: Piece) -> Shape | None:
-        """The piece's shape, loaded once; None where its model cannot be used.
+        """The piece's shape, loaded once; None if its model is unusable.
 
-        A failure is remembered too: a model that cannot be used is not read again. What it returns
-        is shared, so nothing may write into its arrays.
+        The result is shared: do not write into its arrays.
         """
         if piece.id not in self._shapes:
             self._shapes[piece.id] = self.load(piece)
@@ -126,4 +125,4 @@ class Catalogue:
 
 
 EMPTY = Catalogue((), lambda _piece: None, "empty")
-"""Nothing to dress with but what is generated."""
+"""A catalogue of generated pieces alone."""

@@ -1,7 +1,7 @@
-"""Calls from Python, checked where they are made: a wrong argument is one line that names it.
+"""Checks of calls from Python: a wrong argument is one line that names it.
 
-No effects but warnings. What the public names of the package take is in their annotations; types of
-arguments that several of them share are here.
+No effects but warnings. The types of arguments are in the annotations of public functions; types that
+several functions share are here.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _PACKAGE: Final = __name__.partition(".")[0]
 
 @dataclass(frozen=True, slots=True)
 class Where:
-    """What an argument must be beside its type, in an annotation: words for it, and the test."""
+    """A condition on an argument beside its type, in an annotation: words for it, and the test."""
 
     words: str
     holds: Callable[[Any], bool]
@@ -75,7 +75,7 @@ Size = Annotated[
 ]
 Span = Annotated[tuple[float, float], Where("(least, most), two finite numbers", _is_span)]
 
-# What gives an object of a class, for who hands over its name.
+# Functions that give objects of a class, for callers who pass a name.
 _GIVEN_BY: Final = {
     "Home": 'pf.load("builtin") gives one',
     "Model": 'pf.model("mug.glb") gives one',
@@ -88,11 +88,11 @@ _GIVEN_BY: Final = {
 
 
 def checked_call(function: Callable[_P, _R]) -> Callable[_P, _R]:
-    """The function, for calls from Python: BadInput for an argument that is not as it is annotated.
+    """The function with checked arguments: BadInput for one that does not match its annotation.
 
-    The line names the function, the argument, what is expected and what was given. What is given is
-    passed on as it is. To a caller outside the package, options of the command line that errors from
-    further in name become arguments: "layers", not "--layers".
+    The line names the function, the argument, the expected and the given value. Arguments are not
+    converted. To a caller outside the package, options of the command line in later errors become
+    arguments: "layers", not "--layers".
 
         >>> pf.model(3)
         Traceback (most recent call last):
@@ -145,7 +145,7 @@ def check_fields(record: Any) -> None:
 
 
 def as_words(words: Any) -> Any:
-    """Names of layers or modes as a tuple, where one is given by itself too; what is no list as it is."""
+    """Names of layers or modes as a tuple, also of a single name; other values unchanged."""
     if isinstance(words, str):
         return (words,)
     return tuple(words) if isinstance(words, Iterable) else words
@@ -189,7 +189,7 @@ def _fits_many(value: Any, origin: type, inner: Any) -> bool:
     if isinstance(value, str | bytes | os.PathLike) or not isinstance(value, Iterable):
         return False
     if not issubclass(origin, Sequence):
-        # What can be read only once is left to whoever reads it.
+        # An iterator can be read only once: its reader checks it.
         return not isinstance(value, Collection) or all(_fits(v, inner) for v in value)
     is_array = isinstance(value, np.ndarray)
     return (is_array or isinstance(value, Sequence)) and all(_fits(v, inner) for v in value)
@@ -225,7 +225,7 @@ _WORDS: Final = {
 
 
 def words_of(hint: Any) -> str:
-    """What an annotation asks for, in words: "text or a path"."""
+    """An annotation in words: "text or a path"."""
     origin, inner = get_origin(hint), get_args(hint)
     if origin is Annotated:
         named = [one.words for one in inner[1:] if isinstance(one, Where)]
@@ -254,7 +254,7 @@ def _classes_of(hint: Any) -> list[type]:
 
 
 def _text_of(value: Any) -> str:
-    """A value as it may be written in a call, or its kind where that is long."""
+    """A value as Python text, or its kind if that is long."""
     text = " ".join(repr(value).split())
     if isinstance(value, np.ndarray) and value.size > 4:
         return f"an array of shape {value.shape}"
@@ -278,7 +278,7 @@ def _speak_python(error: PbrsError) -> None:
 
 
 def _in_python(text: str) -> str:
-    # A command that is quoted stays one.
+    # Leave quoted commands unchanged.
     parts = re.split(r"(`[^`]*`|pbrs-farm .*)", text.replace("--set ", ""))
     options = re.compile(r"(?<![\w-])--[a-z][a-z-]*")
     return "".join(

@@ -1,7 +1,7 @@
-"""JSON from outside: parsed, checked, and refused in one line of our own words; no effects.
+"""Parse and check JSON from outside, with errors of one line in our words; no effects.
 
-A reader of a file that others wrote says by a pydantic model what it expects. What `json` and
-pydantic say of a fault is translated here alone: the place in the file, and what is expected there.
+A reader states its expectations as a pydantic model. The messages of `json` and pydantic are translated
+here alone: the place in the file, and the expected value.
 """
 
 from __future__ import annotations
@@ -22,19 +22,18 @@ from pbrs_farm.core.shown_text import did_you_mean, hint_of_choice
 T = TypeVar("T")
 
 Finite = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-"""A number that stands as one in the file: no text, no true, no NaN."""
+"""A number of the file: no text, no true, no NaN."""
 
 _MOST_SHOWN: Final = 40  # characters of a value that does not fit
 _MOST_NAMES: Final = 12  # names of fields that a hint lists
 
 
 def json_from_bytes(data: bytes, file: object, *, error: type[BadInput] = BadHouse) -> Any:
-    """The JSON value in data; an error for text that is no JSON, NaN, or absurdly deep nesting.
+    """The JSON value in data; an error for text that is not JSON, NaN, or absurdly deep nesting.
 
-    Every failure is one `error` (BadHouse unless another is given) that names the file and, where
-    it is known, the line and column or the byte: empty text, text that is not UTF-8, NaN and
-    Infinity, numbers of absurdly many digits, and nesting beyond Python's stack. What the value
-    holds is not checked: that is `checked`'s work.
+    Every failure is one `error` that names the file and, if known, the line and column or the byte: empty
+    text, text that is not UTF-8, NaN and Infinity, numbers of absurdly many digits, and nesting beyond
+    Python's stack. `checked` checks the value.
     """
     if not data.strip():
         raise error(file, "", "no valid JSON: the text is empty")
@@ -73,9 +72,9 @@ def checked(
     error: type[BadInput] = BadInput,
     hint: str = "",
 ) -> T:
-    """The kind that a JSON value says, or bytes of JSON; an error naming file and place if none.
+    """Validate a JSON value, or bytes of JSON, as a kind; an error names file and place.
 
-    place: where the value stands in the file.  hint: for faults that have no better one.
+    place: of the value in the file. hint: for errors without a better one.
     """
     adapter: TypeAdapter[T] = kind if isinstance(kind, TypeAdapter) else _adapter_of(kind)
     try:
@@ -86,7 +85,7 @@ def checked(
         # Name the first fault: the others may follow from it.
         first = fault.errors(include_url=False)[0]
     if first["type"] == "json_invalid" and isinstance(data, bytes):
-        # Ask json for the place in a text that is none; it nests deeper than pydantic.
+        # json gives the place of a syntax error, and nests deeper than pydantic.
         json_from_bytes(data, file, error=error)
         raise error(file, "", "no valid JSON: nested too deeply", hint=hint)
     if first["type"] == "extra_forbidden":
@@ -145,10 +144,10 @@ _WANTED: Final = {
 
 
 def sentence(fault: ErrorDetails) -> str:
-    """What is wrong, of one fault that pydantic found, in words that say nothing of pydantic.
+    """One of pydantic's errors as a sentence of our own.
 
-    A fault of one of our own validators keeps its sentence; of pydantic's kinds the commonest have
-    sentences of ours, the others say what was expected and what was there instead.
+    Errors of our validators keep their sentence; common kinds of pydantic's have sentences here, others give
+    the expected and the actual value.
     """
     kind, facts = fault["type"], fault.get("ctx", {})
     if kind in ("value_error", "assertion_error"):
@@ -175,11 +174,10 @@ def _shown_value(value: object) -> str:
 
 
 def exactly(n: int, what: str = "numbers") -> BeforeValidator:
-    """In Annotated: a list of n values, named by what they are where it is none.
+    """In Annotated: a list or tuple of n values, called `what` in the error.
 
-    Put it before the item's own type, so that a list of the wrong length gives one sentence,
-    "expected 3 numbers", and not a fault for each value that is missing or too many. Lists and
-    tuples pass; what the values are is left to the type.
+    Put it before the item's own type, so that a list of the wrong length gives one sentence, "expected 3
+    numbers", and not an error for each missing or extra value. The type checks the values.
     """
 
     def check(value: object) -> object:

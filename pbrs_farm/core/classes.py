@@ -20,7 +20,7 @@ NYU40_NAMES: Final = (
     "lamp", "bathtub", "bag", "otherstructure", "otherfurniture", "otherprop",
 )  # fmt: skip
 
-# Each id by its name; "otherprop" is a thing of no class.
+# Each id by its name; "otherprop" has no class of its own.
 (
     WALL, FLOOR, CABINET, BED, CHAIR, SOFA, TABLE, DOOR, WINDOW, BOOKSHELF, PICTURE, COUNTER, BLINDS,
     DESK, SHELVES, CURTAIN, DRESSER, PILLOW, MIRROR, FLOOR_MAT, CLOTHES, CEILING, BOOKS, REFRIGERATOR,

@@ -1,7 +1,7 @@
 """Holes that the alpha of a picture cuts into a surface: leaves, lace, gratings; no effects.
 
-Labels, light and OpenGL ask the same thing: whether alpha, between the four nearest texels, is below
-the material's cutoff. `check` asks it by code of its own.
+Labels, light and OpenGL share the test: alpha, between the four nearest texels, is below the material's
+cutoff. `check` has its own code for it.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What a format of homes or plans says of itself: how its files are known, what they bring. No effects."""
+"""Description of a format of homes or plans: how its files are recognised, its contents. No effects."""
 
 from __future__ import annotations
 
@@ -10,10 +10,9 @@ from re import Pattern
 class DataFormat:
     """An entry of the table that `pbrs-farm inputs` lists; a format's package ends with its own.
 
-    A file is of a format by its suffix; a .json by its keys. Where files of other kinds bear the
-    suffix, too (`shared_suffixes`), `contains` tells them apart: in a folder such a file is a home
-    only where its head matches. Named on a command line it is tried all the same, so that the
-    reader can say what is wrong with it.
+    The suffix decides; for a .json its keys. If files of other kinds share the suffix (`shared_suffixes`),
+    `contains` checks the head: in a folder such a file is a home only if its head matches. A file named on a
+    command line is tried in any case, so that the reader can explain the problem.
     """
 
     title: str
@@ -21,7 +20,7 @@ class DataFormat:
     brings: str
     where: str  # one gets the data
     licence: str  # of the data
-    needs: str = ""  # what is installed for it, in words
+    needs: str = ""  # packages to install, in words
     library: str = ""  # the module without which it cannot be read
     order: int = 500  # in which formats are asked and listed, lowest first
     suffixes: tuple[str, ...] = ()
@@ -45,10 +44,9 @@ class DataFormat:
         )
 
     def has_keys(self, names: set[str]) -> bool:
-        """Whether a JSON file in which these names occur is of this format.
+        """True if a JSON file that contains these names is of this format.
 
-        The format lists alternative sets of keys; one set that is wholly among the names is enough.
-        Names are compared wherever in the file they occur, so a file of another format that happens
-        to have them is taken for this one.
+        The format lists alternative sets of keys; one complete set is enough. Names count anywhere in the file, so
+        a file of another format may match by chance.
         """
         return any(names.issuperset(keys) for keys in self.keys)

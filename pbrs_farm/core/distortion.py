@@ -46,11 +46,10 @@ def distorted(points: F64, coefficients: Coefficients) -> F64:
 
 
 def undistorted(points: F64, coefficients: Coefficients) -> F64:
-    """(N, 2) the inverse of distorted, by Newton's method; NaN where no undistorted point is.
+    """(N, 2) the inverse of distorted, by Newton's method; NaN without a solution.
 
-    Coefficients as of `distorted`. A point is NaN where Newton's method leaves a residual, where
-    the Jacobian is not positive definite, or where the solution lies beyond `largest_radius`: such
-    a point of the picture is seen by no ray. N may be 0.
+    Coefficients as of `distorted`. NaN if Newton's method leaves a residual, the Jacobian is not positive
+    definite, or the solution is beyond `largest_radius`: no ray meets such a point. N may be 0.
     """
     if not len(points):
         return points.copy()
@@ -98,20 +97,19 @@ def jacobian(points: F64, coefficients: Coefficients) -> tuple[F64, F64, F64]:
 
 
 def largest_radius(coefficients: Coefficients) -> float:
-    """The radius at z = 1 from which on the radial part runs back inwards; inf where it never does.
+    """The radius at z = 1 where the radial part begins to decrease; inf if it never does.
 
-    Only k1, k2 and k3 count, so with strong tangential terms the fold lies a little elsewhere:
-    `undistorted` judges that by the Jacobian as well.
+    Only k1, k2 and k3 count, so with strong tangential terms the fold differs a little: `undistorted` also
+    checks the Jacobian.
     """
     k1, k2, _p1, _p2, k3 = coefficients
     return math.sqrt(first_root((1.0, 3 * k1, 5 * k2, 7 * k3)))
 
 
 def first_root(polynomial: tuple[float, ...]) -> float:
-    """The least positive real root of the polynomial, constant first; inf where it has none.
+    """The least positive real root of the polynomial, constant first; inf without one.
 
-    The coefficients are those of 1, s, s^2 ... Roots with an imaginary part up to rounding count as
-    real; 0 does not count.
+    The coefficients are those of 1, s, s^2 ... Roots with an imaginary part up to rounding count as real.
     """
     roots = np.roots(polynomial[::-1])
     real = roots.real[(np.abs(roots.imag) < 1e-12 * (1 + np.abs(roots))) & (roots.real > 0)]
@@ -126,7 +124,7 @@ def _radius_before(radius: F64, coefficients: Coefficients) -> F64:
         s = r * r
         return np.asarray(r * (1 + s * (k1 + s * (k2 + s * k3))))
 
-    # Reach as far as the farthest point needs: a strong barrel needs more than its own radius.
+    # Cover the farthest point: a strong barrel needs more than its own radius.
     end, most = float(radius.max()), largest_radius(coefficients)
     while end < most and mapped(np.array([end]))[0] < radius.max() and end < 1e3:
         end = end * 1.5 + 1e-6

@@ -1,7 +1,7 @@
-"""What can be changed of a finished home, as values that travel: frozen, no effects.
+"""Edits of a finished home, as frozen values that travel; no effects.
 
-An edit names items by their ids and files by path and sha256, so that a worker elsewhere makes the
-same house or says why it cannot. prepare/apply_edits.py carries edits out, in their order.
+An edit names items by their ids and files by path and sha256, so that another worker makes the same house
+or says why it cannot. prepare/apply_edits.py carries edits out, in their order.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ class MoveItems(Record):
 
 
 class OpenJoints(Record):
-    """Open doors, drawers and lids, or shut them, as far as nothing stands in their way."""
+    """Open or close doors, drawers and lids, as far as no obstacle stops them."""
 
     do: Literal["open"] = "open"
     joints: tuple[tuple[str, str], ...]  # (item, part)
@@ -80,7 +80,7 @@ class OpenJoints(Record):
 
 
 class KeyJoints(Record):
-    """Let doors, drawers and lids open and shut over time, as far as nothing stands in their way."""
+    """Open and close doors, drawers and lids over time, as far as no obstacle stops them."""
 
     do: Literal["key_joints"] = "key_joints"
     joints: tuple[tuple[str, str], ...]  # (item, part)
@@ -104,7 +104,7 @@ class RecordBodies(Record):
 
 
 class StandAt(Record):
-    """Stop at a time: what moves stands there, for good."""
+    """Freeze all motion at a time."""
 
     do: Literal["at"] = "at"
     time_s: float
@@ -169,7 +169,7 @@ Edit = Annotated[
 
 
 class SavedHome(Record):
-    """A home with its edits as a file holds it: which home, how it is dressed, what is changed of it."""
+    """A home with its edits as a file holds it: the home, its dressing, its edits."""
 
     format: Literal["pbrs_farm home 1"] = "pbrs_farm home 1"
     home: str  # a word of a command line; files by their whole path
@@ -184,11 +184,7 @@ SUFFIX: Final = "-e"
 
 
 def edits_digest(edits: Sequence[Edit]) -> str:
-    """Digest of edits in their order, "" of none; where a file lies is no matter, its content is.
-
-    Two lists that read equal files from different folders have one digest, since sha256 of the
-    content is part of each edit. The order counts: later edits act on what earlier ones left.
-    """
+    """Digest of edits in their order, "" for none; the content of files counts, not their paths."""
     if not edits:
         return ""
     rows = [edit.model_dump(mode="json") for edit in edits]

@@ -1,7 +1,7 @@
-"""What a file is by its first bytes, whatever its name says: for messages of readers that cannot read it.
+"""The kind of a file by its first bytes, for messages of readers that cannot read it.
 
-No effects. A picture named .glb, an HTML page that was saved as .hdr or a pointer of Git LFS is
-named as what it is; a reader's own words ("no GLB file", "not UTF-8") would send people astray.
+No effects. For a picture named .glb, an HTML page saved as .hdr or a pointer of Git LFS, the reader's own
+words ("no GLB file", "not UTF-8") would mislead people.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ HEAD_BYTES: Final = 512
 
 
 class FileKind(NamedTuple):
-    """A kind of file: how it begins, what it is called, and what its files are named."""
+    """A kind of file: its first bytes, its name in messages, and its suffixes."""
 
     start: re.Pattern[bytes]
     words: str
@@ -70,7 +70,7 @@ _KINDS: Final = (
 
 
 def kind_of(data: bytes) -> FileKind | None:
-    """The kind of a file by its first HEAD_BYTES; None for text and for what is none of those known."""
+    """The kind of a file by its first HEAD_BYTES; None for text and for unknown kinds."""
     head = data[:HEAD_BYTES].removeprefix(b"\xef\xbb\xbf")
     return next((kind for kind in _KINDS if kind.start.match(head)), None)
 

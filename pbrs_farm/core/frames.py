@@ -59,7 +59,7 @@ def rotation_z(angle_rad: float) -> F64:
     return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]], np.float64)
 
 
-# Quarter turns that are exact: what stands upright lies with its top along +x, or along +z.
+# Exact quarter turns that lay an upright item with its top along +x, or along +z.
 LYING_ALONG_X: F64 = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 LYING_ALONG_Z: F64 = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 
@@ -71,7 +71,7 @@ def is_flattening(matrix: F64) -> bool:
     vertices, millimetres within millimetres) has one of 1e-15, and is as good as any other.
     """
     if not np.isfinite(matrix).all():
-        return False  # what it moves is refused where it lands
+        return False  # the caller refuses a result with such numbers
     sizes = np.linalg.svd(np.asarray(matrix, np.float64), compute_uv=False)
     return bool(sizes[-1] <= _FLAT_SHARE * sizes[0])
 

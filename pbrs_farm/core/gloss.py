@@ -1,4 +1,4 @@
-"""What a material's surface mirrors: reflectance at right angles and roughness, as light and labels have it; no effects.
+"""Specular reflectance at right angles and roughness of a material, for light and labels; no effects.
 
 Kd, Ks and the Phong exponent, or glTF's roughness, become a clear coat or a metal of the GGX model
 (Walter et al. 2007; glTF 2.0, appendix B).
@@ -26,7 +26,7 @@ _MOST_MIRRORED: Final = 0.98
 
 
 class Coat(NamedTuple):
-    """What lies above a material's diffuse base, or a metal's own surface."""
+    """The coat above a material's diffuse base, or a metal's surface."""
 
     f0: F64  # (3,) linear, reflectance at right angles
     alpha: float  # GGX roughness, without the material's map
@@ -35,12 +35,12 @@ class Coat(NamedTuple):
 
 
 def coat_of(material: Material) -> Coat | None:
-    """The coat of a material that is no mirror and no glass; None where it is matte, or a lampshade.
+    """The coat of a material that is neither mirror nor glass; None for a matte one or a lampshade.
 
-    Ks is read as the strength of a clear coat, F0 = 0.08 Ks (0.04 = glass of index 1.5 at Ks
-    0.5), unless Ks is four times brighter than Kd: then the surface is a metal of reflectance Ks.
-    A material that names its roughness has a coat of F0 0.04 at least, and GGX alpha is the roughness
-    squared; of others it follows from the Phong exponent.
+    Ks is the strength of a clear coat, F0 = 0.08 Ks (0.04 = glass of index 1.5 at Ks 0.5), unless Ks is
+    four times brighter than Kd: then the surface is a metal of reflectance Ks. A material with a roughness
+    has a coat of F0 0.04 at least, and GGX alpha is the roughness squared; otherwise alpha follows from the
+    Phong exponent.
 
         >>> coat_of(Material("oak", roughness=0.5)).alpha
         0.25
@@ -65,7 +65,7 @@ def coat_of(material: Material) -> Coat | None:
 
 
 def mirror_reflectance(material: Material) -> F64:
-    """(3,) linear reflectance of a mirror: its Ks where that is bright."""
+    """(3,) linear reflectance of a mirror: its Ks if that is bright."""
     ks = linear_from_srgb(np.clip(np.nan_to_num(material.specular), 0, 1))
     tint = ks if ks @ LUMINANCE > 0.3 else np.full(3, _MIRROR_REFLECTANCE)
     return np.asarray(np.minimum(tint, _MOST_MIRRORED))

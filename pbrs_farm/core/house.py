@@ -1,8 +1,8 @@
 """House > Level > Room > Item > Surface, Material, Opening, LightPart, Motion; frozen values, no effects.
 
-Everything stands in the world frame: metres, right-handed, y up. Geometry is float32, already
-placed (no instancing), so that what is stored, labelled and rendered is the same bits.
-Structure (walls, floors, ceilings) are items like any other; their kind tells them apart.
+Everything is in the world frame: metres, right-handed, y up. Geometry is float32 and placed (no
+instancing): stored, labelled and rendered geometry has the same bits. Structure (walls, floors, ceilings)
+consists of items with their own kinds.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _LEAST_METAL: Final = 0.2  # reflectance, linear; the dullest metals have .4, di
 
 
 class ItemKind(StrEnum):
-    """What an item is to the pipeline; its label is Item.nyu40."""
+    """Role of an item in the pipeline; its label is Item.nyu40."""
 
     WALL = "wall"
     FLOOR = "floor"
@@ -136,7 +136,7 @@ class Surface:
     material: int  # index into House.materials
     uvs: F32 | None = None  # (V, 2) v up, repeat wrap
     normals: F32 | None = None  # (V, 3) unit shading normals; None = flat
-    part: str = ""  # of its item that it moves with (Joint.part); "" = the body, which stands still
+    part: str = ""  # moving part of its item (Joint.part); "" = the static body
 
     def __repr__(self) -> str:
         return f"Surface({self.name!r}, {len(self.faces):,} triangles, material {self.material})"
@@ -153,11 +153,10 @@ def corners_of_surfaces(surfaces: Iterable[Surface]) -> F64:
 
 
 def part_of(surface: Surface, faces: I32, name: str) -> Surface:
-    """Some faces of a surface with the vertices they use, as a surface of its own.
+    """Some faces of a surface with their vertices, as a new surface.
 
-    faces is (F, 3) int32 indices into the surface's vertices, with repetition allowed; vertices are
-    renumbered, those that no face uses are dropped. Material, texture coordinates and normals are
-    carried over.
+    faces: (F, 3) int32 indices into the surface's vertices, repetitions allowed. Vertices are renumbered
+    and unused ones dropped; material, texture coordinates and normals are kept.
     """
     used, numbers = np.unique(faces, return_inverse=True)
     return Surface(
@@ -207,7 +206,7 @@ class LightPart:
     position_end: tuple[float, float, float] | None = None  # other end of a line
     emitting: tuple[int, ...] = ()  # indices into Item.surfaces; repair adds a sphere where none do
     escape: float | None = None  # light output ratio: share that leaves the lamp; None = unmeasured
-    is_coloured: bool = False  # the source tells rgb_linear, also where it is white
+    is_coloured: bool = False  # the source gives rgb_linear, even if white
     is_bare: bool = False  # power is what its surfaces send out, not what leaves the lamp
 
 
@@ -216,23 +215,23 @@ Rows4 = tuple[float, float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class ModelPose:
-    """Which model an item is an instance of, and where that model's frame lies: a 6-D pose."""
+    """The model of which an item is an instance, and the pose of the model's frame: a 6-D pose."""
 
     model: str
     world_from_model: tuple[Rows4, Rows4, Rows4, Rows4]  # rigid; metres
 
 
 OUTSIDE: Final = "outside"
-"""Tag of an item that lies before the windows (furnishings/surroundings): seen, and no part of the home.
+"""Tag of an item before the windows (furnishings/surroundings), which is not part of the home.
 
-Light of rooms is made of what windows see of it; labels and pictures have it behind glass.
+It reflects light into the rooms; labels and pictures have it behind glass.
 """
 LIT: Final = "lit"
-"""Begins the name of a material of such an item that shines by itself: windows at night."""
+"""Prefix of the name of a self-luminous material of such an item: windows at night."""
 
 FLOATING: Final = "floating"
-"""Tag of an item that hangs in the air and touches nothing, put there to teach geometry
-(dress/floating.py): nothing holds it, and it stays where it is when things fall.
+"""Tag of an item in the air without support, added to teach geometry (dress/floating.py); it does not
+fall.
 """
 REMOVED: Final = "removed"
 """Tag of an item that an edit took away: without surfaces, it holds its place, so that the instance
@@ -240,17 +239,17 @@ ids of the others stay.
 """
 
 BOX_ONLY: Final = "box-only"
-"""Tag of an item without surfaces of which the source gives class and box alone.
+"""Tag of an item without surfaces, for which the source gives class and box alone.
 
-box: its axes are right, up, front (columns). A piece of furniture stands in for it (prepare/stand_ins.py).
+box: its axes are right, up, front (columns). prepare/stand_ins.py replaces the item by furniture.
 """
 FRONT_GIVEN: Final = "front-given"
-"""Tag beside BOX_ONLY: the box's front is the source's own, else it is guessed from what is near."""
+"""Tag beside BOX_ONLY: the source gives the box's front, which is otherwise guessed."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Item:
-    """A thing with one instance id and one class: a chair, a wall, a room's floor."""
+    """An object with one instance id and one class: a chair, a wall, a room's floor."""
 
     id: str  # unique in the house and stable
     name: str
@@ -259,7 +258,7 @@ class Item:
     surfaces: tuple[Surface, ...]
     nyu40: int = 0  # class 0..40, 0 = none
     source_class: str = ""  # the source's own name of its class: catalogue id or model id
-    room_id: str | None = None  # the room it stands in
+    room_id: str | None = None  # the room around it
     lights: tuple[LightPart, ...] = ()
     box: Box | None = (
         None  # oriented: the source's plan, of a repaired house the mesh's; None = along x, y, z
@@ -295,10 +294,9 @@ class Item:
 
     @property
     def is_outside(self) -> bool:
-        """It is no part of the home: it lies before its windows.
+        """True for an item before the windows.
 
-        Such items are only seen through windows: the camera search and exports of a home leave them
-        out.
+        Such items are only seen through windows: the camera search and exports of a home omit them.
         """
         return OUTSIDE in self.tags
 
@@ -427,14 +425,14 @@ class House:
     motions: tuple[Motion, ...] = ()  # of what moves with time: at most one a joint and one an item
 
     def level(self, level_id: str) -> Level:
-        """The level of that id; KeyError if there is none."""
+        """The level with an id; KeyError without one."""
         for level in self.levels:
             if level.id == level_id:
                 return level
         raise KeyError(level_id)
 
     def room(self, room_id: str) -> Room:
-        """The room of that id; KeyError if there is none."""
+        """The room with an id; KeyError without one."""
         for room in self.rooms:
             if room.id == room_id:
                 return room
@@ -495,7 +493,6 @@ def geometry_from_house(house: House, *, with_panes: bool = True) -> Geometry:
     for number, (instance, _item, _j, s) in enumerate(house.surfaces()):
         if not with_panes and house.materials[s.material].kind is MaterialKind.PANE:
             continue
-        # Surfaces without normals or texture coordinates have zeros there.
         v, f = len(s.positions), len(s.faces)
         positions.append(s.positions)
         normals.append(s.normals if s.normals is not None else np.zeros((v, 3), np.float32))

@@ -14,7 +14,7 @@ from typing import Final
 from pbrs_farm.core.errors import BadInput
 
 SPLITS: Final = ("train", "val", "test")
-# What keys.house_id and keys.dressed_id put behind a home's name.
+# Suffixes that keys.house_id and keys.dressed_id add to a home's name.
 _DIGEST_AND_VARIANT: Final = re.compile(r"(-[0-9a-f]{8})?(-d[0-9]+)?")
 
 
@@ -50,10 +50,10 @@ def shares_from_text(text: str) -> SplitShares:
 
 
 def home_of(house: str) -> str:
-    """The house's id without its digest and without its variant: `studio` of studio-1a2b3c4d-d3.
+    """The house's id without its digest and its variant: `studio` of studio-1a2b3c4d-d3.
 
-    Houses that are variants of one home go into one split by it: a network must not see in training
-    the walls that it is tested on. An id of another form is returned as it is.
+    Variants of one home go into one split: a network must not train on the walls of its test set. An id of
+    another form is returned unchanged.
     """
     match = re.fullmatch(r"(?P<home>.+?)" + _DIGEST_AND_VARIANT.pattern, house)
     return match["home"] if match else house

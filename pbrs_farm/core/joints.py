@@ -1,7 +1,7 @@
-"""What of a thing moves, and how: a Joint turns or slides one part of it; frozen values, no effects.
+"""Joints of items: a Joint turns or slides one part of an item; frozen values, no effects.
 
-A part is the surfaces of an item that have its name (Surface.part); what has none is the body, which
-stands still. Geometry is flattened (ARCHITECTURE.md): surfaces stand where the joint's value says.
+A part is the surfaces of an item with its name (Surface.part); surfaces without one form the static body.
+Geometry is flattened (ARCHITECTURE.md): surfaces are placed at the joint's value.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from pbrs_farm.core.arrays import F64, Matrix4, triple
 Triple = tuple[float, float, float]
 
 JOINTS_PROPERTY: Final = "pbrs_farm.joints"
-"""The property of a piece of a Sweet Home 3D file that tells the joints of its model, as JSON, in the
-model's frame. Its n-th joint moves the groups named `..._on_hinge_<n>` or `..._on_rail_<n>`.
+"""Property of a piece of a Sweet Home 3D file with the joints of its model, as JSON, in the model's
+frame. Its n-th joint moves the groups named `..._on_hinge_<n>` or `..._on_rail_<n>`.
 """
 
 
@@ -31,10 +31,10 @@ class JointKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Joint:
-    """One part of an item that moves against the item's body.
+    """A moving part of an item.
 
-    Values are measured from the shut state, 0: radians, anticlockwise about the axis, or metres
-    along it. `upper` is as far as it opens.
+    Values count from the closed state, 0: radians, anticlockwise about the axis, or metres along it.
+    `upper` is the fully open state.
     """
 
     part: str  # Surface.part of what moves; names the joint in its item
@@ -43,19 +43,16 @@ class Joint:
     axis: Triple  # unit
     upper: float
     lower: float = 0.0
-    value: float = 0.0  # where its surfaces stand
+    value: float = 0.0  # of its surfaces' present place
     mass_kg: float = 0.0  # of the part; 0 = nobody knows
 
     @property
     def share(self) -> float:
-        """How far it is open, 0..1: its value as a share of `upper`."""
+        """Its opening as a share of `upper`, 0..1."""
         return self.value / self.upper if self.upper else 0.0
 
     def motion(self, value: float) -> Matrix4:
-        """(4, 4) rigid: from where the part's surfaces stand to where they stand at a value.
-
-        The value is not held to the limits.
-        """
+        """(4, 4) rigid motion of the part from its present place to that at a value, without limits."""
         by, axis = value - self.value, np.array(self.axis)
         matrix = np.eye(4)
         if self.kind is JointKind.PRISMATIC:

@@ -24,7 +24,7 @@ RECIPE: Final = "recipe.json"
 RECIPE_REPLACED: Final = "recipe_replaced.json"  # there once another recipe was put in its place
 MANIFEST: Final = "manifest.jsonl"
 ATTRIBUTION: Final = "ATTRIBUTION.txt"
-DRESS: Final = "dress.json"  # of a house that was dressed
+DRESS: Final = "dress.json"  # of a dressed house
 ARTICULATION: Final = "articulation.json"  # of a view that has the layer `part`
 SELECTION: Final = "selection.json"
 # The folders of an output root that hold a folder per house and per object without context.
@@ -40,7 +40,7 @@ _RUN_NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,60}")
 
 @dataclass(frozen=True, slots=True)
 class HouseKey:
-    """What a key below a house's folder names: its file, a view's file, or a step's marker."""
+    """The parts of a key below a house's folder: of its file, a view's file, or a step's marker."""
 
     house: str
     file: str = ""  # below the house's or the view's folder; "" for a marker
@@ -85,8 +85,8 @@ def is_object(house: str) -> bool:
 def house_key(house: str, file: str = "") -> str:
     """Key of a house's file; of its folder, with a trailing slash, when file is "".
 
-    Objects lie below another folder than houses; the id tells which it is. The file may itself
-    contain slashes. `parse_house_key` is the inverse.
+    Objects have another folder than houses, by their id. The file may contain slashes. `parse_house_key` is the
+    inverse.
     """
     return f"{FOLDERS[is_object(house)]}/{house}/{file}"
 
@@ -102,28 +102,26 @@ def marker_name(step: str, view: str | None = None) -> str:
 
 
 def marker_key(house: str, step: str, view: str | None = None) -> str:
-    """Key of the marker that says a step is done.
+    """Key of the marker of a done step, with a view for steps of a view.
 
-    With a view for steps that are done view by view. Whoever asks whether a step is done looks for
-    this key, not for the files of the step.
+    The marker, not the files of a step, tells that it is done.
     """
     return house_key(house, f"done/{marker_name(step, view)}.json")
 
 
 def unfinished_key(house: str, step: str = "", view: str = "") -> str:
-    """Key of what a step under way has kept; of the folder of all, with a trailing slash, when step is "".
+    """Key of an unfinished step's checkpoint; of the folder of all, with a trailing slash, when step is "".
 
-    What lies there may be deleted: the step then begins again.
+    A checkpoint may be deleted: the step then begins again.
     """
     return house_key(house, f"unfinished/{step}.{view}.npz" if step else "unfinished/")
 
 
 def parse_house_key(key: str) -> HouseKey | None:
-    """What house_key, view_key or marker_key built the key of; None when none of them did.
+    """The parts of a key that house_key, view_key or marker_key built; None for any other key.
 
-    For a marker `file` is "" and `step` is set, `view` too where the marker is of one view. Keys of
-    the root (recipe.json, selection/) give None, and so does an object's id below the houses'
-    folder.
+    For a marker `file` is "" and `step` is set, and `view` too for a step of a view. Keys of the root
+    (recipe.json, selection/) give None, and so does an object's id below the houses' folder.
     """
     match = _HOUSE_KEY.fullmatch(key)
     if match is None or match["root"] != FOLDERS[is_object(match["house"])]:
@@ -133,11 +131,7 @@ def parse_house_key(key: str) -> HouseKey | None:
 
 
 def selection_key(run: str, ending: str) -> str:
-    """Key of a selection's "parquet", "jsonl" or "html"; BadInput for a name that is no file name.
-
-    Names of runs are of letters, digits, dots and dashes, since they become file names; anything
-    else could leave the folder.
-    """
+    """Key of a selection's "parquet", "jsonl" or "html"; BadInput for a name that could leave the folder."""
     if not _RUN_NAME.fullmatch(run):
         raise BadInput("--run", run, "a run's name holds letters, digits, dots and dashes")
     return f"selection/{run}.{ending}"
@@ -165,19 +159,14 @@ def sha256(data: bytes) -> str:
 
 
 def digest(*parts: Any) -> str:
-    """First 32 hex of the sha256 over the parts' canonical JSON.
-
-    The order of the parts counts. Anything that canonical_json takes may be a part; what is not
-    part of the digest does not make work be done again.
-    """
+    """First 32 hex of the sha256 over the parts' canonical JSON, in their order."""
     return sha256("\n".join(canonical_json(p) for p in parts).encode())[:32]
 
 
 def seed(*parts: str | int) -> int:
     """A 32-bit seed from names: seed(house, view, mode, recipe digest), rule 7.
 
-    Every random choice takes its seed from names: the same names give the same numbers on every
-    machine and in every order of work. Give each purpose a word of its own among the parts, or two
-    choices are correlated.
+    The same names give the same numbers on every machine and in every order of work. Give each purpose a
+    word of its own among the parts, or two choices are correlated.
     """
     return int(digest(*parts)[:8], 16)

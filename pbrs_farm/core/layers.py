@@ -13,10 +13,13 @@ from typing import Final, Literal, TypeAlias
 from pbrs_farm.core.errors import MachineFailed
 from pbrs_farm.core.plugins import plugins
 
-# How pages and films draw a layer. "picture": as it is. "classes": NYU40's colours. "ids": a colour
-# an id. "mask": light on dark. "depth": a ramp of depth in mm, "depth_m" in metres, "disparity" the
-# inverse. "flow", "flow_kitti": hue by direction. "high_byte": of 16 bits a channel. "range": each
-# channel scaled to what the picture has of it. "": it is no picture.
+# How pages and films draw a layer. "picture": unchanged. "classes": NYU40's colours. "ids": a
+# colour
+# per id. "mask": light on dark. "depth": a ramp of depth in mm, "depth_m" in metres, "disparity"
+# the
+# inverse. "flow", "flow_kitti": hue by direction. "high_byte": of 16 bits per channel. "range":
+# each
+# channel scaled to its range in the picture. "": not a picture.
 ShownAs: TypeAlias = Literal[
     "", "picture", "classes", "ids", "mask", "depth", "depth_m", "disparity", "flow", "flow_kitti",
     "high_byte", "range",
@@ -45,7 +48,7 @@ class Layer:
     optional: bool = False  # only when --layers names it, a plugin's picture tone.pictures
     # "next", "previous" or "stereo": the view without which there is no such file.
     partner: str = ""
-    # What a lens must have: "planar depth" along its axis, "rows" that correspond in a pair.
+    # Required of the lens: "planar depth" along its axis, "rows" that correspond in a pair.
     needs: str = ""
     shown_as: ShownAs = ""
     resized: Resized = "nearest"
@@ -54,7 +57,7 @@ class Layer:
     version: int = 1
     # Its pixels show the albedo, which the recipe's materials hold to a limit.
     shows_albedo: bool = False
-    # Layers that are written with it: without them it says nothing.
+    # Layers that are written with it, and without which it is useless.
     beside: tuple[str, ...] = ()
 
     @property
@@ -72,7 +75,7 @@ class Layer:
 
     @property
     def shown_title(self) -> str:
-        """What menus call it."""
+        """Its name in menus."""
         return self.title or self.name.replace("_", " ").capitalize()
 
 
@@ -178,7 +181,7 @@ _SEEN_THERE: Final = "in the other picture: 0 = seen, 128 = outside it, 255 = hi
 
 
 def _behind(what: str, of: str) -> tuple[Layer, ...]:
-    """Labels of what lies behind what is hit; of: the words of their unit."""
+    """Label layers for the second surface along the ray (behind glass or in a mirror); of: for their unit."""
 
     def layer(name: str, channels: str, dtype: str, nodata: str, shown_as: ShownAs) -> Layer:
         file = f"behind_{what}/{name}.png"
@@ -275,10 +278,10 @@ OWN_LAYERS: Final[tuple[Layer, ...]] = (
     *_intrinsic("", "all light"),
     *_intrinsic("_outdoor", "outdoor light"),
     *_intrinsic("_indoor", "indoor light"),
-    # What lies behind panes and glass objects.
+    # Surfaces behind panes and glass objects.
     optional_layer("glass", "Y", "uint8", "255 = glass or pane hit first", shown_as="mask"),
     *_behind("glass", "first hit that is no glass"),
-    # What mirrors show, where the picture shows it.
+    # Surfaces in mirrors, at their place in the picture.
     optional_layer("mirror", "Y", "uint8", "255 = mirror hit first", shown_as="mask"),
     *_behind("mirror", "of the image behind the mirror"),
     # Boundaries by their kind.
@@ -347,7 +350,7 @@ _VARIANTS: Final = {LAYER[f"mlt_il_ol.{n}"].file for n in range(1, MOST_VARIANTS
 LIGHT_LAYERS: Final = tuple(
     name + ending for ending in ("", "_outdoor", "_indoor") for name in ("shading", "residual")
 )
-"""Those of the names that --layers takes that are made of traced light."""
+"""The names of --layers that are made of traced light."""
 
 OPTIONAL: Final = tuple(
     x.name for x in LAYERS if x.optional and (x.step == "truth" or x.name in LIGHT_LAYERS)
@@ -356,9 +359,9 @@ OPTIONAL: Final = tuple(
 
 
 def layers_in_digest(names: Iterable[str], max_albedo: float) -> list[str]:
-    """What the digest of the step `truth` knows of these layers beside their names and plugins.
+    """Inputs of these layers for the digest of the step `truth`, beside their names and plugins.
 
-    max_albedo: what the recipe's materials hold the albedo to. A layer of version 1 adds nothing.
+    max_albedo: the recipe's limit of albedo. A layer of version 1 adds nothing.
     """
     known = [layer for layer in LAYERS if layer.name in set(names)]
     shown = [f"{layer.name} {max_albedo}" for layer in known if layer.shows_albedo]

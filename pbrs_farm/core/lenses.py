@@ -39,7 +39,7 @@ COEFFICIENTS: Final[Mapping[str, tuple[str, ...]]] = {
 
 @dataclass(frozen=True, slots=True)
 class Lens:
-    """How directions fall on the picture's plane; K then says where that is in pixels."""
+    """Projection of directions to the lens's plane, which K maps to pixels."""
 
     model: LensModel = "pinhole"
     coefficients: tuple[float, ...] = ()  # by COEFFICIENTS
@@ -105,7 +105,7 @@ class Lens:
             return equirect_of_directions(directions)
         if self.model == "cubemap":
             return cubemap_of_directions(directions)
-        # Only what lies before the camera, and within the fold, has a picture.
+        # Only directions before the camera and within the fold have an image.
         z = directions[:, 2:]
         with np.errstate(divide="ignore", invalid="ignore"):
             ideal = np.where(z > 1e-9, directions[:, :2] / z, np.nan)
@@ -126,11 +126,10 @@ PINHOLE: Final = Lens()
 
 
 def lens_from_table(table: Mapping[str, Any]) -> Lens:
-    """The lens that Lens.table wrote; KeyError, TypeError or ValueError when it is none.
+    """The lens that Lens.table wrote; KeyError, TypeError or ValueError for another table.
 
-    The table may carry other keys, which are ignored; a missing max_angle_rad is 180 degrees.
-    KeyError for a coefficient that is missing, ValueError for an unknown model or text that is no
-    number.
+    Other keys are ignored; a missing max_angle_rad is 180 degrees. KeyError for a missing coefficient,
+    ValueError for an unknown model or text that is not a number.
     """
     model = table["model"]
     if model not in COEFFICIENTS:

@@ -22,7 +22,7 @@ class Mode(StrEnum):
 
 
 class Group(StrEnum):
-    """Light transport is linear: each group is rendered by itself and modes are sums (rule 9)."""
+    """A light group. Light transport is linear: groups are rendered apart and modes are sums (rule 9)."""
 
     OUTDOOR = "outdoor"  # sky and sun
     INDOOR = "indoor"  # lamps
@@ -51,7 +51,7 @@ class LightForm(StrEnum):
 
 
 class PowerUnit(StrEnum):
-    """What the number LightPart.power means in the source."""
+    """Unit of the source's number LightPart.power."""
 
     SWEETHOME3D = "sweethome3d"  # power 0..1, 0.5 in every example lamp
     WATT = "watt"  # SUNCG: electric watts of an incandescent lamp

@@ -48,7 +48,7 @@ class MadeHome:
     furniture: bool = True
     storeys: int = 1
     plans: str = ""  # the family of its plan; "" = drawn by seed
-    offices: int = 0  # bedrooms that are offices
+    offices: int = 0  # number of bedrooms used as offices
 
     @property
     def word(self) -> str:
@@ -105,7 +105,6 @@ def made_homes(word: str) -> list[MadeHome]:
     BadInput also for a range longer than MAX_HOMES and for wishes that no home meets
     (`check_wishes`).
     """
-    # made:FIRST..LAST,key=value,...
     seeds, *options = word.removeprefix(PREFIX).split(",")
     first, last = _checked_range(word, seeds, MAX_SEED)
     if last - first >= MAX_HOMES:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pbrs_farm.core.arrays import F64, I64, Bools
 
 _TINY = 1e-300  # divides a zero vector to zero
-_ON_PLANE_M = 1e-8  # a corner nearer to a plane than this lies in it
+_ON_PLANE_M = 1e-8  # maximum distance of a corner in a plane, metres
 _PLACE_DIGITS: Final = 5  # corners that agree to 10 micrometres are one
 _CLOSED: Final = 0.95  # share of closed edges from which a mesh has an inside
 _NO_NORMAL = 100 * np.finfo(np.float64).eps  # of a face in a plane: twice its area, m2
@@ -157,8 +157,8 @@ def signed_volume(corners: F64, origin: F64) -> float:
 def closed_edge_share(places: NDArray[np.floating]) -> float:
     """Share of edges that an even number of triangles meets: 1 for a closed mesh, 0 for no mesh.
 
-    places: (F, 3, 3) corners, rounded by the caller so that corners of one place are equal.
-    Winding is not asked for; edges that begin and end in one place are none.
+    places: (F, 3, 3) corners, rounded by the caller so that corners of one place are equal. Winding does
+    not matter; edges of zero length do not count.
     """
     # Number the places, so that seams of texture and normals do not open the mesh.
     _, vertex = numbered_points(places.reshape(-1, 3))
@@ -171,9 +171,9 @@ def closed_edge_share(places: NDArray[np.floating]) -> float:
 def outside_area(corners: F64) -> float:
     """m2 of triangles (F, 3, 3) seen from outside: both sides of a mesh that is open.
 
-    A closed mesh counts once, since its inside cannot be seen; a curtain or a leaf counts from both
-    sides. Whether it is closed is judged by how many of its edges two faces share, with corners
-    rounded so that seams of textures do not open it.
+    A closed mesh counts once, since its inside cannot be seen; a curtain or a leaf counts from both sides. A
+    mesh is closed if two faces share most of its edges, with corners rounded so that seams of textures do
+    not open it.
     """
     area = float(face_areas(corners).sum())
     is_closed = closed_edge_share(np.round(corners.astype(np.float32), _PLACE_DIGITS)) > _CLOSED
@@ -181,10 +181,10 @@ def outside_area(corners: F64) -> float:
 
 
 def edges_are_paired(faces: NDArray[np.integer]) -> bool:
-    """Whether each directed edge of faces (F, 3) has its reverse, as often; True for no face.
+    """True if each directed edge of faces (F, 3) has its reverse, equally often; True for no face.
 
-    faces: numbers of places, so that corners of one place are equal. Edges that begin and end in
-    one place are none. Such a mesh is closed, and its winding agrees.
+    faces: numbers of places, equal for corners of one place. Edges of zero length do not count. Such a mesh
+    is closed, and its winding is consistent.
     """
     start, end = (faces[:, k].astype(np.int64) for k in ([0, 1, 2], [1, 2, 0]))
     n = int(faces.max(initial=0)) + 1
@@ -194,9 +194,9 @@ def edges_are_paired(faces: NDArray[np.integer]) -> bool:
 
 
 def clipped_to_box(corners: F64, low: F64, high: F64) -> F64:
-    """(G, 3, 3) what of the triangles (F, 3, 3) lies in the box low..high (3,), fronts kept.
+    """(G, 3, 3) the part of triangles (F, 3, 3) in the box low..high (3,), with their fronts.
 
-    A triangle in a side of the box is kept where its front faces outwards.
+    A triangle in a side of the box remains if its front faces outwards.
     """
     # Leave out most of them by their bounds, then cut by one side of the box after the other.
     least, most = triangle_bounds(corners)
@@ -209,12 +209,12 @@ def clipped_to_box(corners: F64, low: F64, high: F64) -> F64:
 
 
 def _cut(corners: F64, axis: int, sign: float, place: float) -> F64:
-    """What of the triangles (F, 3, 3) lies where sign times the coordinate exceeds that of place."""
+    """The part of triangles (F, 3, 3) where sign times the coordinate exceeds that of place."""
     height = sign * (corners[..., axis] - place)
     side = (height > _ON_PLANE_M).astype(np.int8) - (height < -_ON_PLANE_M).astype(np.int8)
     total, n_off = side.sum(1), np.abs(side).sum(1)
     is_kept, is_cut = total == n_off, (n_off >= 2) & (np.abs(total) <= 1)
-    # Keep what lies in the plane by its front.
+    # Keep triangles in the plane by their front.
     (flat,) = np.nonzero(n_off == 0)
     if len(flat):
         a, b, c = np.moveaxis(corners[flat], 1, 0)
@@ -254,7 +254,7 @@ def distances_to_triangles(points: F64, corners: F64) -> F64:
     has_area = _dot(normal, normal) > 0
     squared = np.maximum(_dot(normal, normal), _TINY)
 
-    # Go straight to the plane where the foot lies inside the triangle.
+    # The nearest point is the foot if that is inside the triangle.
     foot = normal * (_dot(a, normal) / squared)
     to_foot = foot - a
     u = _dot(_cross(to_foot, ac), normal) / squared

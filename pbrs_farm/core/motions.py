@@ -1,7 +1,7 @@
-"""What of a home moves with time: a Motion is a row of key values of one joint, or of one whole thing; frozen values, no effects.
+"""Motions of a home over time: a Motion holds key values of one joint, or of one whole item; frozen values, no effects.
 
-Geometry stands where things are at rest. A home's motions say how its parts lie at another time; between two
-keys values change evenly, before the first and after the last one they stay.
+Geometry is stored at rest. Between two keys values change linearly, before the first and after the last one they
+are constant.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ JOINT_VALUES, BODY_VALUES = 1, 7
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """How one part of an item moves, or all of it, over time.
+    """Motion of one part of an item, or all of it, over time.
 
-    A row of `values` for each of `times_s`, which ascend. Of a joint: its value, radians or metres
-    from shut. Of the whole item (`part` is ""): where its `pivot` lies, x, y, z in metres, and its turn
-    from rest about that as a unit quaternion w, x, y, z. A joint moves with the item that it is of.
+    A row of `values` for each of the ascending `times_s`. Of a joint: its value, radians or metres from the
+    closed state. Of the whole item (`part` is ""): its `pivot`, x, y, z in metres, and its turn from rest
+    about that as a unit quaternion w, x, y, z. A joint moves with its item.
     """
 
     item: str  # id of the item
@@ -34,7 +34,7 @@ class Motion:
 
     @property
     def is_of_joint(self) -> bool:
-        """Whether it moves a door, drawer or lid, not the whole thing."""
+        """True if it moves a door, drawer or lid, not the whole item."""
         return bool(self.part)
 
     def value_at(self, time_s: float) -> float:
@@ -45,7 +45,7 @@ class Motion:
         return (1 - share) * self.values[k][0] + share * self.values[k + 1][0]
 
     def matrix_at(self, time_s: float) -> Matrix4:
-        """(4, 4) rigid: from where a whole item stands at rest to where it is at a time."""
+        """(4, 4) rigid motion of a whole item from rest to a time."""
         k, share = self._place(time_s)
         row = np.array(self.values[k], np.float64)
         if share > 0:
@@ -67,7 +67,7 @@ class Motion:
 
 
 def fault_of_motion(motion: Motion) -> str:
-    """What is wrong with a motion by itself; "" where nothing is."""
+    """The error of a motion by itself; "" without one."""
     width = JOINT_VALUES if motion.is_of_joint else BODY_VALUES
     times = motion.times_s
     if not times or len(times) != len(motion.values):

@@ -33,9 +33,9 @@ def normals_from_picture(pixels: NDArray[np.uint8] | F32, scale: float) -> F32:
 def tangents(corners: F64, uvs: F64) -> tuple[F64, F64, Bools]:
     """(dp/du, side, whether both are defined) of triangles: (N, 3), (N,), (N,).
 
-    corners (N, 3, 3) in metres, uvs (N, 3, 2) with v up. dp/du is of any length. side is 1 where
-    the texture is seen as it is from the triangle's front, -1 where it is mirrored: dp/dv lies on
-    the side of cross(n, dp/du) times side. Neither is defined where the uvs span no area.
+    corners (N, 3, 3) in metres, uvs (N, 3, 2) with v up. dp/du is of any length. side is 1 if the texture is
+    not mirrored from the triangle's front, else -1: dp/dv points to the side of cross(n, dp/du) times side.
+    Neither is defined if the uvs span no area.
     """
     e1, e2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     a, b = uvs[:, 1] - uvs[:, 0], uvs[:, 2] - uvs[:, 0]
@@ -53,7 +53,7 @@ def perturbed_normals(normals: F64, dp_du: F64, side: F64, mapped: F64) -> F64:
     normals: unit, of the front; mapped: of the map, as normals_from_picture gives them. A normal
     whose tangent vanishes stays.
     """
-    # Make dp/du stand upright on the shading normal (Gram-Schmidt).
+    # Make dp/du orthogonal to the shading normal (Gram-Schmidt).
     tangent = dp_du - normals * (normals * dp_du).sum(1, keepdims=True)
     length = np.linalg.norm(tangent, axis=1, keepdims=True)
     tangent /= np.maximum(length, 1e-30)

@@ -8,10 +8,9 @@ _MAX_DIGITS: Final = 40  # of a number; more is no number that anybody means
 
 
 def ends_of(word: str) -> tuple[str, str]:
-    """Both ends of a range as they are written: `1..20` -> ("1", "20"), `7` -> ("7", "7").
+    """Both ends of a range as text: `1..20` -> ("1", "20"), `7` -> ("7", "7").
 
-    The ends are text: whether they are numbers, and in order, is the caller's to check, which can
-    then name what was written. `range_of` does both.
+    The caller checks that the ends are ascending numbers; `range_of` does so.
     """
     first, dots, last = word.partition("..")
     return (first, last) if dots else (first, first)

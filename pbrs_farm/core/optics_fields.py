@@ -133,9 +133,9 @@ class LensFields(FieldGroup):
         return Lens(self.model, coefficients, limit)
 
     def intrinsics(self, pinhole: Intrinsics) -> Intrinsics:
-        """The intrinsics of a view that was sampled with a pin-hole's; itself where no lens is set.
+        """The intrinsics of a view sampled with a pin-hole's; unchanged without a lens.
 
-        Raises ValueError where the distortion folds the picture, or a fisheye lacks fx and hfov_deg.
+        Raises ValueError if the distortion folds the picture, or a fisheye lacks fx and hfov_deg.
         """
         found = self._unchecked(pinhole)
         fold = None if found is pinhole else fold_of(found)
@@ -169,7 +169,7 @@ class LensFields(FieldGroup):
         if self.model == "cubemap":
             w, h = _CUBEMAP_PX
             return Intrinsics(w, h, w / 12, h / 2, w / 12, h / 2, lens)
-        # Without a focal length the view keeps its own, but a fisheye is told by its field of view.
+        # Without a focal length the view keeps its own; a fisheye has a field of view instead.
         if self.fx == 0 and self.model != "fisheye":
             return pinhole if lens.is_pinhole else replace(pinhole, lens=lens)
         fx = self.fx or self._focal_length_of_field()
@@ -241,7 +241,7 @@ SENSOR_PRESETS: Final[Mapping[str, Mapping[str, Any]]] = {
 
 
 class SensorFields(FieldGroup):
-    """What a camera's sensor makes of the light modes (docs/lenses.md); labels do not change."""
+    """Camera sensor of the light modes (docs/lenses.md); labels do not change."""
 
     steps = ("develop",)
 

@@ -24,7 +24,7 @@ DRAWN: Final = "drawn"
 
 @dataclass(frozen=True, slots=True)
 class CameraRow:
-    """What one kind of camera does to a picture."""
+    """Effects of one kind of camera on a picture."""
 
     what: str
     tone: Mapping[str, float] = field(default_factory=dict)  # fields of the group tone
@@ -83,7 +83,7 @@ class PictureCamera(NamedTuple):
     sensor: SensorFields
 
     def facts(self) -> dict[str, Any]:
-        """What view.json says of a camera with errors; nothing of one that is the same for each view."""
+        """Facts of a camera with errors for view.json; none for a camera that is the same for each view."""
         if not CAMERAS[self.name].spread:
             return {}
         return {"camera": self.name, "tone": self.tone.model_dump(include=set(ERRORS))}

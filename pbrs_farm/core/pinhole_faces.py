@@ -35,7 +35,7 @@ class PinholeFace:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PinholeFaces:
-    """The faces, and where each pixel of the lens's picture lies in them."""
+    """The faces, and the place of each pixel of the lens's picture in them."""
 
     faces: tuple[PinholeFace, ...]
     number: NDArray[np.int64]  # (H, W) index into faces, -1 = the pixel has no ray

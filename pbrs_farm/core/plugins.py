@@ -1,7 +1,7 @@
-"""What other packages add by entry points: homes, readers, layers, pictures, exports and more.
+"""Plugins of other packages, by entry points: homes, readers, layers, pictures, exports and more.
 
-Effects: looks through the installed packages' metadata; a plugin's code is imported when it is
-first used. Its package and version are part of the digest of the steps that use it.
+Effects: reads the installed packages' metadata; imports a plugin's code at its first use. A plugin's package
+and version are part of the digest of the steps that use it.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class Plugin:
 
     @property
     def mark(self) -> str:
-        """What digests and messages know it by."""
+        """Its name in digests and messages."""
         return f"{self.name} of {self.package} {self.version}"
 
     def load(self) -> Any:
@@ -58,10 +58,9 @@ class Plugin:
 
 @cache
 def plugins(group: str) -> Mapping[str, Plugin]:
-    """The installed plugins of a group by name; of two of one name the first package's.
+    """The installed plugins of a group by name; of two with one name the first package's.
 
-    Only names are read: no plugin's code runs before `Plugin.load`. Kept for the life of the
-    process, so a package that is installed meanwhile is not seen.
+    Runs no plugin's code. Cached for the life of the process, which misses packages installed meanwhile.
     """
     found: dict[str, Plugin] = {}
     for entry in sorted(entry_points(group=f"pbrs_farm.{group}"), key=_order):
@@ -73,7 +72,7 @@ def plugins(group: str) -> Mapping[str, Plugin]:
 
 @cache
 def installed_marks() -> tuple[str, ...]:
-    """The marks of all plugins that are installed here."""
+    """The marks of all installed plugins."""
     return tuple(one.mark for group in GROUPS for one in plugins(group).values())
 
 
@@ -95,22 +94,20 @@ def plugin(group: str, name: str) -> Plugin:
 
 
 def marks_in_digest(group: str, names: Iterable[str]) -> list[str]:
-    """The marks of plugins in the order of their names: what they add to a digest.
+    """The marks of plugins in the order of their names, for a digest.
 
-    The one way in which a plugin becomes part of a digest, so that its next version makes anew what
-    it made: of `homes` and `readers` in the source (prepare/source.py), of `passes` in the house
-    (prepare/passes.py), of `furniture` in the catalogue (furnishings/things/families.py), of `cameras`,
-    `layers` and `pictures` in their steps (run/step_cache.py).
-    Raises MachineFailed for a name that no installed plugin has.
+    The one way in which a plugin becomes part of a digest, so that its next version makes its results anew:
+    `homes` and `readers` in the source (prepare/source.py), `passes` in the house (prepare/passes.py),
+    `furniture` in the catalogue (furnishings/things/families.py), `cameras`, `layers` and `pictures` in their
+    steps (run/step_cache.py). Raises MachineFailed for a name that no installed plugin has.
     """
     return [plugin(group, name).mark for name in names]
 
 
 def checked_names(group: str, names: str) -> str:
-    """Names of plugins with ':' between, all installed; ValueError naming one that is none.
+    """Check names of plugins joined by ':', for validators of fields; ValueError for an unknown one.
 
-    For validators of fields: ValueError is what pydantic turns into a sentence with the field's
-    place. Empty parts are allowed, and the text is returned unchanged.
+    Empty parts are allowed, and the text is returned unchanged.
     """
     known = plugins(group)
     for name in filter(None, names.split(":")):
@@ -137,10 +134,7 @@ class PluginHome:
         )
 
     def make(self) -> Any:
-        """The plugin's Home; MachineFailed where the plugin is not installed.
-
-        An error of the plugin's own stays what it is.
-        """
+        """The plugin's Home; MachineFailed if the plugin is not installed. Errors of the plugin pass through."""
         function: Callable[..., Any] = plugin("homes", self.name).load()
         return function(self.seed, **dict(self.options))
 

@@ -204,7 +204,7 @@ class Recipe(FieldGroup):
 
 
 def _digest_of_fields(fields: Mapping[str, Any], groups: tuple[str, ...]) -> str:
-    # A group that is not there is none, as before it was known.
+    # Leave out absent groups, as before they were introduced.
     chosen = ("seed", *groups) if groups else fields
     return keys.digest({g: fields[g] for g in chosen if fields[g] is not None})
 
@@ -300,15 +300,13 @@ def changed_recipe(
 
 
 def with_settings(recipe: Recipe, settings: Mapping[str, Any]) -> Recipe:
-    """The recipe with other values of some fields, "light.spp" -> 64. Raises as changed_recipe.
+    """A copy of the recipe with other values of some fields, "light.spp" -> 64. Raises as changed_recipe.
 
-    Only what was set in the recipe is kept: a preset of a sensor or lens fills the other fields
-    again, so that changing the preset changes all that follows from it. The recipe given is not
-    changed. Values are validated as from a file.
+    Only fields that were set are kept: a preset of a sensor or lens fills the other fields again, so that
+    changing the preset changes all fields it implies. Values are validated as from a file.
     """
     if not settings:
         return recipe
-    # Start from what was set: a preset of a sensor or a lens fills in the rest anew.
     fields = recipe.model_dump(exclude_unset=True)
     for path, value in settings.items():
         group, _, field = path.partition(".")
@@ -328,13 +326,13 @@ def _validated(fields: Mapping[str, Any]) -> Recipe:
 
 
 def _fault(fault: ErrorDetails) -> str:
-    """What is wrong with a field; of one there is not, which it may have meant."""
+    """The error of a field; for an unknown one with similar names."""
     path, text, value = place_in(fault["loc"]), sentence(fault), fault["input"]
     if not path:  # of groups that do not fit each other
         return text
     if fault["type"] != "extra_forbidden":
         return f"{path}: {text}"
-    # Of a group there is not, the field that was set in it.
+    # For an unknown group name the field that was set in it.
     if isinstance(value, dict) and value:
         path = f"{path}.{next(iter(value))}"
     # A field without its group, or in another's, is found in every group that has it.
@@ -382,10 +380,9 @@ def groups() -> Iterator[tuple[str, type[FieldGroup]]]:
 
 
 def recipe_from_json(data: bytes, place: str) -> Recipe:
-    """A stored recipe; BadRecipe, naming its place, where it is none of this version.
+    """Read a stored recipe.json; BadRecipe, naming its place, if this version cannot read it.
 
-    For recipe.json in an output folder. For a .toml that a person wrote take formats.recipe_toml:
-    its errors name the entry.
+    Use formats.recipe_toml for a .toml that a person wrote: its errors name the entry.
     """
     try:
         return Recipe.model_validate_json(data)

@@ -38,7 +38,7 @@ class FieldGroup(BaseModel):
 
 
 class ReadFields(FieldGroup):
-    """Limits of what is read."""
+    """Limits for readers."""
 
     steps = ("house",)
 
@@ -165,7 +165,7 @@ class RepairFields(FieldGroup):
 
 
 class SurroundingFields(FieldGroup):
-    """What lies before the windows (docs/dress/outside.md); rooms have its light."""
+    """Surroundings before the windows (docs/dress/outside.md), which light the rooms."""
 
     steps = ("house",)
 

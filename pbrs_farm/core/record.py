@@ -1,4 +1,4 @@
-"""What stored JSON and the tables beside the code are read into. Effect: reads tables."""
+"""Types of stored JSON and of the tables beside the code. Effect: reads tables."""
 
 from __future__ import annotations
 
@@ -43,10 +43,10 @@ Several = Annotated[tuple[_Of, ...], BeforeValidator(_several)]
 
 
 def read_toml(path: Path, kind: type[_T]) -> _T:
-    """A TOML table beside the code as that type; BadInput names the file and the entry.
+    """Read a TOML table of the package; BadInput names the file and the entry.
 
-    kind is a type that pydantic validates: a dataclass, a model, a mapping. For tables that are
-    part of the package; recipes and other files of people have readers of their own.
+    kind: a type that pydantic validates: a dataclass, a model, a mapping. Recipes and other files of people
+    have their own readers.
     """
     return _read(path, kind, tomllib.loads)
 
@@ -60,7 +60,7 @@ def read_csv(path: Path, row: type[_T]) -> tuple[_T, ...]:
 
     def rows(text: str) -> list[dict[str, str]]:
         lines = (line for line in text.splitlines() if not line.startswith("#"))
-        # What a cell does not say has its usual value.
+        # Empty cells mean the default value.
         return [{k: v for k, v in row.items() if v} for row in csv.DictReader(lines)]
 
     return _read(path, tuple[row, ...], rows)  # type: ignore[valid-type]

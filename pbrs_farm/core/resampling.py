@@ -11,10 +11,10 @@ Pixels = TypeVar("Pixels", bound=NDArray[Any])
 
 
 def resized_by_area(picture: Pixels, width: int, height: int) -> Pixels:
-    """(height, width, ...): each pixel the mean of what it covers of picture (H, W, ...), uint8 or floats.
+    """(height, width, ...): mean over each pixel's area of picture (H, W, ...), uint8 or floats.
 
-    Bytes are averaged as they are encoded (sRGB), as usual loaders do, and rounded. Enlarging gives
-    areas of one colour.
+    Bytes are averaged as encoded (sRGB), as usual loaders do, and rounded. Enlarging gives areas of one
+    colour.
     """
     if picture.shape[:2] == (height, width):
         return picture
@@ -43,9 +43,8 @@ def resized_nearest(array: Pixels, width: int, height: int) -> Pixels:
 
 
 def resized_any(mask: NDArray[np.bool_], width: int, height: int) -> NDArray[np.bool_]:
-    """(height, width) bool: whether any pixel that is covered is set in mask (H, W): lines stay whole.
+    """(height, width) bool: True if any pixel of mask (H, W) in the area is set, so that lines stay whole.
 
-    For masks of thin things, as boundaries: shrinking by the nearest pixel would break them.
     Without a change of size the mask itself is returned, not a copy.
     """
     if mask.shape == (height, width):
@@ -67,14 +66,14 @@ def bilinear(
 ) -> NDArray[np.float32]:
     """(N, C) values of pixels (H, W, C) at uv (N, 2), v up and row 0 at the top.
 
-    value_of_byte: (256,) what the bytes stand for; None = themselves.
+    value_of_byte: (256,) decoded values; None = the bytes themselves.
     """
     # Place texel centres at half integers; v points up, rows count down.
     height, width = pixels.shape[:2]
     finite = np.where(np.isfinite(uv), uv, 0).astype(np.float64)
     x = finite[:, 0] * width - 0.5
     y = (1 - finite[:, 1]) * height - 0.5
-    # Find the four texels around each point and how far it lies between them.
+    # The four texels around each point, and its fraction between them.
     x0, y0 = np.floor(x), np.floor(y)
     fx, fy = (x - x0).astype(np.float32)[:, None], (y - y0).astype(np.float32)[:, None]
     left, right = (x0 % width).astype(np.int64), ((x0 + 1) % width).astype(np.int64)

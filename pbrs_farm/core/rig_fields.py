@@ -1,4 +1,4 @@
-"""A rig: several cameras that are fixed to each other and look at the same instants; no effects."""
+"""A rig: several cameras fixed to each other that take pictures at the same instants; no effects."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_-]{0,31}$")]
 
 
 class RigCamera(FieldGroup):
-    """One camera: where it stands in the rig, how it is turned, and its lens.
+    """One camera: its position and turn in the rig, and its lens.
 
-    The rig's frame is the camera that walks, or was chosen for a room: x right, y down, z forward.
+    The rig's frame is that of the walking or chosen camera: x right, y down, z forward.
     """
 
     name: Name
@@ -80,9 +80,9 @@ class RigCamera(FieldGroup):
         return matrix
 
     def intrinsics(self, chosen: Intrinsics, lens: LensFields) -> Intrinsics:
-        """What a view has that was chosen through a pin-hole; lens: the recipe's, without one of its own.
+        """Intrinsics of a view chosen through a pin-hole; lens: the recipe's, for a camera without its own.
 
-        Raises ValueError where a distortion folds the picture.
+        Raises ValueError if a distortion folds the picture.
         """
         if self.hfov_deg:
             size = chosen.width_px, chosen.height_px

@@ -1,7 +1,7 @@
-"""Cleans strings that strangers wrote before they are shown or drawn; no effects.
+"""Clean foreign strings before they are shown or drawn; no effects.
 
-Names, files, places and messages go through here on their way to a console, a report, a picture or
-an error: one line stays one line, a screen stays as it is, and 100 kB stay out of sight.
+Names, files, places and messages pass through here on their way to a console, a report, a picture or an
+error: one line stays one line, no control character reaches the screen, and 100 kB are cut.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from difflib import SequenceMatcher, get_close_matches
 from typing import Final
 
 MAX_NAME: Final = 80
-"""Characters of a name (a room, an item, an entry) that are shown."""
+"""Maximum length of a name (a room, an item, an entry)."""
 
 MAX_PLACE: Final = 120
 """Characters of a place inside a file, or of a path's end."""
@@ -27,10 +27,10 @@ _UNSAFE: Final = frozenset({"Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"})
 
 
 def shown(text: object, most: int = MAX_NAME) -> str:
-    """One line of at most `most` characters that can be printed as it stands.
+    """One printable line of at most `most` characters.
 
-    Control and format characters, line ends, bidirectional overrides, lone surrogates and
-    unassigned code points become spaces; what is too long loses its middle.
+    Control and format characters, line ends, bidirectional overrides, lone surrogates and unassigned code
+    points become spaces; long text loses its middle.
     """
     plain = str(text)
     # Cut first, so that a name of megabytes costs nothing; cleaning makes no text longer.
@@ -50,9 +50,9 @@ def printable(text: str) -> str:
 
 
 def escaped(json_text: str) -> str:
-    """JSON with the characters that `shown` takes out written as \\uXXXX: nothing is lost.
+    """JSON with the characters that `shown` removes escaped (\\uXXXX): nothing is lost.
 
-    Reading the result back gives the same value. Line ends between values stay as they are.
+    Line ends between values stay.
     """
     if json_text.isascii():
         return json_text
@@ -80,7 +80,7 @@ def _escape(c: str) -> str:
 
 
 _LEAST_LIKENESS: Final = 0.6  # difflib's ratio of letters that two words share
-_MOST: Final = 2  # names that are offered
+_MOST: Final = 2  # maximum number of suggestions
 _AS_LIKELY: Final = 0.05  # of likeness: a second name is offered where it is nearly as near
 
 
@@ -103,7 +103,7 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
 
 
 def question(names: list[str]) -> str:
-    """ "did you mean A or B?" of these names; "" of none."""
+    """ "did you mean A or B?" of these names; "" for no name."""
     return f"did you mean {' or '.join(names)}?" if names else ""
 
 

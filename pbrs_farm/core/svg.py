@@ -13,14 +13,14 @@ def svg_picture(**attributes: object) -> Element:
 
 
 def svg_file(**attributes: object) -> Element:
-    """An empty picture that is a file of its own."""
+    """An empty picture for a separate file."""
     return svg_picture(xmlns="http://www.w3.org/2000/svg", **attributes)
 
 
 def element(parent: Element, tag: str, content: str = "", **attributes: object) -> Element:
-    """Draw an element above what parent holds.
+    """Draw an element above the others of parent.
 
-    In names "_" stands for "-", css is the class; attributes of no text are left out.
+    In names "_" means "-", css is the class; attributes without text are left out.
     """
     child = _with(ET.SubElement(parent, tag), attributes)
     child.text = content or None

@@ -13,7 +13,7 @@ class Table(Sequence[Mapping[str, Any]]):
     """Rows, each a mapping with the same keys: a list to a program, a table to a reader."""
 
     def __init__(self, columns: Sequence[str], rows: Sequence[Mapping[str, Any]]) -> None:
-        """columns: those that are shown, in that order; rows may hold more."""
+        """columns: the shown ones, in their order; rows may hold more."""
         self.columns = tuple(columns)
         self._rows = tuple(rows)
 
@@ -31,11 +31,7 @@ class Table(Sequence[Mapping[str, Any]]):
         return iter(self._rows)
 
     def column(self, name: str) -> list[Any]:
-        """A column's values; KeyError where a row has none of that name.
-
-        In the order of the rows, as Python values. A column that only some rows have is a KeyError
-        too.
-        """
+        """A column's values in the order of the rows; KeyError if any row lacks it."""
         return [row[name] for row in self._rows]
 
     def __repr__(self) -> str:

@@ -13,8 +13,8 @@ from pbrs_farm.core.arrays import F64, I64, Bools
 
 CELL_M: Final = 0.05
 WALK_M: Final = 0.6  # the width of a way
-STEP_M: Final = 0.08  # what is lower is walked over
-HEAD_M: Final = 1.8  # what is higher is walked under
+STEP_M: Final = 0.08  # maximum height of an obstacle to step over
+HEAD_M: Final = 1.8  # minimum height of an obstacle to walk under
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,11 +71,10 @@ class FloorGrid:
 
 
 def clearance_m(free: Bools) -> F64:
-    """(H, W) metres from the middle of each cell to that of the nearest one that is not free.
+    """(H, W) Euclidean distance from each cell's middle to that of the nearest cell that is not free, metres.
 
-    free is (H, W) bool; cells that are not free have 0. Beyond the grid nothing counts, and a grid
-    that is free all over has no meaningful result: leave a margin that is not free. Distances are
-    Euclidean.
+    free: (H, W) bool; other cells have 0. Cells beyond the grid do not count, so leave a margin that is not
+    free.
     """
     return np.asarray(ndimage.distance_transform_edt(free) * CELL_M)
 
