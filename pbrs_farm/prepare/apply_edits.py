@@ -58,9 +58,9 @@ from pbrs_farm.regular_files import MAX_DIGEST_BYTES, fault_of, read_regular
 
 
 def apply_edits(house: House, source: SourceRef, fields: ReadFields) -> House:
-    """The house of a source's `unedited`, with the source's edits and its id.
+    """Apply the source's edits to the house of its `unedited`; the result has the source's id.
 
-    Raises BadInput for an item that the house has not, and for a file that is missing or changed.
+    Raises BadInput for an item that the house does not have, and for a missing or changed file.
     """
     for edit in source.edits:
         house = _ONE[edit.do](house, edit, fields)
@@ -144,7 +144,7 @@ def _remove(house: House, edit: RemoveItems, _fields: ReadFields) -> House:
 
 
 def _emptied(item: Item, instance: int) -> Item:
-    """What stands in a removed item's place. Its id is free: a new item may have it."""
+    """An empty item in place of a removed one. Its id is free: a new item may have it."""
     return Item(
         f"removed/{instance}", item.name, ItemKind.OBJECT, item.level_id, (), tags=(REMOVED,)
     )
@@ -174,7 +174,7 @@ def _key_joints(house: House, edit: KeyJoints, _fields: ReadFields) -> House:
 
 
 def _joints_named(house: House, joints: Sequence[tuple[str, str]]) -> list[tuple[int, str]]:
-    """(item's index, part) of joints that are named by (item's id, part)."""
+    """(item index, part) of joints given as (item id, part)."""
     _found(house, {item for item, _part in joints})
     index_of = {item.id: k for k, item in enumerate(house.items)}
     for item_id, part in joints:

@@ -1,6 +1,6 @@
-"""The catalogue that a command or a step dresses homes with, read once a process.
+"""The catalogue for dressing, read once per process.
 
-Effects: reads the cached packages and the user's libraries, keeps the shapes that were read in the
+Effects: reads the cached packages and the user's libraries, and writes the shapes it has read to the
 cache; downloads nothing unless asked.
 """
 
@@ -52,9 +52,9 @@ def catalogue_of_words(words: str) -> Catalogue:
 
 
 def own_catalogue(paths: Sequence[Path]) -> Catalogue:
-    """What libraries and folders of the user's own give by themselves, indexed once; maybe nothing but notes.
+    """Index the user's libraries and folders alone, once; the result may hold nothing but notes.
 
-    Raises BadInput for what is no library.
+    Raises BadInput for a path that is no library.
     """
     from pbrs_farm.read.catalogue.read_catalogue import catalogue_from
 
@@ -72,7 +72,7 @@ def _cached_names() -> frozenset[str]:
 
 
 def _store() -> Path:
-    # Beside the packages: what was read of their models.
+    # Shapes read from the packages' models, beside the packages.
     return cache_folder() / "shapes"
 
 
@@ -117,9 +117,9 @@ def catalogue_of(fields: DressFields) -> Catalogue:
 
 
 def fetch_catalogue(fields: DressFields) -> None:
-    """Download the packages of the catalogue that a recipe names where they are not cached.
+    """Download the packages of a recipe's catalogue that are not cached.
 
-    Raises MachineFailed, with the command to type, where apt cannot give them, and BadInput for a
-    library of the user's that is none.
+    Raises MachineFailed, with the command to type, if apt cannot provide them, and BadInput for a user's
+    path that is no library.
     """
     fetch_packages(fields.catalogue)

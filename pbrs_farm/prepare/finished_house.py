@@ -30,10 +30,9 @@ class HouseBeforeEdits:
         self._finished: FinishedHouse | None = None
 
     def get(self, source: SourceRef, recipe: Recipe) -> FinishedHouse | None:
-        """The finished house of a source without edits, where it is the one that is kept.
+        """The cached house of a source without edits (`SourceRef.unedited`); None for any other source.
 
-        source must be one without edits: take `SourceRef.unedited` first. One house is kept, the
-        last.
+        Only the last house is cached.
         """
         return self._finished if self._key == cache_key(source, recipe) else None
 
@@ -56,11 +55,11 @@ def finished_house(
     tell_share: Callable[[float], None] = _ignore_share,
     before_edits: HouseBeforeEdits | None = None,
 ) -> FinishedHouse:
-    """The finished house of a source: read, furnished, dressed, repaired and edited, as the recipe says.
+    """Read, furnish, dress, repair and edit the house of a source, as the recipe says.
 
-    Equal arguments give equal bits. tell_share: called with the share that is done while it is
-    dressed and repaired. before_edits: where the house of a source with edits is kept before them.
-    Raises BadHouse for a file that is no house or has changed, BadInput, BadRecipe, MachineFailed.
+    Equal arguments give equal bits. tell_share: called with the finished share of dressing and repair.
+    before_edits: cache for the house without its edits. Raises BadHouse for a file that is no house or
+    has changed, BadInput, BadRecipe, MachineFailed.
 
         >>> house, report, dressing = finished_house(resolve("builtin"), Recipe())
         >>> dressing is None

@@ -1,6 +1,6 @@
-"""The table of every format that is read: ours, floor plans, plugins'. Effects: reads the head of a file.
+"""The table of supported formats: ours, floor plans, plugins'. Effects: reads the head of a file.
 
-Each package of read/ ends with its entry FORMAT, each module of generate/plans with one of a plan's.
+Each package of read/ ends with its entry FORMAT, each module of generate/plans with a PlanFormat.
 """
 
 from __future__ import annotations
@@ -35,10 +35,10 @@ _NAMES: Final = re.compile(rb'"([A-Za-z_]{3,40})"\s*:')
 
 
 def formats() -> Iterator[Format]:
-    """Every format that is read, in the order in which files are asked.
+    """All supported formats, in the order in which they are tried.
 
-    A generator, as most words of a command line need none of the later ones, whose modules cost
-    time to import: packages of read/ first, then plans.
+    Packages of read/ come first, then plans. A generator, because importing a format's module takes time
+    and the first ones serve most words of a command line.
     """
     yield from _formats_of_packages()
     yield from _formats_of_plans()
@@ -64,10 +64,7 @@ def format_of_source(source: SourceRef) -> Format | None:
 
 
 def format_of_plugin(name: str) -> Format:
-    """The entry that a plugin brings; MachineFailed where none is installed, or it brings another thing.
-
-    Loads the plugin's code. Take `formats_of_plugins` for all.
-    """
+    """The entry of a plugin, whose code is loaded; MachineFailed if it is not installed or has another type."""
     one = plugin("readers", name)
     entry = one.load()
     if not isinstance(entry, Format):
@@ -76,10 +73,9 @@ def format_of_plugin(name: str) -> Format:
 
 
 def plugin_of_file(path: Path) -> str | None:
-    """The name of the plugin that reads what lies at a path, where one does.
+    """Name of the plugin that reads a path; None if there is no path or no such plugin.
 
-    Loads the code of plugins one after another until one knows the file. Nothing is loaded where no
-    reader is installed or the path is not there.
+    Loads plugins one by one until one accepts the file.
     """
     names = plugins("readers")
     if not names or not path.exists():
@@ -103,17 +99,16 @@ def format_of_file(path: Path, *, surely: bool = False) -> Format | None:
 
 
 def is_beside_homes(path: Path) -> bool:
-    """Whether a file's name says that it belongs to a home that lies beside it.
+    """True if a file name, in any case, belongs to a home beside it.
 
-    Such a file in a folder of homes is no home and no fault either. The case of letters is no
-    matter.
+    In a folder of homes such a file is neither a home nor an error.
     """
     patterns = [pattern for one in formats() for pattern in one.beside]
     return any(fnmatch(path.name.lower(), pattern) for pattern in patterns)
 
 
 def summary() -> str:
-    """All that is read, in one line: for hints."""
+    """All supported formats in one line, for hints."""
     every = list(formats())
     suffixes = dict.fromkeys(suffix for one in every for suffix in one.suffixes)
     titles = dict.fromkeys(one.title for one in every if one.keys)
@@ -122,14 +117,14 @@ def summary() -> str:
 
 
 def missing_library(entry: DataFormat) -> str:
-    """What to type for the library without which a format cannot be read; "" where it is there."""
+    """The command that installs a format's missing library; "" if nothing is missing."""
     if not entry.library or is_installed(entry.library):
         return ""
     return install_command(entry.needs.removeprefix("the extra "))
 
 
 class _Look:
-    """What lies at a path, its head read once, and only where a format asks for it."""
+    """A path to identify; its head is read once, when a format asks for it."""
 
     def __init__(self, path: Path) -> None:
         self._path = path

@@ -1,9 +1,9 @@
-"""Empty rooms of a home that was read, furnished as made homes are; no effects but the catalogue's.
+"""Furnish the empty rooms of a home that was read, as made homes are; no effects but the catalogue's.
 
-A room is empty where what stands on its floor covers less than 3 % of it, and sparse below 20 %: asked
-for `sparse`, such a room keeps what it has and gets what its brief has beside. Its use follows from its name
-and what stands there; one whose name says none gets what the home lacks. A garage, and a dark room of no
-known use, stays as it is, with a note.
+A room is empty if furniture covers less than 3 % of its floor, and sparse below 20 %: for `sparse`, such
+a room keeps its furniture and gets the rest of its brief. Its use follows from its name and its furniture;
+a room without a telling name gets the use that the home lacks. A garage, and a dark room of unknown use,
+remains as it is, with a note.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ from pbrs_farm.home.room_use import RoomKind
 
 Furnish = Literal["none", "empty", "sparse"]
 
-# Of a room's floor: what stands there covers less.
+# maximum share of the floor under furniture
 _MOST_COVERED: Final[dict[Furnish, float]] = {"none": 0.0, "empty": 0.03, "sparse": 0.2}
 _STANDS_M: Final = 0.5  # what begins higher above the floor hangs
 _FLAT_M: Final = 0.12  # what ends lower can be walked on
@@ -86,7 +86,7 @@ _USES: Final = {
     RoomKind.OFFICE: _Use(RoomType.OFFICE),
 }  # fmt: skip
 
-# Groups of briefs -> NYU40 classes of things of which a room needs no second one.
+# Groups of briefs -> NYU40 classes of furniture that a room needs once.
 _SERVED_BY: Final[dict[str, frozenset[int]]] = {
     "bed": frozenset({BED}), "lounge": frozenset({SOFA}), "dining": frozenset({TABLE}),
     "desk": frozenset({DESK}), "wardrobe": frozenset({CABINET, OTHERFURNITURE}),
@@ -104,16 +104,15 @@ class _Storey:
     angle_rad: float  # by which it was turned
     rooms: tuple[RoomSpace, ...]
     uses: tuple[_Use, ...]
-    wanting: tuple[int, ...]  # rooms that are to be furnished
+    wanting: tuple[int, ...]  # rooms to furnish
 
 
 def furnish_rooms(
     house: House, catalogue: Catalogue, seed: int, style: str = "", which: Furnish = "empty"
 ) -> House:
-    """The house with furniture in its empty rooms, the same for the same seed.
+    """Furnish the empty rooms of a house; the same seed gives the same furniture.
 
-    which: `sparse` = rooms with little in them too; what stands there stays. Raises BadInput for a
-    style that there is none of.
+    which: `sparse` includes rooms with little furniture, which they keep. Raises BadInput for an unknown style.
     """
     with closing(MutableHouse(house, seed)) as mutable:
         return _furnished(mutable, catalogue, style, _MOST_COVERED[which])
@@ -149,9 +148,9 @@ def _furnished(
 
 
 def _kinds_of_rooms(space: HouseSpace) -> dict[str, RoomKind]:
-    """Room id -> what it is for; one of no known use is what the home lacks, the largest first.
+    """Room id -> use; rooms of unknown use get the uses that the home lacks, the largest room first.
 
-    A room without windows keeps no use, where others of the home have some.
+    A room without windows gets no use if other rooms of the home have windows.
     """
     kinds = {room.room.id: room.kind for room in space.rooms}
     has_windows = any(room.windows for room in space.rooms)
@@ -171,7 +170,7 @@ def _storey(
     """The rooms of a level as a plan, and which of them are to be furnished."""
     rooms, shapes, uses = [], [], []
     for room in space.rooms:
-        # Furniture stands at the walls' faces, wherever the outline was drawn.
+        # Furniture touches the walls' faces, wherever the outline was drawn.
         ground = corners(room.area.difference(room.walls.buffer(0.002, join_style="mitre")))
         if room.room.level_id == level_id and len(ground) >= 3:
             use = _use_of(room, kinds[room.room.id])
@@ -205,7 +204,7 @@ def _use_of(room: RoomSpace, kind: RoomKind) -> _Use:
 
 
 def _present(room: RoomSpace, mutable: MutableHouse) -> list[str]:
-    """Names of the groups of briefs that what stands in a room serves already."""
+    """Groups of briefs that the room's furniture serves already."""
     classes = {mutable.items[n].nyu40 for n in _on_floor(room, mutable)}
     return [name for name, served in _SERVED_BY.items() if served & classes]
 
@@ -227,7 +226,7 @@ def _is_wanting(
 
 
 def _on_floor(room: RoomSpace, mutable: MutableHouse) -> list[int]:
-    """Numbers of what stands in the way of a man in the room."""
+    """Indices of the room's items at the height of a person."""
     floor = room.room.floor_y
     return [
         n
@@ -244,7 +243,7 @@ def _ground(bounds: F64) -> Polygon:
 
 
 def _standing(storey: _Storey, number: int, mutable: MutableHouse) -> list[Rect]:
-    """Rectangles of the upright plan around what stands in a room already."""
+    """Footprints of the room's furniture in the upright plan."""
     found = []
     for n in _on_floor(storey.rooms[number], mutable):
         ground = shapely.affinity.rotate(
@@ -258,7 +257,7 @@ def _standing(storey: _Storey, number: int, mutable: MutableHouse) -> list[Rect]
 def _opening(
     passage: Passage, sides: Sequence[int], wall: int, floor_y: float
 ) -> tuple[PlanOpening, PlanWall]:
-    """A door or window with a wall of its own, as wide as itself."""
+    """A door or window, with a wall of the same width."""
     (x, _, z), along = passage.centre.tolist(), passage.along[[0, 2]] * passage.width / 2
     # The wall's ends in plan, rounded to 0.1 mm as those of made homes are.
     start = round(x - float(along[0]), 4), round(z - float(along[1]), 4)
@@ -277,7 +276,7 @@ def _opening(
 def _add(
     mutable: MutableHouse, storey: _Storey, pieces: Sequence[PlacedPiece], catalogue: Catalogue
 ) -> None:
-    """Put the pieces into the house, turned back to where its walls stand."""
+    """Add the pieces to the house, turned back into the frame of its walls."""
     cos, sin = math.cos(-storey.angle_rad), math.sin(-storey.angle_rad)
     lit = {k for k, room in enumerate(storey.rooms) if _has_lamp(room, mutable)}
     grounds = [Polygon(room.polygon).buffer(0.02) for room in storey.plan.rooms]

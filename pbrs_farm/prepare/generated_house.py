@@ -33,7 +33,7 @@ def house_of_contents(contents: HomeContents, name: str, sha256: str, fields: Re
 
 
 def _model_of_shape(shape: Shape, max_triangles: int) -> ObjModel | None:
-    """What parse_obj gives of the shape's OBJ; None where the reader has something to say about it."""
+    """The model that parse_obj reads from the shape's OBJ; None if the reader would warn about it."""
     if sum(len(surface.faces) for surface in shape.surfaces) > max_triangles:
         return None
     meshes = [_mesh_of_surface(surface) for surface in written_surfaces(shape)]
@@ -43,7 +43,7 @@ def _model_of_shape(shape: Shape, max_triangles: int) -> ObjModel | None:
 
 def _mesh_of_surface(surface: WrittenSurface) -> Mesh | None:
     """The mesh of a surface; None where it loses a triangle."""
-    # A corner's position, uv and normal have one number, -1 where the surface has none.
+    # A corner's position, uv and normal share one index, -1 where the surface has none.
     corner = surface.faces.reshape(-1).astype(np.int64)
     none = np.full(len(corner), -1, np.int64)
     uvs, normals = surface.uvs, surface.normals

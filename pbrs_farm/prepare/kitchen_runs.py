@@ -1,7 +1,7 @@
-"""Boxes of kitchens as runs of units of one set: cabinets, sink, cooker, wall cabinets; no effects.
+"""Replace kitchen boxes by runs of matching units: cabinets, sink, cooker, wall cabinets; no effects.
 
-A source says "a kitchen, 3.2 m by 0.6 m" or "a counter", and where a sink lies in it. What one sees there
-is a row of units with one worktop; a box deeper than a unit is an L or a U along the walls that it
+A source gives "a kitchen, 3.2 m by 0.6 m" or "a counter", and the place of a sink in it. The result is a
+row of units under one worktop. A box deeper than a unit becomes an L or a U along the walls that it
 touches, or an island of two rows.
 """
 
@@ -22,18 +22,16 @@ from pbrs_farm.core.house import Box, Item
 from pbrs_farm.home.names import words_of_item
 
 MODULE_M: Final = 0.6  # of a usual unit
-_NARROWEST_M: Final = 0.28  # of a unit; what is left over goes to its neighbour
+_NARROWEST_M: Final = 0.28  # minimum width of a unit; a smaller rest goes to its neighbour
 _DEPTH_M: Final = 0.62  # of a run along a wall, where a box is deeper
-_DEPTHS_M: Final = (0.4, 0.96)  # of boxes that are one run
+_DEPTHS_M: Final = (0.4, 0.96)  # depth of boxes that become one run
 _TOPS_M: Final = (0.7, 1.1)  # a worktop's height above the floor
-_FOOT_M: Final = 0.35  # what begins lower stands on the floor
+_FOOT_M: Final = 0.35  # maximum bottom height of a box on the floor
 _HUNG_M: Final = 1.2  # what begins higher hangs
 _HUNG_HEIGHTS_M: Final = (0.3, 1.1)
 _HUNG_DEPTH_M: Final = 0.5
 _AT_WALL_M: Final = 0.2
-_ASIDE_M: Final = (
-    0.1  # middles of what stands in a run may lie so far beside it: scans are no better
-)
+_ASIDE_M: Final = 0.1  # maximum offset of a unit's centre from the run (accuracy of scans)
 _STANDS_OVER_M: Final = (
     0.4  # of the middle of a sink's or hob's box above the worktop; higher is a hood
 )
@@ -69,7 +67,7 @@ class _Set(NamedTuple):
 
 @dataclass(slots=True)
 class _Run:
-    """A row along x of its own frame, from 0 to length; it looks along z."""
+    """A row of units in its local frame: along x from 0 to length, facing z."""
 
     item: Item
     origin: F64  # its left back lower corner, world
@@ -81,7 +79,7 @@ class _Run:
     is_hung: bool
 
     def along(self, item: Item) -> float | None:
-        """Where the middle of another box lies along it; None: elsewhere."""
+        """Coordinate along the run of another box's centre; None if the box is elsewhere."""
         assert item.box is not None
         away = item.box.centre - self.origin
         x, z = float(away @ self.right), float(away @ self.front)
@@ -99,24 +97,24 @@ class _Run:
 
 
 class _Module(NamedTuple):
-    """What stands between two places along a run: a unit for an item, or nothing (a machine's place)."""
+    """A section of a run: a unit for an item, or a gap for an appliance."""
 
     low: float
     high: float
     kind: str  # "base", "sink", "cooker", "gap"
-    item: Item | None = None  # that it stands for; None = the run's own
-    absorbed: tuple[str, ...] = ()  # ids of what it has in it as well
+    item: Item | None = None  # the item it replaces; None = a unit of the run itself
+    absorbed: tuple[str, ...] = ()  # ids of the other items in it
 
 
 def kitchen_units(
     items: Sequence[Item], floor_y: float, catalogue: Catalogue, house_id: str, *, is_kitchen: bool,
     distance_to_wall: Callable[[Point], float], choose_front: Callable[[Sequence[Box]], int],
 ) -> Mapping[str, list[Unit]]:  # fmt: skip
-    """The units of a room's counters, by the id of the box-only item that each stands for.
+    """Units for a room's counters, by the id of the box-only item that they replace.
 
-    items: the box-only things of the room. is_kitchen: whether its cabinets are kitchen cabinets.
-    choose_front: of boxes that look different ways, the number of the likeliest. Items that are no
-    part of a run are not in the result, those that are part of another's unit have none; it is empty where the catalogue has no kitchen set.
+    items: the room's box-only items. is_kitchen: cabinets are kitchen cabinets. choose_front: index of the
+    likeliest of boxes with different fronts. Items outside every run are not in the result; items inside
+    another item's unit have an empty list. Empty if the catalogue has no kitchen set.
     """
     is_kitchen = is_kitchen or any(_is_named_counter(i) for i in items)
     counters = [i for i in items if _is_counter(i, floor_y, is_kitchen=is_kitchen)]
@@ -197,7 +195,7 @@ def _runs_of(
     item: Item, floor_y: float, distance_to_wall: Callable[[Point], float],
     choose_front: Callable[[Sequence[Box]], int], *, is_hung: bool,
 ) -> Iterator[_Run]:  # fmt: skip
-    """The rows of units that a box is made of; none where it is too deep and stands free."""
+    """The rows of units for a box; none if it is too deep and away from all walls."""
     box = item.box
     assert box is not None
     right, front = box.axes[:, 0] * [1, 0, 1], box.axes[:, 2] * [1, 0, 1]
@@ -315,7 +313,7 @@ def _unit_of(module: _Module, number: int, run: _Run, chosen: _Set) -> Unit | No
         return None
     piece = pieces[number % len(pieces)]
     box = run.box(module.low, module.high)
-    # A tap stands over the worktop, which all units of the set have at one height.
+    # A tap rises above the worktop, whose height is the same for all units of the set.
     top = piece.size[2] if run.is_hung else chosen.top
     width, depth, _ = piece.size
     scale = np.array([2 * box.half[0] / width, 2 * box.half[1] / top, 2 * box.half[2] / depth])

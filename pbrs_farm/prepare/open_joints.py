@@ -1,4 +1,4 @@
-"""Doors and drawers of a finished home opened, as far as nothing stands in their way; no effects."""
+"""Open doors and drawers of a finished home, as far as no obstacle stops them; no effects."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from pbrs_farm.geometry.opened import free_value, item_at, joint_of
 from pbrs_farm.geometry.scene_triangles import SceneTriangles
 
 STOPPED: Final = "joint-stopped"
-"""Kind of the note about a joint that something keeps from opening as far as it should."""
+"""Kind of the note about a joint that an obstacle stops early."""
 
-_LEAST_OPEN: Final = 0.15  # share of its way by which a joint that was left open stands open
-_NEAR: Final = 1e-3  # radians or metres: what is stopped by less is not
+_LEAST_OPEN: Final = 0.15  # minimum opening of a joint left open, share of its range
+_NEAR: Final = 1e-3  # tolerance of a stopped joint, radians or metres
 
 
 def opened(house: House, index: int, part: str, share: float) -> House:
-    """The house with a part of items[index] open by a share of its joint's way, 0..1.
+    """Open a part of items[index] by a share of its joint's range, 0..1.
 
-    Where a wall or a thing stands in its way it stops before that, and a note says so. A joint that
-    stands further open is shut to there.
+    A wall or item in the way stops it earlier, with a note. A joint that is open further is closed to
+    that share.
     """
     value, notes = _reach(house, index, part, share)
     item = item_at(house.items[index], part, value)
@@ -37,13 +37,13 @@ def opened(house: House, index: int, part: str, share: float) -> House:
 def keyed(
     house: House, index: int, part: str, keys_of_time: Sequence[tuple[float, float]]
 ) -> House:
-    """The house in which a part of items[index] opens and shuts over time.
+    """Open and close a part of items[index] over time.
 
-    keys_of_time: (seconds, share of the joint's way, 0..1), times ascend. It stands where the first
-    key has it. What is in its way holds it as in `opened`, of the home at rest.
+    keys_of_time: (seconds, share of the joint's range, 0..1) with ascending times. The house at rest has
+    the first key. Obstacles of the home at rest stop the part as in `opened`.
     """
     joint = joint_of(house.items[index], part)
-    # Ask from where it is shut: there is no way to what it stands beyond.
+    # Measure from the closed state: an open part may already be beyond an obstacle.
     shut = _shut(house, index, part)
     most, notes = _reach(shut, index, part, max(share for _time, share in keys_of_time))
     values = tuple((min(_value(joint, share), most),) for _time, share in keys_of_time)
@@ -67,7 +67,7 @@ def _shut(house: House, index: int, part: str) -> House:
 
 
 def _reach(house: House, index: int, part: str, share: float) -> tuple[float, tuple[Note, ...]]:
-    """How far a part of items[index] opens towards a share of its way, and what is to be said of it."""
+    """Reachable opening of a part of items[index] towards a share of its range, with notes."""
     item = house.items[index]
     joint = joint_of(item, part)
     wanted = _value(joint, share)
@@ -83,9 +83,9 @@ def _value(joint: Joint, share: float) -> float:
 
 
 def left_open(house: House, share: float, seed: int) -> House:
-    """The house in which a share of its doors and drawers stands open, drawn by a seed.
+    """Leave a random share of the doors and drawers open, each by a random amount.
 
-    Windows stay shut, and so does what leads outdoors. How far each stands open is drawn as well.
+    Windows and doors to the outside remain closed.
     """
     for index, item in enumerate(house.items):
         if item.is_outside or item.is_removed:

@@ -1,10 +1,10 @@
-"""The passes that make a finished house of a source: a table of what each does, when and by what.
+"""The passes from a source to a finished house: a table of functions, versions and recipe groups.
 
     read -> stand-ins -> furnish -> dress -> repair -> open -> float -> surroundings -> edits
 
-The table is the only list of passes: finished_house.py calls them in its order; the digest of the step
-`house`, the versions by which workers know each other and the keys of caches are made from it.
-Effects: those of the passes, which read files and the cached packages and write nothing.
+The table is the only list of passes: finished_house.py calls them in its order, and the digest of the step
+`house`, the versions that workers compare and the keys of caches derive from it. Effects: those of the
+passes, which read files and the cached packages and write nothing.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ _DRESS_SHARE: Final = 0.7  # of the time that dressing and repair take, about
 
 
 class FinishedHouse(NamedTuple):
-    """What comes of a source: the house, what repair did, and what dressing did, None: not dressed."""
+    """A finished house, the report of repair, and that of dressing (None if not dressed)."""
 
     house: House
     report: RepairReport
@@ -48,7 +48,7 @@ class FinishedHouse(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Preparation:
-    """A source on its way through the passes; each pass gives it on with what it has made."""
+    """A source on its way through the passes; each pass returns it with its result added."""
 
     source: SourceRef
     recipe: Recipe
@@ -61,13 +61,13 @@ class Preparation:
 
     @property
     def house(self) -> House:
-        """The house as the last pass gave it; the first pass has none yet."""
+        """The house after the last pass; the first pass has none yet."""
         assert self.current is not None
         return self.current
 
     @property
     def finished(self) -> FinishedHouse:
-        """What the last pass leaves."""
+        """The result of the last pass."""
         assert self.report is not None
         return FinishedHouse(self.house, self.report, self.dressing)
 
@@ -94,10 +94,9 @@ class Pass:
 
 
 def dress_seed(source: SourceRef, recipe: Recipe) -> int:
-    """The seed a source is dressed by: its own, else the recipe's; 0 = it is not dressed.
+    """Seed of dressing: that of the source's word, else the recipe's; 0 = not dressed.
 
-    An object without context is never dressed. The source's own seed comes from the word of the
-    command line, and stands before the recipe's.
+    An object without context is never dressed.
     """
     kind = HOME_KIND.get(source.kind)
     if kind is not None and not kind.is_home:
@@ -148,7 +147,7 @@ def _has_floating_things(source: SourceRef, recipe: Recipe) -> bool:
 def _float_depends(source: SourceRef, recipe: Recipe) -> list[object]:
     from pbrs_farm.furnishings.things.families import families_digest
 
-    # What is generated for dressing hangs in the air, too.
+    # Generated items float, too.
     things = [families_digest(), PASS["dress"].version]
     return [_float_seed(source, recipe), recipe.dress.float_share, *things]
 
@@ -177,7 +176,7 @@ def _furnish_depends(source: SourceRef, recipe: Recipe) -> list[object]:
 
 
 def _dress_depends(source: SourceRef, recipe: Recipe) -> list[object]:
-    # Where the libraries lie is no matter: their content is.
+    # The content of the libraries counts, not their paths.
     fields = recipe.dress.model_dump(
         mode="json", exclude={"seed", "catalogue", "furnish", "passes", "open_share", "float_share"}
     )
@@ -189,7 +188,7 @@ def _dress_depends(source: SourceRef, recipe: Recipe) -> list[object]:
 
 
 def _read(work: Preparation) -> Preparation:
-    """The house as its source gives it; of an object and of a plugin's home that is all there is."""
+    """Read the house of the source; for an object or a plugin's home it is the finished house."""
     from pbrs_farm.home.room_use import with_uses
     from pbrs_farm.prepare.read_source import read_house
     from pbrs_farm.prepare.source import check_unchanged
@@ -210,7 +209,7 @@ def _read(work: Preparation) -> Preparation:
 
 
 def _stand_in(work: Preparation) -> Preparation:
-    """Furniture for the things that the source describes by class and box alone."""
+    """Furnish items that the source describes by class and box alone."""
     from pbrs_farm.prepare.stand_ins import has_box_only_items, with_stand_ins
 
     if not has_box_only_items(work.house):
@@ -221,7 +220,7 @@ def _stand_in(work: Preparation) -> Preparation:
 
 
 def _furnish(work: Preparation) -> Preparation:
-    """Furniture in rooms that are empty or nearly so, drawn by the seed of dressing."""
+    """Furnish empty or nearly empty rooms, by the seed of dressing."""
     from pbrs_farm.prepare.furnish_rooms import furnish_rooms
 
     catalogue, seed = catalogue_of(work.recipe.dress), dress_seed(work.source, work.recipe)
@@ -230,10 +229,10 @@ def _furnish(work: Preparation) -> Preparation:
 
 
 def _dress(work: Preparation) -> Preparation:
-    """Surfaces, parts, lamps, textiles and small things, drawn by the source's seed.
+    """Add surfaces, parts, lamps, textiles and clutter, by the source's seed.
 
-    Raises BadRecipe for an unknown style, BadInput for a library that is none, MachineFailed where
-    the furniture package cannot be had.
+    Raises BadRecipe for an unknown style, BadInput for a path that is no library, MachineFailed if the
+    furniture package is not available.
     """
     from pbrs_farm.dress.dressing import dressed_house
     from pbrs_farm.repair.small_repairs import with_rooms_closed, without_persons_and_plants
@@ -250,10 +249,10 @@ def _dress(work: Preparation) -> Preparation:
 
 
 def _repair(work: Preparation) -> Preparation:
-    """Walls closed, openings cut, lamps found; what dressing hung on a wall that is lost, hung anew.
+    """Close walls, cut openings, find lamps; hang pictures of a lost wall anew.
 
-    The gates of dressing hold for the house as it is rendered: what loses its wall to repair is
-    hung on the wall that is left or taken out, and the house is repaired again without it.
+    The gates of dressing apply to the house as it is rendered: an item that loses its wall to repair is
+    hung on the remaining wall or removed, and the house is repaired again.
     """
     from pbrs_farm.dress.dressing import refit_after_repair
     from pbrs_farm.raycast.caster import Caster
@@ -339,9 +338,9 @@ STEP_GROUPS: Final = tuple(group for group in GROUPS if group != "dress")
 
 
 def versions_of_passes() -> dict[str, int]:
-    """Pass -> version: installations of equal versions make the same house of the same source.
+    """Pass -> version, with a version for the readers of floor plans.
 
-    What reads floor plans has a version of its own, too.
+    Installations with equal versions make the same house from the same source.
     """
     return {p.name: p.version for p in PASSES} | {"plans": _PLANS_VERSION}
 
@@ -356,10 +355,9 @@ def cache_key(source: SourceRef, recipe: Recipe) -> str:
 
 
 def step_depends(source: SourceRef, recipe: Recipe) -> list[object]:
-    """What the step `house` depends on beside STEP_GROUPS, for its digest.
+    """Inputs of the step `house` beside STEP_GROUPS, for its digest.
 
-    The source's files, then a row for each pass that the house goes through: name, version, and what
-    else it follows from.
+    The source's files, then a row for each pass of the house: name, version and its other inputs.
     """
     passes = [p for p in PASSES if p.is_needed(source, recipe)]
     return [source.fingerprint, *([p.name, p.version, *p.depends(source, recipe)] for p in passes)]

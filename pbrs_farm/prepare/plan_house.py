@@ -1,6 +1,6 @@
-"""A file of a floor plan becomes a House: its walls built, its things as boxes; and a home to be furnished.
+"""Build a House from a floor plan, walls as meshes and furniture as boxes; or a home's file to furnish.
 
-Effects: reads the file. Things are items without surfaces until prepare/stand_ins.py furnishes them.
+Effects: reads the file. Furniture has no surfaces until prepare/stand_ins.py adds them.
 """
 
 from __future__ import annotations
@@ -32,10 +32,9 @@ LEFT_OUT = "plan-left-out"
 
 
 def house_of_plan(given: GivenFile, fields: ReadFields) -> House:
-    """The house of a plan, with an item for each thing that it names. Raises BadInput, naming the place.
+    """The house of a plan, with an item for each piece of furniture. Raises BadInput, naming the place.
 
-    Things that cannot be drawn, by their class or for want of a box, are notes of the house. It has
-    no cameras.
+    Furniture of an unknown class or without a box becomes a note. The house has no cameras.
     """
     path = given.path
     file = upright(plan_from_file(path, part_of(given.part)))
@@ -66,10 +65,10 @@ def _walls_of_plan(file: PlanFile, name: str, fields: ReadFields) -> House:
 
 
 def box_only_items(house: House, storeys: Sequence[PlanStorey]) -> tuple[Item, ...]:
-    """An item for each thing of a plan that is drawn, on the levels of the house, which go from below.
+    """An item for each piece of furniture of a plan, on the levels of the house from the lowest up.
 
-    As many storeys as the house has levels, or ValueError. Ids are by storey and number in the
-    plan, also of things that are not drawn.
+    Raises ValueError unless there are as many storeys as levels. Ids count all furniture of a storey, also
+    pieces that give no item.
     """
     levels = sorted(house.levels, key=lambda level: level.elevation)
     found = []
@@ -88,10 +87,9 @@ def box_only_items(house: House, storeys: Sequence[PlanStorey]) -> tuple[Item, .
 def furnish_plan_file(
     file: PlanFile, catalogue: Catalogue, *, seed: int, style: str = "", name: str = "home"
 ) -> GeneratedHome:
-    """A plan as a home's file: its things where the plan has them, other rooms furnished by a seed.
+    """A plan as a home's file: its furniture at its places, other rooms furnished by a seed.
 
-    The plans, not the file's name, decide together with the seed: equal plans and seeds give equal
-    homes.
+    Plans and seed decide, not the file's name: equal plans and seeds give equal homes.
     """
     plans = [s.plan for s in file.storeys]
     key = repr(plans[0]) if len(plans) == 1 else repr(plans)
@@ -109,7 +107,7 @@ def furnish_plan_file(
 
 
 def _pieces_of_things(file: PlanFile, catalogue: Catalogue) -> list[list[PlacedPiece]]:
-    """The pieces that stand in for a plan's things, a list a storey."""
+    """Catalogue pieces for a plan's furniture, a list per storey."""
     found: list[list[PlacedPiece]] = [[] for _ in file.storeys]
     if not catalogue.pieces or not any(s.things for s in file.storeys):
         return found

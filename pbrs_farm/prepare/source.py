@@ -39,7 +39,7 @@ _UNREAD_SUFFIXES: Final = frozenset({
 })  # fmt: skip
 _MOST_NAMED: Final = 3  # folders of homes that a hint names
 _LONGEST_ID: Final = 255  # bytes of a folder's name
-_DEFAULT_KIND: Final = "sweethome3d"  # of a path that says nothing: its reader tells what is wrong
+_DEFAULT_KIND: Final = "sweethome3d"  # of an unrecognised path: its reader explains the problem
 SAVED_SUFFIX: Final = ".home.json"
 """Of a file of a home with its edits: `saved_home` writes it, `resolve` reads it."""
 
@@ -50,9 +50,9 @@ _ROOT_HINT: Final = (
 
 
 def variants(source: SourceRef, seeds: Sequence[int]) -> list[SourceRef]:
-    """The source dressed by each seed, a house of its own each; itself for seed 0.
+    """The source dressed by each seed, as separate houses; the source itself for seed 0.
 
-    An object without context is never dressed: it is given back once.
+    An object without context is never dressed and returned once.
     """
     if source.kind in HOME_KIND and not HOME_KIND[source.kind].is_home:
         return [source]
@@ -69,11 +69,10 @@ def variants(source: SourceRef, seeds: Sequence[int]) -> list[SourceRef]:
 
 
 def words_of_homes(words: Sequence[str]) -> list[str]:
-    """The words, each that names several homes replaced by one word a home.
+    """Expand words that name several homes into one word per home.
 
-    That is a range, `made:1..20`, and a folder: every home in it of any format, by name, not those
-    in folders below but for a format whose homes are folders. A folder without one stays what it
-    is, so that `resolve` says what is wrong with it.
+    These are a range, `made:1..20`, and a folder: all homes in it of any format, by name, without its
+    subfolders unless they are homes. A folder without homes remains, so that `resolve` reports it.
     """
     homes: list[str] = []
     for word in words:
@@ -130,10 +129,10 @@ def _is_home_file(path: Path) -> bool:
 
 
 def resolve(word: str, files: SourceFiles | None = None, *, models: str = "") -> SourceRef:
-    """The source a word names: "builtin", an example home's name, or a path. Raises BadHouse.
+    """The source of a word: "builtin", an example home's name, or a path. Raises BadHouse.
 
-    files: what was looked at before, for many words that share files. models: the folder of the
-    models that a file of HSSD, 3D-FRONT or Holodeck names.
+    files: cache for many words that share files. models: folder of the models that a file of HSSD,
+    3D-FRONT or Holodeck names.
     """
     word, part = _parted(word)
     path = Path(word)
@@ -185,7 +184,7 @@ def _of_saved_home(path: Path, files: SourceFiles | None) -> SourceRef:
 
 
 def _format_at(path: Path) -> Format:
-    """The format of what lies at a path; raises BadHouse for a folder or a model that is no home."""
+    """The format of a path; raises BadHouse for a folder or a model that is no home."""
     entry = format_of_file(path)
     if entry is not None:
         return entry
@@ -219,7 +218,7 @@ def _parted(word: str) -> tuple[str, str]:
 
 
 def _is_utf8(word: str) -> bool:
-    """Whether a path can be stored and sent: bytes that are no UTF-8 become lone surrogates."""
+    """True if a path can be stored and sent: bytes that are not UTF-8 become lone surrogates."""
     try:
         word.encode()
     except UnicodeEncodeError:
@@ -252,10 +251,9 @@ def _source_of(kind: str, location: str, files: SourceFiles, models: str, part: 
 
 
 def suncg_list(root: Path, list_file: Path) -> list[str]:
-    """The words `ROOT/house/<id>` for every id in a list file, blank and # lines left out.
+    """The words `ROOT/house/<id>` for every id in a list file, without blank and # lines.
 
-    BadHouse, with the line, for an id that is too long for a folder's name. That the houses exist
-    is not checked.
+    Raises BadHouse, with the line, for an id that is too long for a folder's name. The houses need not exist.
     """
     ids = [line.strip() for line in text_given(list_file, error=BadHouse).splitlines()]
     for number, house in enumerate(ids, 1):
@@ -266,10 +264,10 @@ def suncg_list(root: Path, list_file: Path) -> list[str]:
 
 
 def check_unchanged(source: SourceRef) -> None:
-    """Raise BadHouse or MachineFailed where a file is not what it was when the source was named.
+    """Raise an error if a file has changed since the source was named. Reads all files of the source.
 
-    Reads all files of the source again. MachineFailed where another version of a package or plugin
-    is to blame, so that another machine may do it; BadHouse where the user's own file changed.
+    MachineFailed if another version of a package or plugin is the cause, so that another machine may do
+    it; BadHouse if the user's file has changed.
     """
     # Name the source again and compare the digests.
     now = _source_of(source.kind, source.location, SourceFiles(), source.models, source.part)
@@ -289,7 +287,7 @@ def check_unchanged(source: SourceRef) -> None:
 
 
 def _of_folder(folder: Path) -> tuple[str, str]:
-    """What is wrong with a folder that is no home, and what to do."""
+    """The problem of a folder that is no home, and a hint."""
     n = len(_homes_in(folder))
     if n:
         return (

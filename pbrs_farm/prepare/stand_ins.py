@@ -1,8 +1,8 @@
-"""Furniture for things of which a source gives class and box alone: scans, plans, scenes without their models.
+"""Furniture for items that a source gives by class and box alone: scans, plans, scenes without their models.
 
-No effects but the catalogue's. A box-only thing (an item tagged BOX_ONLY, without surfaces) gets the
-piece of the catalogue that fits its box best, scaled, on the floor or at the box's height, its front
-by what is near; else a plain box, or nothing.
+No effects but the catalogue's. A box-only item (tagged BOX_ONLY, without surfaces) gets the best fitting
+piece of the catalogue, scaled, on the floor or at the box's height, with its front chosen from its
+surroundings; else a plain box, or nothing.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from pbrs_farm.prepare.kitchen_runs import Unit, kitchen_units
 from pbrs_farm.read.catalogue.piece_groups import group_rule
 
 STAND_IN: Final = "stand-in"
-"""Tag of an item that stands in place of a box-only thing."""
+"""Tag of an item that replaces a box-only item."""
 
 How = Literal["pieces", "boxes", "none"]
 
@@ -54,15 +54,15 @@ _FAR_SCALES: Final = (0.35, 2.6)  # of such a box against the piece
 _BASINS: Final = frozenset({"sink", "washbasin"})
 _TALLEST_BASIN_M: Final = 1.3  # taller ones have a mirror
 _RIMS_M: Final = (0.6, 1.1)  # heights of basins' rims above the floor
-_ON_TOP_M: Final = 0.12  # between a thing and the top of what it stands on
+_ON_TOP_M: Final = 0.12  # maximum gap between an item and its support, metres
 _OVER_EDGE_M: Final = 0.05
 _MOST_DROP_M: Final = (
-    0.6  # what is farther above all else is held by something that no source tells of
+    0.6  # maximum drop to a support; an item higher up hangs from something the source omits
 )
-_NEAR_WALL_M: Final = 0.25  # a back that stands nearer to a wall than this stands at it
+_NEAR_WALL_M: Final = 0.25  # maximum gap between a back and its wall
 _THIN_M: Final = 0.12
 _AT_TABLE_M: Final = 1.5  # from a chair to the middle of its table
-_ON_FLOOR_M: Final = 0.35  # what stands on floors and whose box begins lower stands on the floor
+_ON_FLOOR_M: Final = 0.35  # maximum bottom height of a box on the floor
 _MOST_IN_WALL_M: Final = 0.15  # boxes of scans reach into walls
 _IN_WALL_SHARE: Final = 0.06  # of a footprint that may stay outside its room
 _SEATS: Final = frozenset({"chair", "stool", "office_chair"})
@@ -79,20 +79,19 @@ _PLAIN: Final = (0.62, 0.58, 0.52)
 class _Fit(NamedTuple):
     piece: Piece
     scale: F64  # (3,) along the piece's width, height, depth
-    misfit: float  # 0 = as it is modelled
+    misfit: float  # 0 = the modelled size
 
 
 def has_box_only_items(house: House) -> bool:
-    """Whether there are things of which the source gives class and box alone."""
+    """True if the source gives some items by class and box alone."""
     return any(BOX_ONLY in item.tags for item in house.items)
 
 
 def with_stand_ins(house: House, catalogue: Catalogue, how: How) -> House:
-    """The house with a piece, a box or nothing for each box-only thing; notes say what was left out.
+    """Replace each box-only item by a piece, a box or nothing; notes list the omitted ones.
 
-    Pieces come from the catalogue, and their credits go into the source's attribution. Without such
-    things it is the house itself. how "none" leaves them out, and a note says how many; catalogue
-    is read only for "pieces".
+    Pieces come from the catalogue, and their credits go into the source's attribution. how "none" omits
+    all of them, with a note of their number; only "pieces" reads the catalogue.
     """
     box_only = [item for item in house.items if BOX_ONLY in item.tags]
     if not box_only:
@@ -106,7 +105,7 @@ def with_stand_ins(house: House, catalogue: Catalogue, how: How) -> House:
     with closing(MutableHouse(left, 0)) as mutable:
         scene = _Scene(house, catalogue if how == "pieces" else None)
         units = _units_of_kitchens(box_only, scene)
-        # What stands on other things comes after them.
+        # Supports come before their contents.
         for item in sorted(box_only, key=scene.stands_on_another):
             if item.id in units:
                 _add_units(mutable, item, units[item.id], scene)
@@ -125,7 +124,7 @@ def with_stand_ins(house: House, catalogue: Catalogue, how: How) -> House:
 
 
 class _Place(NamedTuple):
-    """A room as box-only things meet it."""
+    """A room with the geometry that places box-only items."""
 
     room: Room
     outline: Polygon
@@ -141,7 +140,7 @@ def _place(room: Room) -> _Place:
 
 
 class _Scene:
-    """What stands-in are chosen from and placed among; state: counts of what became no piece."""
+    """Inputs and obstacles for choosing and placing stand-ins; counts the items without a piece."""
 
     def __init__(self, house: House, catalogue: Catalogue | None) -> None:
         self.house = house
@@ -176,7 +175,7 @@ class _Scene:
         return found
 
     def place_of(self, item: Item) -> _Place | None:
-        """The room that a box-only thing names, else the nearest one on its storey; None = out of all."""
+        """The room that a box-only item names, else the nearest on its storey; None = outside all rooms."""
         if item.id not in self._place_by_item:
             self._place_by_item[item.id] = self._find_place(item)
         return self._place_by_item[item.id]
@@ -202,7 +201,7 @@ class _Scene:
         return best
 
     def is_kitchen(self, place: _Place | None) -> bool:
-        """Whether one cooks in a room: what it is called, else what stands in it."""
+        """True if the room is a kitchen, by its name or else by its furniture."""
         if place is None:
             return False
         if place.room.id not in self._kitchens:
@@ -213,7 +212,7 @@ class _Scene:
         return self._kitchens[place.room.id]
 
     def stands_on_another(self, item: Item) -> bool:
-        """Whether a thing's box begins on, or within, the box of another, above its foot."""
+        """True if the bottom of an item's box is on or inside another box."""
         assert item.box is not None
         low = float(item.box.centre[1] - item.box.half[1])
         here = Point(*item.box.centre[[0, 2]])
@@ -232,7 +231,7 @@ class _Scene:
         return False
 
     def surface_below(self, item: Item, target: Box) -> float | None:
-        """The height of what stands below a thing that the source puts on another; None = nothing near."""
+        """Height of the support below an item that the source puts on another; None = nothing near."""
         if not self.stands_on_another(item):
             return None
         low = float(target.centre[1] - target.half[1])
@@ -256,7 +255,7 @@ class _Scene:
         return y if low - y < _MOST_DROP_M else None
 
     def remember(self, placed: Item) -> None:
-        """Keep a stand-in: things may stand on it."""
+        """Record a stand-in as a possible support."""
         (x0, _, z0), (x1, _, z1) = placed.bounds.tolist()
         self._placed.append((x0, z0, x1, z1, placed))
 
@@ -269,7 +268,7 @@ class _Scene:
 
 
 def _units_of_kitchens(box_only: list[Item], scene: _Scene) -> dict[str, list[Unit]]:
-    """The units that stand in for counters and kitchens, by the id of the thing."""
+    """Units that replace counters and kitchens, by item id."""
     if scene.catalogue is None:
         return {}
     by_room: dict[str, tuple[_Place, list[Item]]] = {}
@@ -296,7 +295,7 @@ def _likeliest_front(boxes: Sequence[Box], place: _Place, scene: _Scene) -> int:
 
 
 def _add_units(mutable: MutableHouse, item: Item, units: list[Unit], scene: _Scene) -> None:
-    """The units of a run; the first one bears the thing's id."""
+    """Add the units of a run; the first one has the replaced item's id."""
     assert scene.catalogue is not None
     place = scene.place_of(item)
     for number, unit in enumerate(units):
@@ -314,7 +313,7 @@ def _add_units(mutable: MutableHouse, item: Item, units: list[Unit], scene: _Sce
 
 
 def _target_of(item: Item, place: _Place | None) -> Box | None:
-    """The box within its room, off its walls; None where most of it lies in them."""
+    """The box clipped to its room, off the walls; None if most of it is inside them."""
     assert item.box is not None
     return _inside(_between(item.box, place.room), place.area) if place else item.box
 
@@ -329,7 +328,7 @@ def _stand_in(mutable: MutableHouse, item: Item, scene: _Scene) -> None:
         target = _down_to_floor(target, place.room)
     surface_y = scene.surface_below(item, target)
     if surface_y is not None:
-        # What it stands on may be lower, or higher, than the source's own.
+        # The support may be lower or higher than in the source.
         target = _from(target, surface_y, surface_y + 2 * float(target.half[1]))
     found = _chosen(item, target, place, scene) if scene.catalogue else None
     if found is not None and scene.catalogue is not None:
@@ -367,7 +366,7 @@ def _chosen(
 
 
 def _group_of(item: Item) -> str:
-    """The catalogue's group of a box-only thing, by its name, then by its class; "" = none."""
+    """Catalogue group of a box-only item, by its name, then by its class; "" = none."""
     assert item.box is not None
     width, height, depth = (float(2 * h) for h in item.box.half)
     names = (item.name, item.source_class, NYU40_NAMES[item.nyu40] if 0 < item.nyu40 < 38 else "")
@@ -390,7 +389,7 @@ def _best(catalogue: Catalogue, group: str, item: Item, target: Box) -> _Fit | N
         fits = [fit for p in pieces if p.place is not Place.OPENING and (fit := _fit(p, target))]
         if fits:
             return min(fits, key=lambda fit: (round(fit.misfit, 6), fit.piece.id))
-    # Fixtures are of one size whatever a scan measured: better a toilet of its own size than a box.
+    # Fixtures have standard sizes, so a toilet of the wrong size is better than a box.
     fits = [
         fit for p in catalogue.of(group) if group in _FIXTURES and (fit := _own_size(p, target))
     ]
@@ -398,7 +397,7 @@ def _best(catalogue: Catalogue, group: str, item: Item, target: Box) -> _Fit | N
 
 
 def _own_size(piece: Piece, target: Box) -> _Fit | None:
-    """A piece about as large as it is made; None where the box is far smaller or larger."""
+    """A piece at about its modelled size; None if the box is far smaller or larger."""
     size = np.array([piece.size[0], piece.size[2], piece.size[1]])
     raw = 2 * target.half / np.maximum(size, 1e-6)
     if not _stands(piece) or raw.min() < _FAR_SCALES[0] or raw.max() > _FAR_SCALES[1]:
@@ -413,11 +412,11 @@ def _fit(piece: Piece, target: Box) -> _Fit | None:
         return None
     scale = np.maximum(2 * target.half, 0.01) / size
     if piece.group in _BASINS:
-        # A source measures a basin to its rim; the tap stands over it.
+        # A source measures a basin to its rim, below the tap.
         if not _stands(piece) or piece.size[2] > _TALLEST_BASIN_M:
             return None
         scale[1] = 1.0
-    # What is thin, a picture, a rug, a flat screen, says little by its thickness.
+    # The thickness of a thin item (picture, rug, flat screen) says little.
     is_thin = (size < _THIN_M) | (2 * target.half < _THIN_M)
     scale = np.where(is_thin, np.clip(scale, *_SCALES), scale)
     thick = scale[~is_thin] if not is_thin.all() else scale
@@ -429,18 +428,18 @@ def _fit(piece: Piece, target: Box) -> _Fit | None:
 
 
 def _between(target: Box, room: Room) -> Box:
-    """The box between its room's floor and ceiling: what begins a little off the floor stands on it."""
+    """The box clipped to its room's height; a box just above the floor is lowered onto it."""
     low, high = (float(target.centre[1] + side * target.half[1]) for side in (-1, 1))
     bottom = max(low, room.floor_y)
     top = min(high, room.ceiling_y - 0.005)
     if top - bottom < 0.01:
-        # The box lies outside: keep its height and stand it on the floor.
+        # The box is outside: keep its height and put it on the floor.
         bottom, top = room.floor_y, room.floor_y + min(high - low, room.ceiling_y - room.floor_y)
     return _from(target, bottom, top)
 
 
 def _down_to_floor(target: Box, room: Room) -> Box:
-    """A basin's box down to the floor where its rim is as high as those of basins that stand."""
+    """Extend a basin's box to the floor if its rim is as high as that of a pedestal basin."""
     rim = float(target.centre[1] + target.half[1]) - room.floor_y
     if not _RIMS_M[0] <= rim <= _RIMS_M[1]:
         return target
@@ -538,7 +537,7 @@ def _placed(
     elif place is not None and _stands(fit.piece) and base - place.room.floor_y < _ON_FLOOR_M:
         base = place.room.floor_y
     if fit.piece.group in _BASINS:
-        # The tap stands over the rim that the source tells of.
+        # The tap rises above the rim that the source measures.
         target = _from(target, base, base + float(high[1] - low[1]))
     deeper = max(float(high[2] - low[2]) / 2 - float(target.half[2]), 0.0)
     at = target.centre + deeper * front - np.array([mx * cos + mz * sin, 0.0, mz * cos - mx * sin])
@@ -566,7 +565,7 @@ def _level_id(item: Item, place: _Place | None) -> str:
 
 
 def _kept(item: Item) -> tuple[str, ...]:
-    """The tags of a box-only thing that say more than that it is one."""
+    """The tags of a box-only item, without those that mark it as one."""
     return tuple(tag for tag in item.tags if tag not in (BOX_ONLY, FRONT_GIVEN))
 
 

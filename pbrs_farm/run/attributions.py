@@ -25,7 +25,6 @@ def write_attribution(store: Store) -> None:
     Other workers may finish houses meanwhile: it looks again after writing, and stops when nothing
     is new. A root whose houses ask for no credit gets no file.
     """
-    # Look again after writing: a house may have come in meanwhile.
     seen: list[dict[str, str]] | None = None
     for _round in range(_ROUNDS):
         rows = dressing_rows(get_or_none(store, keys.MANIFEST) or b"")
@@ -50,10 +49,7 @@ def write_attribution_of(store: Store, rows: Sequence[dict[str, str]]) -> None:
 
 
 def attribution_text(homes: Iterable[str], credits: Iterable[Credit]) -> str:
-    """The file's text; "" where nothing that is shown asks for a credit.
-
-    homes: the lines that the homes themselves ask for.
-    """
+    """The file's text; "" if nothing asks for a credit. homes: the credit lines of the homes themselves."""
     # Write a line a work, apart by whether its licence asks for one.
     lines: dict[bool, set[str]] = {True: set(), False: set()}
     for credit in credits:

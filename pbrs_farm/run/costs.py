@@ -1,7 +1,7 @@
-"""What a run will cost before it runs: CPU and GPU seconds, bytes, files, by measured constants; no effects.
+"""Estimated cost of a run: CPU and GPU seconds, bytes, files, from measured constants; no effects.
 
-The constants are of generated homes on one machine: they tell an hour from a month, and are not right to
-ten per cent. What a scene costs and how dark it is, is not in them.
+The constants come from generated homes on one machine, without the light of single scenes: they tell an
+hour from a month and are not right to ten per cent.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ def measured() -> Mapping[str, float]:
 
 @dataclass(frozen=True, slots=True)
 class RunCost:
-    """What runs cost together. On a GPU light takes gpu_s, and the CPU cpu_beside_gpu_s."""
+    """Total cost of runs. On a GPU light takes gpu_s, and cpu_beside_gpu_s of the CPU."""
 
     n_houses: int = 0
     n_views: int = 0
@@ -78,7 +78,7 @@ def views_per_house(recipe: Recipe, want: Wanted) -> float:
 
 
 def cost_of_run(recipe: Recipe, want: Wanted, n_houses: int) -> RunCost:
-    """What a run of n_houses houses costs."""
+    """Cost of a run of n_houses houses."""
     m, pixels = measured(), megapixels(recipe)
     has_light = any(mode.groups for mode in want.modes)
     rig = recipe.rig_in_use

@@ -1,4 +1,4 @@
-"""What a process keeps of the house it works on: geometry, caster, GL and light scenes, made once.
+"""The house that a process works on: geometry, caster, GL and light scenes, made once.
 
 Effects: reads the store, holds a GL context and Mitsuba scenes; one house at a time.
 """
@@ -35,12 +35,12 @@ if TYPE_CHECKING:
     from pbrs_farm.transport.scene_tables.sky import Sky
 
 
-_TIMES: Final = 3  # that are kept of a moving house: a frame's and its neighbours'
+_TIMES: Final = 3  # cached times of a moving house: a frame and its neighbours
 
 
 @dataclass(frozen=True)
 class Moment:
-    """A house at one time: what stands where, as labels see it."""
+    """A house at one time, as labels see it."""
 
     house: House
     geometry: Geometry
@@ -48,7 +48,7 @@ class Moment:
 
 
 class CachedHouse:
-    """A repaired house from the store and what is built from it, each at its first use."""
+    """A repaired house from the store, and its scenes, each built at its first use."""
 
     def __init__(self, store: Store, recipe: Recipe, house_id: str, digest: str) -> None:
         """digest: of the house step's marker; another digest means another CachedHouse."""
@@ -92,13 +92,13 @@ class CachedHouse:
 
     @cached_property
     def moving(self) -> MovingHouse:
-        """The house with what of it moves told apart, and where that is at any time."""
+        """The house split into static and moving parts."""
         return MovingHouse(self.house, self.geometry)
 
     def at(self, time_s: float | None) -> Moment:
-        """The house at a time in seconds; None, and a house in which nothing moves: at rest.
+        """The house at a time in seconds; at rest for None, and if nothing moves.
 
-        What stands still is shared by all times; the last few times are kept.
+        All times share the static parts; the last few times are cached.
         """
         if time_s is None or not self.house.motions:
             return Moment(self.house, self.geometry, self.caster)
@@ -153,9 +153,9 @@ class CachedHouse:
         return sky_for_house(self.recipe, self.house_id, panorama=panorama)
 
     def view(self, view_id: str, cameras_digest: str) -> View:
-        """The view of that id; BadInput if the house has none.
+        """The view with an id; BadInput if the house has none.
 
-        cameras_digest: of the cameras step's marker; cameras.json is read again when it changes.
+        cameras_digest: of the cameras step's marker; another digest reads cameras.json again.
         """
         views = self.views(cameras_digest)
         if view_id not in views:
@@ -169,7 +169,6 @@ class CachedHouse:
         cameras_digest is that of the file in the step's marker: with another one the file is read
         again.
         """
-        # Parse the file once for all views of the house.
         if self._views is None or self._views[0] != cameras_digest:
             key = keys.house_key(self.house_id, "cameras.json")
             self._views = (cameras_digest, views_from_json(self.store.get(key), key))
@@ -180,10 +179,7 @@ class CachedHouse:
         self._views = None
 
     def close(self) -> None:
-        """Free what the GPU or Mitsuba holds.
-
-        The object can be used again afterwards, and loads anew what is asked for.
-        """
+        """Free the resources of the GPU and Mitsuba. The object loads them again when it is used."""
         # Drop each cached property by name: scenes before the arrays they refer to.
         rasterizer = self.__dict__.pop("rasterizer", None)
         if rasterizer is not None:
@@ -213,7 +209,7 @@ def decoded_textures(house: House) -> tuple[dict[str, NDArray[np.uint8]], list[s
 
 
 class HouseCache:
-    """The house this process worked on last; asking for another one lets it go.
+    """The last house of this process.
 
     before_edits: the last house before its edits, which outlasts the houses that are made of it.
     """
@@ -223,10 +219,9 @@ class HouseCache:
         self._held: tuple[tuple[str, str, str, str], CachedHouse] | None = None
 
     def get(self, store: Store, recipe: Recipe, house_id: str, digest: str) -> CachedHouse:
-        """The loaded house, the same object as long as nothing it depends on changes.
+        """The loaded house, the same object while its inputs are the same.
 
-        Only one house is held: another one, or another digest or recipe, closes it first. So do not
-        keep what it returned across calls.
+        Another house, digest or recipe closes the cached one first, so do not keep the result across calls.
         """
         # Scenes depend on the recipe, too.
         key = (store.url, house_id, digest, recipe.digest())

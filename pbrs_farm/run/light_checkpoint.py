@@ -1,4 +1,4 @@
-"""What a view's light keeps every minute, so that a killed run goes on from its film.
+"""A checkpoint of a view's light, written every minute, from which a killed run resumes.
 
 Effects: reads and writes one object of the store, reads a clock.
 """
@@ -23,8 +23,8 @@ _MAX_BYTES: Final = 2**30  # larger states are not kept
 class LightCheckpoint:
     """Implements transport.render_checkpoint.RenderCheckpoint over an object of the store.
 
-    digest: of the step; what another one has kept is not gone on from. tell: hears the share that is
-    done, at most every few seconds. clock: seconds that only grow.
+    digest: of the step; checkpoints with another digest are ignored. tell: called with the finished share,
+    at most every few seconds. clock: monotonic seconds.
     """
 
     def __init__(
@@ -50,19 +50,14 @@ class LightCheckpoint:
         }
 
     def kept(self, part: str) -> Arrays:
-        """The state of a part; {} where nothing was kept.
-
-        Arrays as `keep` was given them, by name. A checkpoint of another recipe or home is never
-        loaded: its digest is part of what is compared.
-        """
+        """The stored arrays of a part, by name; {} without a checkpoint of this digest."""
         return self._loaded.get(part, {})
 
     def keep(self, part: str, share: float, state: Callable[[], Arrays]) -> None:
-        """Tell the share that is done; write the states of all parts when a minute has passed.
+        """Report the finished share of the step, 0..1; write the states of all parts once a minute.
 
-        share is 0..1 of the whole step. state is called only when something is written, so copying
-        from the GPU costs nothing in between; it is called later too, for another part's turn, and
-        must then still be right.
+        state is called only before a write, so copying from the GPU costs nothing in between. It may be
+        called later, for another part's write, and must still be right then.
         """
         self._states[part] = state
         now = self._clock()
@@ -82,7 +77,7 @@ class LightCheckpoint:
         parts = {part: state() for part, state in self._states.items()}
         if sum(a.nbytes for arrays in parts.values() for a in arrays.values()) > _MAX_BYTES:
             return
-        # A store that is full or away costs what was to be kept, not the render.
+        # A full or unreachable store costs the checkpoint, not the render.
         try:
             self._store.put(self._key, checkpoint_npz(KeptParts(self._digest, spent_s, parts)))
         except StoreFailed:

@@ -1,4 +1,4 @@
-"""What is asked of a run on this machine, and what came of it; values, no effects."""
+"""Request and summary of a run on this machine; values, no effects."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Observer = Callable[[Event], None]
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """What is asked of a local run."""
+    """Request of a local run."""
 
     homes: Sequence[str]  # words as prepare.source.resolve takes them
     store_url: str
@@ -30,23 +30,23 @@ class Run:
     memory_mb: float = 0.0  # and one that holds more; 0 = its share of the machine
     debug: bool = False  # tracebacks travel with failures
     store: StoreSettings = field(default_factory=StoreSettings)
-    sources: Sequence[SourceRef] = ()  # homes that are resolved already
+    sources: Sequence[SourceRef] = ()  # resolved homes
     dress_seeds: Sequence[int] = ()  # each home dressed by each of them; none = by the recipe's
-    refused: Sequence[tuple[str, str]] = ()  # what was asked for and cannot be read, and why
+    refused: Sequence[tuple[str, str]] = ()  # unreadable homes and the reason of each
     models: str = ""  # folder of the models that the homes' files name
 
 
 @dataclass(slots=True)
 class Summary:
-    """What came of a run."""
+    """Result of a run."""
 
     houses: list[str] = field(default_factory=list)
     n_views: int = 0
     n_done: int = 0  # steps
-    n_kept: int = 0  # steps that were done already
+    n_kept: int = 0  # steps that were done before
     peak_mb: float = 0.0  # of the largest process
     failures: list[tuple[str, str, str]] = field(default_factory=list)  # what, message, command
-    without_views: list[tuple[str, str]] = field(default_factory=list)  # house, why it has none
+    without_views: list[tuple[str, str]] = field(default_factory=list)  # house, reason
     left_out: list[tuple[str, str]] = field(default_factory=list)  # house, which views and why
     leaks: list[tuple[str, str]] = field(default_factory=list)  # house, rays that reached the sky
     walls_lost: list[tuple[str, str]] = field(default_factory=list)  # house, walls repair lost

@@ -21,10 +21,7 @@ from pbrs_farm.store.object_store import LAYOUT, Store, get_or_none
 
 
 def attribution(store: Store, house_id: str) -> str:
-    """The line every product of the house must carry, "" if its source asks for none.
-
-    A house.json that is missing or damaged gives "" as well.
-    """
+    """The credit line of all products of the house; "" without one, or if house.json is missing or damaged."""
     key = keys.house_key(house_id, "house.json")
     data = get_or_none(store, key)
     if data is None:
@@ -36,20 +33,18 @@ def attribution(store: Store, house_id: str) -> str:
 
 
 def finish_house(store: Store, house_id: str) -> int:
-    """Write the house's manifest if it changed, remove what done steps kept; the number of objects.
+    """Write the house's manifest if it changed, and remove the checkpoints of done steps.
 
-    Lists what markers say, whether or not the file is there. An equal manifest is not written
-    again, since its date tells when the house last changed.
+    Returns the number of objects that the markers list, whether or not the files exist. An equal manifest is
+    not written again, since its date tells when the house last changed.
     """
-    # A manifest lists what the markers say, not what lies in the folder.
     found = [read_marker(store, k) for k in store.list(keys.house_key(house_id, "done/"))]
     markers = [marker for marker in found if marker is not None]
     data = manifest_from_markers(markers, attribution(store, house_id))
     key = keys.house_key(house_id, keys.MANIFEST)
-    # Leave an equal file alone: its date tells when the house last changed.
     if get_or_none(store, key) != data:
         store.put(key, data)
-    # A step that was killed between its marker and the removal of what it kept left that behind.
+    # A step killed between its marker and the removal of its checkpoint leaves one.
     done = {keys.unfinished_key(house_id, m.step, m.view_id) for m in markers if m.view_id}
     for unfinished in list(store.list(keys.unfinished_key(house_id))):
         if unfinished in done:
@@ -58,24 +53,21 @@ def finish_house(store: Store, house_id: str) -> int:
 
 
 def merge_manifests(store: Store, house_ids: list[str]) -> None:
-    """Write the root's manifest.jsonl from those of the houses that have one.
+    """Write the root's manifest.jsonl from those of the houses, in the order of the ids.
 
-    In the order of the ids, whatever the order of house_ids; houses without a manifest add nothing.
+    Houses without a manifest, which failed before their first marker, add nothing.
     """
-    # A house that failed before its first marker has none.
     found = (keys.house_key(house_id, keys.MANIFEST) for house_id in sorted(house_ids))
     store.put(keys.MANIFEST, b"".join(get_or_none(store, key) or b"" for key in found))
 
 
 def finish_root(store: Store, houses: Iterable[str]) -> None:
-    """Write the manifests of these houses and that of the root, and whose works it shows.
+    """Write the manifests of these houses, the root's manifest of all its houses, and the attribution.
 
-    The root's manifest then covers every house of the folder, those of earlier runs too. Safe to
-    call again, also while other workers write.
+    Safe to call again, also while other workers write.
     """
     for house_id in houses:
         finish_house(store, house_id)
-    # The root's manifest covers every house of the folder, those of former runs too.
     below = [keys.parse_house_key(key) for top in keys.FOLDERS for key in store.list(f"{top}/")]
     merge_manifests(store, [at.house for at in below if at and at.file == keys.MANIFEST])
     write_attribution(store)
@@ -101,10 +93,10 @@ def claim_root(store: Store, recipe: Recipe, *, update: bool) -> None:
 
 
 def pull(of: Store, folder: Path, tell: Callable[[int], None] = lambda _n: None) -> tuple[int, int]:
-    """Copy an output root, however it lies, into a folder of files; how many were copied, how many were there.
+    """Copy an output root of any layout into a folder of files; the numbers of copied and of present files.
 
-    A file that is there with its size is not read again, but for manifests and the like of the root.
-    tell: called with how many files are done, after each.
+    A file of a house that is present with its size is not read again. tell: called before each file with the
+    number of finished ones.
     """
     to, n_copied, n_there = FolderStore(folder), 0, 0
     for key in of.list():
@@ -123,10 +115,10 @@ def pull(of: Store, folder: Path, tell: Callable[[int], None] = lambda _n: None)
 
 @contextmanager
 def as_files(word: str, settings: StoreSettings) -> Iterator[Path]:
-    """The folder of an output root: the one named, or of a URL or a packed root a copy, removed afterwards.
+    """The folder of an output root; for a URL or a packed root a temporary copy.
 
-    A copy of a remote or packed root is whole: mind its size. What is written into the copy is
-    lost. A folder that is no root is yielded as it is.
+    A copy of a remote or packed root is whole: mind its size. Changes to the copy are lost. A folder that is
+    no root is yielded as it is.
     """
     if "://" not in word and not (Path(word) / LAYOUT).is_file():
         yield Path(word)

@@ -24,7 +24,7 @@ from pbrs_farm.sample.camera_source import source_of
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """One function of run/steps.py: what it depends on."""
+    """One function of run/steps.py with its inputs."""
 
     name: str
     version: int  # raised when its output changes
@@ -68,7 +68,7 @@ OPENGL_STEPS: Final = ("opengl_dl", "opengl_il")
 def wanted(
     modes: Iterable[str], layers: Iterable[str], n_views: int = 0, *, pairs: bool = False
 ) -> Wanted:
-    """What is made, from words: no modes are all of them. BadInput for a word that is none of ours."""
+    """`Wanted` from words; no modes mean all of them. BadInput for an unknown word."""
     asked = tuple(modes) or ALL_MODES
     return wanted_of(Wanted(modes=asked, layers=tuple(layers), n_views=n_views, pairs=pairs))
 
@@ -161,9 +161,9 @@ def lit_views(
     floor_lux: Mapping[str, Mapping[str, float]],
     least_lx: float,
 ) -> tuple[list[tuple[str, str, float]], list[str]]:
-    """The rows (view id, room id, score) of rooms that are bright enough; why others are left out.
+    """The rows (view id, room id, score) of bright rooms, and the reasons for omitting others.
 
-    floor_lux: room id -> lx by light group, of the step illuminance; rooms it lacks are kept.
+    floor_lux: room id -> lx by light group, of the step illuminance; views of rooms without a row remain.
     """
     kept: list[tuple[str, str, float]] = []
     left_out: dict[str, int] = {}

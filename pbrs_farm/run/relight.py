@@ -33,17 +33,16 @@ from pbrs_farm.transport.lamp_layers import indoor_from_lamps, lamp_shares, reli
 
 @dataclass(frozen=True, slots=True)
 class LampFactor:
-    """What one --lamp asks."""
+    """The request of one --lamp."""
 
     word: str  # a lamp's number, item, name, or a pattern of these
     rgb: tuple[float, float, float]  # what its light is multiplied by
 
 
 def linear_aovs(radiance: RadianceExr) -> LinearAovs:
-    """What `develop` reads of a radiance.exr; BadInput when an image is missing.
+    """The images of a radiance.exr for `develop`, as stored; BadInput if one is missing.
 
-    float32 (H, W, 3) each: outdoor, indoor, albedo and normal, as they were stored and not
-    denoised.
+    float32 (H, W, 3) each: outdoor, indoor, albedo and normal, not denoised.
     """
     image = radiance.image
     return LinearAovs(image("outdoor"), image("indoor"), image("albedo"), image("normal"))
@@ -53,17 +52,17 @@ def linear_aovs(radiance: RadianceExr) -> LinearAovs:
 class RelightLayers:
     """The layers of light that relit views are sums of, (H, W, 3) float32 radiance each."""
 
-    aovs: LinearAovs  # its groups as they are developed
+    aovs: LinearAovs  # its groups for `develop`
     lamps: Mapping[int, F32]  # number -> its share of indoor light; they sum to it
 
 
 def relight_layers(
     radiance: RadianceExr, rows: Sequence[Mapping[str, Any]], *, denoise: bool
 ) -> RelightLayers:
-    """The layers whose sums `relit` tones. rows: the lamps of view.json, () where it has none.
+    """The layers whose sums `relit` tones. rows: the lamps of view.json, () without any.
 
-    With denoise, each lamp's layer is denoised and scaled so that their sum is the denoised indoor
-    light. MachineFailed without a denoiser. BadInput where the file lacks a layer that rows name.
+    With denoise, each lamp's layer is denoised and scaled so that their sum is the denoised indoor light.
+    MachineFailed without a denoiser. BadInput if the file lacks a layer of rows.
     """
     aovs = linear_aovs(radiance)
     layers = {int(r["number"]): radiance.image(r["layer"]) for r in rows if r["layer"]}
@@ -112,7 +111,7 @@ def _denoised_lamps(aovs: LinearAovs, layers: Mapping[int, F32]) -> dict[int, F3
 
 
 def lamps_of_view(view: Path) -> list[dict[str, Any]]:
-    """The lamps' rows of a view's view.json (transport/lamp_layers.py); BadInput when it has none."""
+    """The lamps' rows of a view's view.json (transport/lamp_layers.py); BadInput without any."""
     return lamps_from_view_json(read_given(view / "view.json"), view)
 
 
@@ -124,13 +123,11 @@ def lamp_factors(rows: Sequence[Mapping[str, Any]], words: Sequence[LampFactor])
     """
     factors: dict[int, F32] = {}
     for asked in words:
-        # Find the lamps that the word names.
         named = [int(row["number"]) for row in rows if _is_named(row, asked.word)]
         if not named:
             exist = ", ".join(f"{row['number']} {row['item']} ({row['name']})" for row in rows)
             hint = f"of {exist}" if exist else "there is none"
             raise BadInput("--lamp", asked.word, "no such lamp", hint=hint)
-        # Let the last word that names a lamp count.
         factors |= {number: np.array(asked.rgb, np.float32) for number in named}
     return factors
 
@@ -182,7 +179,7 @@ def folder_of_view(word: str, settings: StoreSettings, *, needs_light: bool) -> 
             try:
                 copy.put(key, store.get(key))
             except ObjectMissing:
-                # Only the line of credit stands in house.json.
+                # house.json needs its credit line alone.
                 if key in wanted:
                     raise BadInput(word, key, "not in this store") from None
         yield Path(folder) / keys.view_key(house, view)

@@ -1,8 +1,8 @@
-"""What a user asks of `run` and `submit`: one field an option, with type, default, limits and help.
+"""Options of `run` and `submit`: one field each, with type, default, limits and help.
 
-The one place of an option. Both command lines, a job's file, `pf.render_homes` and the farm's JobSpec
-are made from these fields: one that is added to Wanted is an option of both verbs, an entry of job.toml,
-and travels to every worker. commands/options.py makes the command line. No effects.
+The only list of options. Both command lines, a job's file, `pf.render_homes` and the farm's JobSpec are
+made from these fields: a new field of Wanted is an option of both verbs, an entry of job.toml, and
+travels to every worker. commands/options.py makes the command line. No effects.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from pbrs_farm.core.shown_text import hint_of_choice
 
 
 class LibraryOptions(Record):
-    """What to dress with beside the furniture package."""
+    """Libraries for dressing beside the furniture package."""
 
     catalogue: tuple[str, ...] = option(
         (), "your own library, repeatable: .sh3f (models), .sh3t (textures), a folder of OBJ or GLB, of"
@@ -69,7 +69,7 @@ class SeededRecipeOptions(RecipeOptions):
 
 
 class LightOptions(Record):
-    """How long light is traced and which groups are stored: short forms of the recipe's fields."""
+    """Duration of light and its stored groups: short forms of the recipe's fields."""
 
     noise: str | None = option(
         None, "end a view's light at this estimated relative error, e.g. 0.05 (light.noise):"
@@ -130,7 +130,7 @@ class ModelsOption(Record):
 
 
 def _modes(given: object) -> object:
-    """Modes by name or themselves, in the order of ALL_MODES; BadInput for one that is none."""
+    """Modes, by name or as Mode, in the order of ALL_MODES; BadInput for an unknown name."""
     if isinstance(given, str) or not isinstance(given, Iterable):
         return given
     names = [mode.value for mode in ALL_MODES]
@@ -143,10 +143,9 @@ def _modes(given: object) -> object:
 
 
 class Wanted(Record):
-    """What is made of each house: the options that `run`, `submit` and every worker know alike.
+    """The products of each house: the options that `run`, `submit` and every worker share.
 
-    A field that is added here needs nothing elsewhere but the code that heeds it. Modes may be given
-    by name; no mode at all is labels alone.
+    A new field needs no code elsewhere but its use. Modes may be given by name; no mode means labels alone.
 
         >>> Wanted(modes=("mlt_ol", "opengl_dl")).modes[0].value
         'opengl_dl'
@@ -175,10 +174,10 @@ class Wanted(Record):
 
 
 def wanted_of(request: Wanted) -> Wanted:
-    """What a request, or a job of the farm, asks of each house, its layers in the table's order.
+    """The `Wanted` of a request or of a job of the farm, with layers in the table's order.
 
-    With a layer go those that it says nothing without. Raises BadInput for a layer that is not
-    installed here, and for one that is made of light where none is traced.
+    Adds the layers that others need. Raises BadInput for a layer that is not installed here, and for one
+    made of light if none is traced.
     """
     want = Wanted(**{name: getattr(request, name) for name in Wanted.model_fields})
     for layer in want.layers:
@@ -192,7 +191,7 @@ def wanted_of(request: Wanted) -> Wanted:
 
 
 class ProcessLimitOptions(Record):
-    """How many processes this machine has for a run, and what each may take."""
+    """Number and limits of the processes of a run on this machine."""
 
     jobs: int = option(
         1, "processes (default 1, with a second one beside it for most steps but light); each view uses all cores",
@@ -221,15 +220,15 @@ class ProcessOptions(ProcessLimitOptions):
 
 
 class Request(Wanted, LightOptions, SeededRecipeOptions, LibraryOptions, DressOptions):
-    """What `run` and `submit` take alike: dressing, recipe, light, and what is made of each house."""
+    """Shared options of `run` and `submit`: dressing, recipe, light, and products."""
 
 
 class RunRequest(ProcessOptions, Request):
-    """What `run` and `demo` take beside the homes."""
+    """Options of `run` and `demo` beside the homes."""
 
 
 class ObjectsRequest(ProcessOptions, Wanted, LightOptions, SeededRecipeOptions):
-    """What `objects` takes beside the models: nothing of dressing."""
+    """Options of `objects` beside the models, without dressing."""
 
 
 SHORT_FORMS: Final = {

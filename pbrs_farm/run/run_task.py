@@ -1,6 +1,6 @@
-"""What a render process of a local run does with a task: its steps, an event for each.
+"""Run a task in a render process: its steps, with an event for each.
 
-Effects: the store's, and those of the libraries the steps use; a crash here costs one step.
+Effects: those of the store and of the steps' libraries; a crash here costs one step.
 """
 
 from __future__ import annotations
@@ -82,7 +82,7 @@ def make_finishing_handler(send: Send) -> Handler:
 
 def _load(modules: Sequence[str]) -> None:
     for module in modules:
-        # What is missing is told by the step that needs it.
+        # The step that needs a missing library reports it.
         with contextlib.suppress(ImportError):
             importlib.import_module(module)
     with contextlib.suppress(PbrsError):
@@ -90,10 +90,10 @@ def _load(modules: Sequence[str]) -> None:
 
 
 def run_task(send: Send, setting: Setting, house_cache: HouseCache, task: RenderTask) -> None:
-    """Run the steps of one task; a failed one leaves out those that read what it makes.
+    """Run the steps of one task.
 
-    A step that fails does not raise: its fault is sent, and the steps that read what it makes are
-    left out. `view` never is, since it lists whatever there is.
+    A failed step does not raise: its error is sent, and the steps that read its files are skipped, except
+    `view`, which lists the existing files.
     """
     work = Work(
         store=store_from_url(setting.store_url, setting.store),
@@ -105,7 +105,6 @@ def run_task(send: Send, setting: Setting, house_cache: HouseCache, task: Render
         layers=task.layers,
         tell_share=lambda share: send(Message("share", f"{share:.4f}")),
     )
-    # A step is left out when one it reads failed; view.json lists whatever there is.
     failed: set[str] = set()
     for name in task.steps:
         is_blocked = name != "view" and bool(failed.intersection(plan.STEPS[name].after))
@@ -143,7 +142,7 @@ def _run_step(send: Send, setting: Setting, name: str, work: Work) -> bool:
 
 
 def _facts_for_run(step: str, facts: dict[str, Any]) -> dict[str, Any]:
-    """What of a marker's facts the run needs: all of a house's steps, the darkness of a view."""
+    """The marker facts that a run needs: all of a house's steps, the darkness of a view."""
     if not plan.STEPS[step].per_view:
         return facts
     return {"dark": facts["dark"]} if facts.get("dark") else {}

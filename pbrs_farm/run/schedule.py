@@ -1,10 +1,10 @@
-"""Which task of a local run is done next, by which process, and what follows from how it ended.
+"""Scheduler of a local run: the next task of each process, and the consequences of its end.
 
     one process a house:   all steps of the house -> per view: all its steps
     light apart (RENDER):  house -> cameras and, beside it, illuminance
-                           -> per view: light and, beside it, its labels -> what needs both
+                           -> per view: light and, beside it, its labels -> steps that need both
 
-Effects: gives tasks to a pool and tells an observer of its events.
+Effects: gives tasks to a pool and reports events to an observer.
 """
 
 from __future__ import annotations
@@ -24,13 +24,11 @@ from pbrs_farm.run.processes.render_task import Event, RenderTask
 _OF_LIGHT: Final = ("illuminance", "light")  # steps of the process that renders light
 _AFTER_LIGHT: Final = ("develop", "view")  # steps of a view that wait for it
 
-_Stage: TypeAlias = list[
-    tuple[int, RenderTask]
-]  # tasks that are done side by side, each with its lane
+_Stage: TypeAlias = list[tuple[int, RenderTask]]  # parallel tasks, each with its lane
 
 
 class _Unit:
-    """A house, or a view, that is being made: its stages follow one another."""
+    """A house or view in progress, with its remaining stages."""
 
     def __init__(self, stages: Sequence[_Stage]) -> None:
         self.stages = deque(stage for stage in stages if stage)
@@ -68,10 +66,10 @@ class Schedule:
             self._begin_house(self._houses.popleft(), RENDER)
 
     def drive(self, pool: Pool) -> None:
-        """Until nothing waits and nobody works.
+        """Run until no task waits or runs.
 
-        Idle processes are asked first, each with the house it holds; then events are taken, which
-        may add tasks. Returns also when everything failed: the outcome is in what was reported.
+        Idle processes are served first, each with the house it holds; then events, which may add tasks. Returns
+        also when everything failed: the result is in the reports.
         """
         while self._houses or any(self._waiting.values()) or pool.n_busy:
             for lane in self._waiting:
@@ -83,7 +81,7 @@ class Schedule:
                 self._take(event)
 
     def _next(self, lane: int, held_house: str, pool: Pool) -> RenderTask | None:
-        """What an idle process of the lane does: a task that waits, else the next house."""
+        """Next task of an idle process of the lane: a waiting task, else the next house."""
         waiting = self._waiting[lane]
         if not waiting and self._houses and self._may_begin(lane, pool):
             self._begin_house(self._houses.popleft(), lane)
@@ -126,7 +124,7 @@ class Schedule:
     def _begin_stage(self, unit: _Unit) -> None:
         stage = unit.stages.popleft()
         unit.n_open = len(stage)
-        # What completes a view goes before the labels of those whose light is still rendered.
+        # Tasks that complete a view come before the labels of views whose light is being rendered.
         for lane, task in stage:
             if task.steps[0] in _AFTER_LIGHT:
                 self._waiting[lane].appendleft(task)
@@ -137,7 +135,7 @@ class Schedule:
         summary = self._summary
         summary.peak_mb = max(summary.peak_mb, event.peak_mb)
         key = (event.house_id, event.view_id or "")
-        # What a machine lacks is a fault where nothing else was asked for.
+        # A missing capability is an error if nothing else was requested.
         if event.kind == "lacking" and not plan.has_light(self._run.want):
             event = replace(event, kind="failed")
         if event.kind in ("done", "kept"):
@@ -197,7 +195,7 @@ class Schedule:
     def _add_views(self, house: str, facts: dict[str, Any]) -> None:
         want, source = self._run.want, self._sources[house]
         rows = [(str(v), str(room), float(score)) for v, room, score in facts["views"]]
-        # Leave out rooms that were measured dark, where the recipe chooses the views.
+        # Skip rooms that were measured dark, if the recipe chooses the views.
         reason, lux = str(facts.get("why_none", "")), self._floor_lux.pop(house, {})
         if plan.leaves_out_dark_rooms(self._run.recipe, want, house):
             rows, lines = plan.lit_views(rows, lux, self._run.recipe.selection.min_room_lx)
@@ -208,7 +206,7 @@ class Schedule:
         self._observe(Event("planned", house, None, "view", facts={"views": views}))
         if not views:
             self._summary.without_views.append((house, reason))
-        # What needs illuminance would fail for the reason that illuminance has told already.
+        # Steps that need illuminance would fail again for the reported reason.
         modes = tuple(m for m in want.modes if not (m.groups and house in self._unlit))
         steps = plan.view_steps(want.model_copy(update={"modes": modes}))
         # They go before the next houses.

@@ -51,29 +51,29 @@ class Work:
     house_cache: HouseCache
     source: SourceRef | None = None  # only the house step reads it
     view_id: str | None = None  # of a step of a view
-    layers: tuple[str, ...] = ()  # optional layers to write beside those that are there
+    layers: tuple[str, ...] = ()  # optional layers to write beside the present ones
     inputs: Mapping[str, str] = field(default_factory=dict)  # step it reads -> digest of its marker
     digest: str = ""  # of the step under way
     tell_share: Callable[[float], None] = unheard  # called with the share done of a long step
 
     def layers_of(self, step: str) -> tuple[str, ...]:
-        """Those of its optional layers that a step heeds; `light` those that are made of light."""
+        """The optional layers that concern a step; for `light` those made of light."""
         written_by = {"light": "develop"}.get(step, step)
         return tuple(name for name in self.layers if LAYER[name].step == written_by)
 
 
 @dataclass(frozen=True, slots=True)
 class StepOutput:
-    """What a step gives."""
+    """Result of a step's function."""
 
     files: Mapping[str, bytes]  # by name below the house's or the view's folder
     facts: dict[str, Any] = field(default_factory=dict)  # of its marker
-    unfinished: str = ""  # key of what it had kept of itself, to remove once it is done
+    unfinished: str = ""  # key of the step's checkpoint, to remove once it is done
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What came of a step."""
+    """Result of a step."""
 
     marker: Marker
     was_done: bool  # it was there already
@@ -86,7 +86,7 @@ def run_unless_done(
 
     Raises BadInput if a step before it has not been done.
     """
-    # Digest everything the step depends on, and compare it with the marker that is there.
+    # Compare the digest of all inputs with that of the present marker.
     step = plan.STEPS[name]
     view_id = work.view_id if step.per_view else None
     inputs = _inputs(step, work)
@@ -97,7 +97,7 @@ def run_unless_done(
 
     key = keys.marker_key(work.house_id, name, view_id)
     old = read_marker(work.store, key)
-    # Layers that are there stay, where nothing else has changed.
+    # Keep the present layers if nothing else has changed.
     written = replace(work, layers=_written_layers(old))
     is_valid = old is not None and old.digest == digest_of(written)
     if is_valid:
@@ -105,12 +105,13 @@ def run_unless_done(
     digest = digest_of(work)
     if old is not None and old.digest == digest:
         return Outcome(old, was_done=True)
-    # Remove the marker before its files change: a crash leaves a step that is not done. Files
-    # that are right outlast a step that fails to add to them.
+    # Remove the marker before its files change, so that a crash leaves an unfinished step. Valid
+    # files
+    # outlast a step that fails to add to them.
     if old is not None and not is_valid:
         work.store.delete(key)
 
-    # Do the step, put its files, then its marker: both at once where the store packs them.
+    # Put the files, then the marker: both at once in a store that packs them.
     started = time.perf_counter()
     made = function(replace(work, inputs=inputs, digest=digest))
     if is_valid:
@@ -167,7 +168,7 @@ def _inputs(step: plan.Step, work: Work) -> dict[str, str]:
 
 
 def _extra(name: str, work: Work) -> object:
-    """What a step depends on beside recipe fields and other steps."""
+    """Inputs of a step beside recipe fields and other steps."""
     if name == "house":
         return passes.step_depends(required_source(work), work.recipe)
     if name == "truth":
@@ -227,7 +228,7 @@ def camera_file_text(fields: CameraFields) -> str:
 
 
 def required_source(work: Work) -> SourceRef:
-    """The house's source; BadInput when the work has none."""
+    """The house's source; BadInput if the work has none."""
     if work.source is None:
         raise BadInput(work.house_id, "", "the house step needs the house's source")
     return work.source

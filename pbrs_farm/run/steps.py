@@ -89,7 +89,6 @@ def _cameras(work: Work) -> StepOutput:
         return _object_cameras(work, house, seed)
     sampling = chosen_cameras(house, work.recipe, seed, cached.caster)
     views, report = sampling.views, sampling.report
-    # Say why where there are none.
     made = _camera_output(views, report.model_dump(mode="json"), work.recipe)
     return made if views else StepOutput(made.files, {**made.facts, "why_none": report.why_none})
 
@@ -104,7 +103,7 @@ def _object_cameras(work: Work, house: House, seed: int) -> StepOutput:
 
 
 def _camera_output(views: Sequence[View], report: dict[str, Any], recipe: Recipe) -> StepOutput:
-    """The file of views that were chosen through a pin-hole, with the recipe's lens before them."""
+    """cameras.json of views that were chosen through a pin-hole, with the recipe's lens applied."""
     from pbrs_farm.run.chosen_cameras import with_lens
 
     views = [with_lens(view, recipe.lens, recipe.rig_in_use) for view in views]
@@ -171,14 +170,14 @@ def _truth(work: Work) -> StepOutput:
     view, camera, now = setup.view, setup.camera, setup.now
     caster, house = now.caster, now.house
     hit = caster.hit_record(camera)
-    # Derive the layers that every view has, and the table of what is seen.
+    # Derive the layers of every view, and the table of visible items.
     arrays = truth.layers_from_hit(hit, house, camera)
     table = truth.view_table(hit.item, house, camera, cut_outs=caster.cut_outs)
     if house.motions and view.time_s is not None:
         table["motion"] = truth.motion_table(house, view.time_s)
     if setup.room is not None:
         table["layout"] = truth.layout_table(setup.room, camera, hit.depth_z)
-    # Add the layers that were asked for; those behind glass cast once more without it.
+    # Add the requested layers; those behind glass cast rays again without it.
     layers = work.layers_of("truth")
     if layers:
         seed = view.shot.seed(work.house_id, "truth", work.recipe.seed, per="view")
@@ -274,7 +273,7 @@ def _light(work: Work) -> StepOutput:
 
 
 def _facts_of_light(work: Work, setup: ViewSetup, result: LightResult) -> dict[str, Any]:
-    """What view.json says of a view's light."""
+    """Facts of a view's light for view.json."""
     from pbrs_farm.transport.illuminance import darkness_of_room
     from pbrs_farm.transport.light_result import darkness_of_picture
 
@@ -354,7 +353,7 @@ def _view(work: Work) -> StepOutput:
 
 
 def _facts_of_view(work: Work) -> dict[str, dict[str, Any]]:
-    """Step -> facts of its marker, for every step of this view that is done."""
+    """Step -> facts of its marker, for every done step of this view."""
     facts = {}
     for name in plan.STEPS["view"].after:
         if plan.STEPS[name].per_view:

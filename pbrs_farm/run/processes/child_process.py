@@ -1,6 +1,6 @@
 """The operating system's side of a render process: its start, pipes, log and end.
 
-Effects: a process in a session of its own, and its log file.
+Effects: a process in a new session, and its log file.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ class ChildProcess:
     def __init__(self, target: str, log: Path) -> None:
         self._log = log
         self._buffer = b""  # received, up to no line's end yet
-        # A session of its own: Ctrl-C does not reach it, and its children die with it.
+        # A new session: Ctrl-C does not reach it, and its children die with it.
         command = [sys.executable, "-P", "-c", _BOOT, json.dumps(sys.path), target]
         with log.open("ab") as file:
             self._process = subprocess.Popen(
@@ -75,7 +75,7 @@ class ChildProcess:
             chunk = self._replies.read(timeout_s)
             if chunk is None:
                 return None
-            if not chunk:  # it is ending; exit_code tells how as soon as it has
+            if not chunk:  # end of file: exit_code soon returns the exit status
                 with contextlib.suppress(subprocess.TimeoutExpired):
                     self._process.wait(timeout=1.0)
             self._buffer += chunk
@@ -89,22 +89,19 @@ class ChildProcess:
         return self._process.poll()
 
     def kill(self) -> None:
-        """Kill it and whatever it started; it is gone afterwards.
-
-        Nothing of it can clean up. Take `close` where it should free what it holds.
-        """
+        """Kill it and its children, without any clean-up; `close` ends it in good order."""
         end_tree(self._process)
         self._process.wait()
         self.release()
         self._replies.close()
 
     def release(self) -> None:
-        """Close its requests' pipe, so that it ends by itself as soon as it can."""
+        """Close its requests' pipe, so that it ends by itself."""
         with contextlib.suppress(BrokenPipeError):
             self._requests.close()
 
     def close(self) -> None:
-        """Let it end by itself, which frees what its libraries hold; kill it when it does not."""
+        """Let it end by itself, which frees its libraries' resources; kill it if it does not."""
         self.release()
         with contextlib.suppress(subprocess.TimeoutExpired):
             self._process.wait(timeout=_CLOSE_S)
@@ -123,7 +120,7 @@ class ChildProcess:
         return self._log.stat().st_size
 
     def log_tail(self, n_bytes: int) -> str:
-        """The end of its log, "" when there is none."""
+        """The end of its log; "" without one."""
         try:
             with self._log.open("rb") as file:
                 file.seek(max(0, file.seek(0, os.SEEK_END) - n_bytes))

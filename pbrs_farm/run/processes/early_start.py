@@ -13,7 +13,7 @@ from typing import Final
 from pbrs_farm.run.processes.child_process import ChildProcess
 
 FINISHING_HANDLER: Final = "pbrs_farm.run.run_task:make_finishing_handler"
-"""What makes the handler of the process that makes houses and finishes views."""
+"""Factory of the handler that makes houses and finishes views."""
 
 # Target -> a process that nobody has taken, and the folder of its log.
 _STARTED: Final[dict[str, tuple[ChildProcess, tempfile.TemporaryDirectory[str]]]] = {}
@@ -38,9 +38,9 @@ def end_untaken() -> None:
 
 
 def child_of(target: str, log: Path) -> ChildProcess:
-    """The process that was started early for a target, if it lives; else one that starts now.
+    """The live process that was started early for a target, or a new one.
 
-    log: its file from now on, on the file system of temporary files.
+    log: its log file from now on, in the file system of temporary files.
     """
     if target not in _STARTED:
         return ChildProcess(target, log)

@@ -1,4 +1,4 @@
-"""What a render process may use, and what the machine has.
+"""Limits of a render process, and the resources of the machine.
 
 Effects: reads /sys.
 """
@@ -38,10 +38,9 @@ class ProcessLimits:
 
 
 def machine_mb(limits: tuple[Path, ...] = _CGROUP_LIMITS) -> float:
-    """Memory this container or machine may use, in MiB.
+    """Memory available to this container or machine, in MiB, including memory that is in use.
 
-    limits are files of cgroups, version 1 or 2; the least of them that is a number counts. What
-    other processes already use is not taken off.
+    limits: files of cgroups, version 1 or 2; the least number in them counts.
     """
     # Take the container's limit where it is below what the machine has.
     total = memory_bytes()
@@ -61,7 +60,7 @@ def is_room_for_two() -> bool:
 
 
 def memory_share_mb(n_processes: int) -> float:
-    """What one of n render processes may hold: its share of nine tenths of the machine, in MiB.
+    """Memory limit of one of n render processes: its share of nine tenths of the machine, in MiB.
 
     A tenth is left for the scheduler and the system.
     """

@@ -30,7 +30,7 @@ HANDLERS: Final = {
     LIGHT: "pbrs_farm.run.run_task:make_light_handler",
     FINISHING: FINISHING_HANDLER,
 }
-"""What makes the handler of a process that does every step, light, or all else."""
+"""Factories of the handlers for all steps, for light, and for the other steps."""
 
 
 @dataclass(slots=True)
@@ -106,8 +106,6 @@ class Pool:
         the views of a room, so one that holds it comes first, then one that holds nothing, then
         any.
         """
-        # Loading a house costs more than the views of a room: prefer the process that has it, then
-        # a fresh process, then any.
         idle = [w for w in self._of(lane) if w.task is None]
         idle.sort(key=lambda w: (w.held_house != task.house_id, w.held_house != ""))
         fits = bool(idle) and idle[0].held_house in (task.house_id, "")
@@ -127,10 +125,9 @@ class Pool:
         return self._workers[-1]
 
     def events(self) -> Iterator[Event]:
-        """What happens next, at least once a second; nothing when no process has a task.
+        """Wait up to a second for the next events; none while no process has a task.
 
-        Waits up to a second. Ends of tasks, faults and messages come in the order in which each
-        process said them; a process that died is an event and no error.
+        The messages of a process come in their order; a process that died is an event, not an error.
         """
         busy = [w for w in self._workers if w.task is not None]
         if busy:
@@ -154,7 +151,7 @@ class Pool:
         if not ended.cause:
             yield Event(**ended.body)
             return
-        # What native libraries printed last says more than the signal.
+        # The last output of native libraries says more than the signal.
         lines = last_lines(worker.process.log_tail())
         reason = f"{ended.text}: {lines}" if lines else ended.text
         yield Event("failed", task.house_id, task.view_id, worker.step, message=reason)
@@ -182,9 +179,5 @@ def _events_in(worker: _Worker, task: RenderTask, message: Message) -> Iterator[
 
 
 def last_lines(log: str) -> str:
-    """The last three lines a process' libraries printed, on one line.
-
-    For the message of a process that died: what it said last is the likeliest cause. "" for an
-    empty log.
-    """
+    """The last three lines of a log on one line: the likeliest cause of a death; "" for an empty log."""
     return " | ".join([line.strip() for line in log.splitlines() if line.strip()][-3:])

@@ -70,12 +70,12 @@ class RenderProcess:
         return self._is_busy
 
     def fileno(self) -> int:
-        """What becomes readable when the process says something; only while it is busy."""
+        """File descriptor that becomes readable with the next message; only while the process is busy."""
         assert self._child is not None
         return self._child.fileno()
 
     def start(self) -> Child:
-        """Start the process, before it has a task too, unless it lives."""
+        """Start the process unless it lives, also before it has a task."""
         child = self._child
         if child is None or child.exit_code() is not None:
             self.stop()
@@ -84,13 +84,12 @@ class RenderProcess:
         return child
 
     def begin(self, request: bytes, *, task_s: float = math.inf) -> None:
-        """Give it a task of at most task_s seconds; the process is started when there is none.
+        """Send a task of at most task_s seconds; starts the process if there is none.
 
-        One task at a time. The request waits in the pipe until the process has loaded its
-        libraries; the log of the last task is emptied.
+        One task at a time. The request waits in the pipe until the process has loaded its libraries; the log of
+        the last task is emptied.
         """
         assert not self._is_busy, "one task at a time"
-        # The request waits in the process's pipe until it is ready.
         child = self.start()
         child.clear_log()
         now = self._clock()
@@ -100,10 +99,10 @@ class RenderProcess:
         child.send(request)
 
     def poll(self, timeout_s: float) -> Message | Ended | None:
-        """What it says next, or how its task ended; None when nothing happens in timeout_s.
+        """The next message, or the end of the task; None if nothing happens within timeout_s.
 
-        Limits of time and memory are looked at here, once a second: who does not poll lets a
-        process run on. What a dying process said last is given before its end.
+        Limits of time and memory are checked here, once a second, so poll while a task runs. The last message
+        of a dying process comes before its end.
         """
         child = self._child
         assert child is not None
@@ -116,7 +115,7 @@ class RenderProcess:
                 return self.kill(*exceeded)
         line = child.receive(timeout_s)
         if line is None and child.exit_code() is not None:
-            line = child.receive(0.0)  # what it said last
+            line = child.receive(0.0)  # its last message
             if line is None:
                 return self._died(child)
         return None if line is None else self._heard(message_from_line(line))
@@ -206,7 +205,7 @@ class RenderProcess:
         return None
 
     def _died(self, child: Child) -> Ended:
-        """The process ended by itself: a crash, or the kernel's out-of-memory killer."""
+        """End of a process after a crash or by the kernel's out-of-memory killer."""
         code = child.exit_code() or 0
         self.stop()
         seconds = self._clock() - self._begun_at

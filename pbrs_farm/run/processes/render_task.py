@@ -1,4 +1,4 @@
-"""What a render process of a local run is asked to do and what it answers; values, no effects."""
+"""Tasks of a render process of a local run, and its events; values, no effects."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class RenderTask:
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """What the tasks of one run have in common."""
+    """Settings that all tasks of a run share."""
 
     store_url: str
     recipe: Recipe
@@ -43,9 +43,11 @@ class Setting:
 class Event:
     """Something that happened to a step, or the end of a task."""
 
-    # done: made now; kept: was there already; end: of a task. planned: the views of a house that
-    # will be made, known once its cameras are and the dark ones left out. under_way: facts hold the
-    # "share" of a long step that is done. lacking: the machine cannot do the step, message says why.
+    # done: made now; kept: done before; end: of a task. planned: the views of a house to make,
+    # known after
+    # its cameras and without dark rooms. under_way: facts hold the finished "share" of a long step.
+    # lacking:
+    # the machine cannot do the step, for the reason in message.
     kind: Literal["begin", "done", "kept", "failed", "lacking", "end", "planned", "under_way"]
     house_id: str
     view_id: str | None
@@ -57,7 +59,7 @@ class Event:
 
 
 _TASK = TypeAdapter(RenderTask)
-# What str() would blot out: revealed for the pipe to our own child, never for a file.
+# Fields hidden by str(): revealed for the pipe to our own child, never for a file.
 _SECRETS = ("secret_key", "session_token")
 
 

@@ -1,8 +1,8 @@
-"""The body of a render process: tasks come in one after another, messages leave.
+"""The main loop of a render process: receives tasks, sends messages.
 
-Effects: those of the tasks; ends when its parent does. It is started afresh (never forked), so that
-S3 and Mitsuba are safe in it, and may be killed at any moment. Requests are lines on what was stdin,
-messages leave on what was stdout; whatever libraries print goes to stderr, which is the task's log.
+Effects: those of the tasks; ends when its parent does. It is started afresh (never forked), so that S3
+and Mitsuba are safe in it, and may be killed at any moment. Requests are lines on the original stdin,
+messages go to the original stdout; libraries print to stderr, the task's log.
 """
 
 from __future__ import annotations
@@ -21,11 +21,10 @@ from pbrs_farm.run.processes.child_process import Message
 
 
 def main(target: str) -> int:
-    """Serve the tasks of `module:function`, which makes a Handler from what sends a message.
+    """Serve tasks with the Handler that `module:function` makes from a function that sends messages.
 
-    Never called in the parent. It ignores SIGINT and SIGTERM, as the parent decides what they mean,
-    and dies with it. What the libraries print goes to the log, since replies have a pipe of their
-    own. 1 where the handler could not be made, after saying why.
+    Never called in the parent. Ignores SIGINT and SIGTERM, which the parent handles, and dies with it.
+    Returns 1, after a message, if the handler cannot be made.
     """
     die_with_parent()
     # The parent decides what Ctrl-C and TERM mean; Slurm signals every process of a step.
@@ -37,7 +36,7 @@ def main(target: str) -> int:
         replies.write(message.line())
 
     try:
-        # Make the handler once: what it keeps between tasks lives in it.
+        # One handler for all tasks holds the state between them.
         handle = pkgutil.resolve_name(target)(send)
     except Exception as error:  # noqa: BLE001 - the parent learns why
         traceback.print_exc()
@@ -50,10 +49,10 @@ def main(target: str) -> int:
 
 
 def end(code: int) -> NoReturn:
-    """End this process as soon as what was left for its end is done (atexit).
+    """Run the atexit functions and end this process at once; its parent waits for it.
 
-    Whoever started it waits for it. Taking the interpreter apart, with all that Mitsuba and Dr.Jit
-    put into it, is 0.12 s of CPU and frees nothing that the kernel does not.
+    Tearing down an interpreter with Mitsuba and Dr.Jit takes 0.12 s of CPU and frees nothing that the
+    kernel does not.
     """
     atexit._run_exitfuncs()
     for stream in (sys.stdout, sys.stderr):

@@ -1,6 +1,6 @@
-"""A verb in a process of its own, so that a library that dies costs one line.
+"""Run a verb in a child process, so that a library that dies costs one line.
 
-Effects: starts a process, reads what it tells of its work from a temporary file.
+Effects: starts a process, reads its notes from a temporary file.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def run_watched(target: str, words: Sequence[str], say: Callable[[str], None]) -
 
     Where the child is killed: 1, after one line through say with the file and the step it was at.
     """
-    # A file and no pipe: not every system hands descriptors on. The child removes its name at once.
+    # A file, because not every system passes descriptors on. The child removes its name at once.
     handle, notes = _new_file()
     command = [sys.executable, "-P", "-c", _BOOT, json.dumps(sys.path), notes, target]
     # The terminal sends Ctrl-C to both: the child decides. A handler of ours ends with its exec.
