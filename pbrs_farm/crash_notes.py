@@ -1,4 +1,4 @@
-"""What this process works on, for the process that watches it: after a crash it names file and step.
+"""Notes of the present file and step, for the process that watches this one: they locate a crash.
 
 Effects: writes lines to the file that send_notes_to names. run/processes/verb_process.py reads them.
 """
@@ -15,10 +15,10 @@ _FILE: ContextVar[int | None] = ContextVar("file", default=None)
 
 
 def note_step(file: str, step: str) -> None:
-    """Note that the step of a file begins, for the process that watches this one, if one does.
+    """Note the beginning of a file's step, for the process that watches this one, if any.
 
-    A library of others may kill the process without a word; the last note then says where.
-    Characters that cannot be printed become "?". What cannot be written is no error.
+    A native library may kill the process without a message; the last note then locates the crash. Characters
+    that cannot be printed become "?". A failed write is no error.
     """
     notes = _FILE.get()
     if notes is not None:

@@ -1,9 +1,8 @@
 """Pixels <-> PNG, EXR and JPEG bytes: the only user of OpenImageIO.
 
-Effects: a temporary file per call, because the binding reads and writes files only; it is gone
-when the call returns. What is written goes to memory (on a disk a small PNG took 5 ms), what is
-read comes from a disk. EXR channels are found by name, never by position (OpenEXR sorts them), and
-carry a fixed DateTime, so that equal images give equal bytes.
+Effects: a temporary file per call, because the binding reads and writes files only. Writing uses memory
+(on a disk a small PNG took 5 ms), reading a disk. EXR channels are found by name, never by position
+(OpenEXR sorts them), and carry a fixed DateTime, so that equal images give equal bytes.
 """
 
 from __future__ import annotations
@@ -46,7 +45,7 @@ _MAGIC: Final = (
     (b"#?", ".hdr"),
 )
 _RESOLUTION: Final = re.compile(rb"\n\r?\n([+-])([XY]) +[0-9]+ +([+-])[XY] +[0-9]+\r?\n")
-_HDR_HEADER_BYTES: Final = 65_536  # in which a Radiance picture says how it lies
+_HDR_HEADER_BYTES: Final = 65_536  # maximum header of a Radiance picture
 _TEXTURE_KINDS: Final = (".png", ".jpg", ".gif", ".bmp", ".tga")
 
 
@@ -111,7 +110,6 @@ def resized(
     height, width = array.shape[:2]
     if (height, width) == (height_px, width_px):
         return array
-    # Take the pixel whose centre is nearest: labels keep their values.
     if nearest:
         rows = (np.arange(height_px) + 0.5) * height / height_px
         columns = (np.arange(width_px) + 0.5) * width / width_px
@@ -171,9 +169,9 @@ def array_from_png(
 ) -> NDArray[np.uint8] | NDArray[np.uint16]:
     """The pixels as the PNG stores them: (H, W) or (H, W, C), uint8 or uint16.
 
-    16 bits stay 16, no colour space is converted and alpha is not multiplied in: this reads labels.
-    For pictures that are to be looked at or used as textures take decode_photo or decode_texture.
-    name: for messages. Raises BadInput for what is no PNG, is damaged or is above MAX_FILE_PIXELS.
+    16 bits stay 16, no colour space is converted and alpha is not multiplied in: this reads labels. Use
+    decode_photo or decode_texture for pictures to look at and for textures. name: for messages. Raises
+    BadInput for data that is no PNG, is damaged or is above MAX_FILE_PIXELS.
     """
     if _kind(data, name) != ".png":
         raise _not_a("a PNG file", data, name)
@@ -319,7 +317,7 @@ def _decoded(data: bytes, name: str, suffix: str, kind: str) -> tuple[NDArray[An
     """(H, W, C) array of type kind ("unknown": as stored) and the file's ImageSpec."""
     if suffix == ".png" and _is_cut_short(data):  # said here: libpng would write to stderr
         raise BadInput(name, "", "cannot be read as a picture: damaged or truncated")
-    # Read alpha as it is stored, not multiplied into the colours.
+    # Read alpha as stored, not multiplied into the colours.
     config = oiio.ImageSpec()
     config["oiio:UnassociatedAlpha"] = 1
     with _temporary(suffix, data) as path:
@@ -340,7 +338,7 @@ def _decoded(data: bytes, name: str, suffix: str, kind: str) -> tuple[NDArray[An
 
 
 def _is_cut_short(png: bytes) -> bool:
-    """Whether a chunk of the PNG is longer than what is left of the file."""
+    """True if a chunk of the PNG is longer than the rest of the file."""
     at = 8  # behind the signature
     while at < len(png):
         # A chunk: length, type, data, checksum.

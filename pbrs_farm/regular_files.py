@@ -22,16 +22,16 @@ from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.file_kinds import HEAD_BYTES, other_kind, wrong_kind
 from pbrs_farm.operating_system import NOT_REGULAR, open_unwaiting
 
-MAX_FILE_BYTES: Final = 512 * 2**20  # of a file that is read whole: a home, a scene, a picture
+MAX_FILE_BYTES: Final = 512 * 2**20  # maximum of a file read whole: a home, a scene, a picture
 MAX_SCENE_BYTES: Final = 1_000_000_000  # of a scene or model with the files beside it
-MAX_TEXT_BYTES: Final = 64 * 2**20  # of one that is parsed by hand: a list of houses or cameras
-MAX_DIGEST_BYTES: Final = 4 * 2**30  # of one that is read in pieces
+MAX_TEXT_BYTES: Final = 64 * 2**20  # maximum of a file parsed by hand: a list of houses or cameras
+MAX_DIGEST_BYTES: Final = 4 * 2**30  # maximum of a file read in pieces
 
 
 @contextmanager
 def open_regular(path: Path, max_bytes: int = MAX_FILE_BYTES) -> Iterator[BufferedReader]:
     """The file, opened to be read; OSError where it is no regular file or above max_bytes."""
-    # Ask not to wait, so that a pipe without a writer opens, and look at what was opened.
+    # Open without waiting, so that a pipe without a writer opens, and inspect the opened file.
     descriptor = open_unwaiting(path)
     with os.fdopen(descriptor, "rb") as file:
         status = os.fstat(descriptor)
@@ -84,9 +84,9 @@ def text_given(path: Path, *, error: type[BadInput] = BadInput) -> str:
 
 @contextmanager
 def naming_kind(path: Path) -> Iterator[None]:
-    """What a reader raises of a file, said by what the file is where its name says another kind.
+    """Replace a reader's error by the file's actual kind if its name claims another.
 
-    For readers of one kind: their words for a file of another are riddles ("byte 0: no valid JSON").
+    A reader's words for a file of another kind are riddles ("byte 0: no valid JSON").
     """
     try:
         yield
@@ -121,12 +121,12 @@ def digest_of_regular(path: Path) -> str:
 
 
 def real_path(path: Path) -> Path:
-    """The absolute path without links; a link that leads to itself is left as it is."""
+    """The absolute path without links; a link to itself stays."""
     return Path(os.path.realpath(path))
 
 
 def fault_of(error: OSError) -> str:
-    """What is wrong with a file, for a message: "no such file", "cannot be read: ..."."""
+    """The error of a file for a message: "no such file", "cannot be read: ..."."""
     if isinstance(error, FileNotFoundError):
         return "no such file"
     return f"cannot be read: {error.strerror or 'the system gave no reason'}"
@@ -141,7 +141,7 @@ def files_below(folder: Path) -> list[Path]:
 def new_folder(out: Path) -> Iterator[Path]:
     """Yield a temporary folder that is renamed to out at the end, or removed on any error.
 
-    Raises BadInput if out has contents, or cannot be written.
+    Raises BadInput if out is not empty or cannot be written.
     """
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise BadInput(out, "", "is there already", hint="name a new folder")

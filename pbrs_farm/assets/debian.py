@@ -49,7 +49,7 @@ class Deb:
     note: str = ""  # irregularities of the package
 
     def members(self, wanted: Callable[[str], bool]) -> dict[str, bytes]:
-        """Path in the package -> bytes of every wanted file; MachineFailed if it is damaged.
+        """Path in the package -> bytes of every wanted file; MachineFailed for a damaged package.
 
         wanted: called with each path, without a leading "./". Files are held in memory: request only the
         necessary ones. The package is never installed and no script of it runs.
@@ -179,7 +179,7 @@ def write_whole(path: Path, data: bytes) -> None:
 
 
 def version_of(deb: Path) -> str:
-    """The version in a .deb's file name; "" if it has none."""
+    """The version in a .deb's file name; "" without one."""
     return deb.name.split("_")[1].replace("%3a", ":") if deb.name.count("_") >= 2 else ""
 
 

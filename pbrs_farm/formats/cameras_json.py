@@ -26,11 +26,7 @@ def cameras_document(views: Iterable[View], report: Mapping[str, Any]) -> dict[s
 
 
 def cameras_json(views: Iterable[View], report: Mapping[str, Any]) -> bytes:
-    """The file, written by the step `cameras`.
-
-    report: why the other candidates were rejected, as JSON values. Equal views and reports give
-    equal bytes.
-    """
+    """The file, written by the step `cameras`; equal views and reports give equal bytes."""
     return json_bytes(cameras_document(views, report))
 
 
@@ -60,11 +56,11 @@ def _json_of_view(view: View) -> dict[str, Any]:
 
 
 def rig_table(view: View) -> dict[str, Any]:
-    """What cameras.json and view.json say of the rig that took a view; {} where there is none.
+    """The rig of a view for cameras.json and view.json; {} without one.
 
-    "rig": its name, the camera's, the instant (the id of its first camera's view) and the transform to
-    the rig, 4 x 4, metres, both frames x right, y down, z forward. The right view of a stereo pair also
-    says "left", the other's id.
+    "rig": its name, the camera's, the instant (the id of its first camera's view) and the transform to the
+    rig, 4 x 4, metres, both frames x right, y down, z forward. The right view of a stereo pair also has
+    "left", the other's id.
     """
     if view.rig is None:
         return {}

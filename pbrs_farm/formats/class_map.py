@@ -106,7 +106,6 @@ class ClassMap:
         0. An instance id without a row becomes 0. For many pictures of one house the rows are
         matched anew on each call.
         """
-        # Look the class up by instance id; an id without a row is nothing.
         table = np.zeros(max([int(instance.max(initial=0)), *(r["id"] for r in instances)]) + 1)
         for row in instances:
             table[row["id"]] = self.id_of(row)

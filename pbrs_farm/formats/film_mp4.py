@@ -34,7 +34,6 @@ def film(pictures: Iterable[Srgb8Image], fps: Fraction) -> bytes:
             if stream is None:
                 stream = container.add_stream("libx264", rate=fps)
                 stream.width, stream.height, stream.pix_fmt = width, height, "yuv420p"
-                # One thread: the same frames give the same file.
                 stream.options = {"crf": _QUALITY, "threads": "1"}
             frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(rgb[:height, :width]), "rgb24")
             container.mux(stream.encode(frame))

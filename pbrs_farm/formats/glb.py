@@ -190,7 +190,7 @@ def entry(gltf: Gltf, kind: str, index: Any) -> dict[str, Any]:
 
 
 def count(gltf: Gltf, holder: dict[str, Any], key: str, place: str, default: int = 0) -> int:
-    """holder[key] as a count >= 0; BadHouse otherwise.
+    """holder[key] as a count >= 0, by default `default`; BadHouse for any other value.
 
     A missing key gives the default. A bool, a float or a negative number raises too; place (as
     "accessors[3]") and key locate it in the message.

@@ -77,7 +77,6 @@ def gltf_asset(house: House) -> dict[str, Any]:
         "generator": "pbrs_farm",
         "extras": json_from_value(source),
     }
-    # Carry the credit that the source asks for, or name its author and licence.
     line = source.attribution or ", ".join(x for x in (source.author, source.licence) if x)
     return asset | {"copyright": line} if line else asset
 
@@ -105,7 +104,6 @@ def primitive(writer: glb.GlbWriter, house: House, item: Item, s: Surface) -> di
     counts it from the top. A surface without faces becomes a point cloud, to keep its vertices. BadHouse
     names item and surface for non-finite numbers, invalid vertex indices, and unknown materials.
     """
-    # Refuse what a viewer could not open.
     place = f"item {item.id}, surface {s.name}"
     for array in (s.positions, s.uvs, s.normals):
         if array is not None and not np.isfinite(array).all():

@@ -1,6 +1,6 @@
 """Houses and views of a finished output folder, as plain values. Effects: reads files.
 
-The layout is that of docs/formats.md; pictures themselves are not opened here.
+The layout is that of docs/formats.md; pictures are not opened here.
 """
 
 from __future__ import annotations

@@ -20,11 +20,11 @@ def view_description(
     recipe_digest: str,
     versions: Mapping[str, str],
 ) -> dict[str, Any]:
-    """What view.json says. facts: step -> facts of its marker; "table" of `truth` stands at the top.
+    """The content of view.json. facts: step -> facts of its marker; "table" of `truth` is the top level.
 
-    recipe_digest: of the recipe that rendered the view; versions: program or library -> version.
-    The warnings are those of the step "light", each once; frame, time_s, rig and left are there only
-    for views of a sequence, a rig or a stereo pair.
+    recipe_digest: of the recipe that rendered the view; versions: program or library -> version. Each
+    warning appears once; frame, time_s, rig and left are there only for views of a sequence, a rig or a
+    stereo pair.
     """
     table = facts.get("truth", {}).get("table", {})
     light = facts.get("light", {})
@@ -32,7 +32,7 @@ def view_description(
     if view.frame is not None:
         sequence = {"frame": view.frame, "time_s": view.time_s}
     sequence |= rig_table(view)
-    # The room's warnings, and what is dark of the picture and of the room.
+    # Warnings of the room, and of darkness in the picture and the room.
     warnings = list(dict.fromkeys([*light.get("warnings", []), *light.get("dark", [])]))
     return {
         "house": house_id,

@@ -1,15 +1,15 @@
-"""How an output root lies in a remote store: a view's files packed, houses spread over prefixes.
+"""Layout of an output root in a remote store: a view's files packed, houses spread over prefixes.
 
-Callers name objects by the keys of core/keys.py; this module alone says which object of the store
-holds them. Effects: those of the store it wraps.
+Callers name objects by the keys of core/keys.py; this module alone maps them to objects of the store.
+Effects: those of the store it wraps.
 
     layout.json                                     says that a root is packed; without it every key is an object
     houses/<hh>/<house>/...                         hh: first two hex digits of the sha256 of the house's id
-    houses/<hh>/<house>/packs/<group>.<view>.tar    what the steps of a group made of a view, with their markers
+    houses/<hh>/<house>/packs/<group>.<view>.tar    files and markers of a group of steps of a view
     houses/<hh>/<house>/packs/<step>.<view>.tar     the same of one step, done after its group's pack was written
 
 A pack is an uncompressed tar that appears whole: its steps are done, or they are not. Its first
-member is an index; it is followed by the markers and by the files, small ones first.
+member is an index, followed by the markers and by the files, small ones first.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ _MOST_RECENT: Final = 256
 
 @dataclass(slots=True)
 class _Pending:
-    """What steps of one view and group made and is not written yet."""
+    """Unwritten results of one view and group of steps."""
 
     house: str
     view: str
@@ -68,10 +68,10 @@ class _Pending:
 
 @dataclass(slots=True)
 class _Task:
-    """What is remembered while one task runs."""
+    """Cache of one task."""
 
     n_head: int
-    packs: dict[str, Pack | None] = field(default_factory=dict)  # None: there is none
+    packs: dict[str, Pack | None] = field(default_factory=dict)  # None: no such pack
     absent: set[str] = field(default_factory=set)  # packs that were not there when first asked for
     objects: dict[str, bytes | None] = field(default_factory=dict)  # markers of the house
     pending: _Pending | None = None
@@ -86,12 +86,12 @@ class LaidOutStore:
     def __init__(self, inner: Store, packs: bool = True) -> None:
         self.inner = inner
         self._packs = packs
-        self._known: bool | None = None  # is it packed? None: nothing lies there yet
+        self._known: bool | None = None  # packed or not; None: the root is empty
         self._recent: dict[str, tuple[float, Pack | None]] = {}  # object -> until when, its index
         self._task: _Task | None = None
 
     def __reduce__(self) -> tuple[object, ...]:
-        # What was read lately stays here.
+        # Caches stay in this process.
         return LaidOutStore, (self.inner, self._packs)
 
     @property
@@ -109,10 +109,10 @@ class LaidOutStore:
 
     @property
     def is_packed(self) -> bool:
-        """Whether the root that lies here is packed. Raises StoreFailed for a later layout.
+        """True if the root is packed. Raises StoreFailed for a later layout.
 
-        Asked of the store once and then remembered, but for a root that has not begun (no recipe in
-        it): there it is False until somebody writes.
+        Read from the store once and cached, except for a root that has not begun (no recipe in it): it gives
+        False until somebody writes.
         """
         if self._known is None:
             # The layout is written before the recipe: ask in the other order.
@@ -125,10 +125,10 @@ class LaidOutStore:
 
     @contextmanager
     def task(self, *, reads_whole: bool) -> Iterator[LaidOutStore]:
-        """This store for the time of one task: what it read of markers it does not ask again.
+        """This store for the time of one task, with a cache of markers.
 
-        What steps of one group make of a view is written together, at the latest at the end, also
-        where the task fails. reads_whole: packs are read at once, since their pictures are needed.
+        The results of a group of steps of a view are written together, at the latest at the end, also if the
+        task fails. reads_whole: packs are read at once, since their pictures are needed.
         """
         store = LaidOutStore(self.inner, self._packs)
         # Ask once in a worker's life, not once a task.
@@ -155,14 +155,14 @@ class LaidOutStore:
         if at is not None:
             raise StoreFailed(key, "a packed root takes a view's files with their marker")
         if key == keys.RECIPE and self._packs and self.inner.head(key) is None:
-            # Say how the root lies before it begins.
+            # Write the layout before anything else.
             row = {"format": FORMAT, "layout": "packed"}
             self.inner.put_if_absent(LAYOUT, (json.dumps(row) + "\n").encode())
         self._forget(key)
         return self.inner.put_if_absent(self._object(key), data)
 
     def put_done(self, key: str, marker: bytes, files: Mapping[str, bytes]) -> None:
-        """Put what a step made and its marker: of a view in a pack, both at once."""
+        """Put a step's files and its marker; for a view both at once, in a pack."""
         at = self._of_view(key)
         if at is None:
             for file, data in files.items():
@@ -253,7 +253,7 @@ class LaidOutStore:
         return object_key(key) if is_of_house and self.is_packed else key
 
     def _of_view(self, key: str) -> keys.HouseKey | None:
-        """What the key of a view's file or marker says in a packed root, else None."""
+        """The parts of the key of a view's file or marker in a packed root, else None."""
         check_key(key)
         if key.partition("/")[0] not in keys.FOLDERS or not self.is_packed:
             return None
@@ -293,7 +293,7 @@ class LaidOutStore:
         return data
 
     def _waiting(self, at: keys.HouseKey) -> bytes | None:
-        """What the task has not written yet. To ask for a later group's marker ends the one before."""
+        """Data that the task has not written yet. Asking for a later group's marker writes the group before."""
         task = self._task
         if task is None or task.pending is None:
             return None
@@ -347,7 +347,7 @@ class LaidOutStore:
         task.packs[place] = pack
 
     def _member(self, place: str, pack: Pack, name: str) -> bytes | None:
-        """A member's bytes; None where another pack lies there now."""
+        """A member's bytes; None if another pack has replaced it."""
         if (held := pack.held(name)) is not None:
             return held
         _step, start, n_bytes = pack.rows[name]
@@ -434,7 +434,7 @@ class LaidOutStore:
                 return
             known = self._read(place)
             self._remember(place, known)
-        # Steps that are done after the pack was written, or that another writer's lacks, have their own.
+        # Steps done after the pack was written, or missing in another writer's pack, get their own.
         for step, members in pending.steps.items():
             name = marker_of(step)
             if known is not None and name in known.rows:
@@ -528,8 +528,8 @@ def _is_packed(data: bytes) -> bool:
 def one_task(store: Store, *, reads_whole: bool) -> Iterator[Store]:
     """The store for the time of one task, whose writes are packed together (LaidOutStore.task).
 
-    reads_whole: the task needs labels and pictures of its view anyway, so packs are fetched whole.
-    Any other kind of store is given back as it is. Use as a context manager.
+    reads_whole: the task needs labels and pictures of its view, so packs are fetched whole. Any other kind of
+    store is yielded unchanged.
     """
     if not isinstance(store, LaidOutStore):
         yield store

@@ -1,4 +1,4 @@
-"""What a store is: whole objects under keys, and which keys are allowed; no effects."""
+"""The interface of a store, whole objects under keys, and the allowed keys; no effects."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ CONTENT_TYPES: Final = {
 
 @dataclass(frozen=True, slots=True)
 class Head:
-    """What a store knows about an object that it has not read."""
+    """Properties of an object that was not read."""
 
     n_bytes: int
     modified_s: float = 0.0  # since 1970, by the store's clock; 0 where it keeps none
@@ -62,17 +62,12 @@ class Store(Protocol):
     def put_if_absent(self, key: str, data: bytes) -> bool:
         """Write the object unless it exists; True for the one writer who did.
 
-        False says that an object lay there before and was left as it is, whatever its bytes. Of
-        many writers at once one gets True, so that the answer may decide who goes on.
+        Of many writers at once one gets True, so that the answer may decide who goes on.
         """
         ...
 
     def get(self, key: str) -> bytes:
-        """The object's bytes; ObjectMissing if there is none.
-
-        The whole object is held in memory; take `get_range` for a part, and the function
-        `get_or_none` where a missing object is no error.
-        """
+        """The object's whole content; ObjectMissing without one. See `get_range` and `get_or_none`."""
         ...
 
     def get_range(self, key: str, start: int, n_bytes: int) -> bytes:
@@ -84,35 +79,26 @@ class Store(Protocol):
         ...
 
     def head(self, key: str) -> Head | None:
-        """Size of the object, None if there is none.
-
-        One small request that reads no content; to learn whether an object is there before `get`,
-        use `get_or_none` instead.
-        """
+        """Size of the object, None if it is missing: one small request. `get_or_none` replaces head and get."""
         ...
 
     def list(self, prefix: str = "") -> Iterator[str]:
-        """Keys below the folder `prefix` ("" or "a/b/"), in no promised order.
+        """Keys of all objects below the folder `prefix` ("" or "a/b/"), at any depth, in no promised order.
 
-        Every object below it, at any depth, by its whole key. Raises StoreFailed at once for a
-        prefix that does not end with "/". What is put or deleted during the listing may be in it or
-        not.
+        Raises StoreFailed at once for a prefix that does not end with "/". Objects put or deleted meanwhile may
+        be listed or not.
         """
         ...
 
     def delete(self, key: str) -> None:
-        """Remove the object; nothing happens if there is none.
-
-        So it may be called twice. There is no deletion of a folder: list it and delete its keys.
-        """
+        """Remove the object, if it exists. Folders cannot be deleted: list one and delete its keys."""
         ...
 
 
 def get_or_none(store: Store, key: str) -> bytes | None:
-    """The object's bytes, None if there is none: one request, not two.
+    """The object's bytes, None if it is missing: one request, not two.
 
-    Prefer it to `head` and `get`: between the two another process may remove the object. Raises
-    StoreFailed as `get` for everything but a missing object.
+    Raises StoreFailed as `get` for everything but a missing object.
     """
     try:
         return store.get(key)
@@ -122,7 +108,7 @@ def get_or_none(store: Store, key: str) -> bytes | None:
 
 @runtime_checkable
 class PackingStore(Store, Protocol):
-    """A store that has a way of its own to put what a step made."""
+    """A store with its own way to put a step's results."""
 
     def put_done(self, key: str, marker: bytes, files: Mapping[str, bytes]) -> None:
         """As the function put_done.
@@ -134,11 +120,11 @@ class PackingStore(Store, Protocol):
 
 
 def put_done(store: Store, key: str, marker: bytes, files: Mapping[str, bytes]) -> None:
-    """Put what a step made, by key, and then the marker under `key`, if-absent: it is seen last.
+    """Put a step's files, and then its marker under `key`, if-absent.
 
-    key: of the marker; files: whole key -> bytes, written first, so that a reader who sees the
-    marker finds them. Where a marker is there already it stays, but the files are written again. A
-    PackingStore may hold back what is given until the last step of its group is put.
+    files: whole key -> bytes, written first, so that a reader who sees the marker finds them. An existing
+    marker stays, but the files are written again. A PackingStore may hold the results back until the last
+    step of its group is put.
     """
     if isinstance(store, PackingStore):
         store.put_done(key, marker, files)
@@ -175,10 +161,7 @@ def check_prefix(prefix: str) -> str:
 
 
 def content_type(key: str) -> str:
-    """The MIME type by the key's ending; application/octet-stream for one that is unknown.
-
-    Browsers and S3 consoles show an object by it.
-    """
+    """The MIME type by the key's suffix; application/octet-stream for an unknown one."""
     return CONTENT_TYPES.get(key.rpartition(".")[2], "application/octet-stream")
 
 

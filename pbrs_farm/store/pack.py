@@ -28,16 +28,16 @@ TAR_BLOCK: Final = 512
 
 @dataclass(frozen=True, slots=True)
 class Pack:
-    """What is known of a pack: its index, and as much of its beginning as was read."""
+    """The index of a pack, and its beginning as far as it was read."""
 
     rows: Mapping[str, tuple[str, int, int]]  # name -> step, first byte, number of bytes
     head: bytes
 
     def held(self, name: str) -> bytes | None:
-        """The bytes of a member, None where the beginning that was read ends before it does.
+        """The bytes of a member, None if the part that was read ends before it does.
 
-        name: as `marker_of` or a file's name below the view's folder gives it; KeyError for one
-        that is not in `rows`. On None read the range that `rows` names from the pack's object.
+        name: as `marker_of` or a file's name below the view's folder gives it; KeyError for one that is not in
+        `rows`. On None read the range of `rows` from the pack's object.
         """
         _step, start, n_bytes = self.rows[name]
         end = start + n_bytes
@@ -72,10 +72,10 @@ def pack_bytes(steps: Mapping[str, Mapping[str, bytes]]) -> bytes:
 
 
 def pack_from_head(data: bytes, key: str) -> Pack | None:
-    """The pack that begins with data; None where its index is longer. StoreFailed where it is none.
+    """The pack that begins with data; None if its index is longer. StoreFailed for any other object.
 
-    data: the first bytes of the object, however many were read; key: for messages alone. On None
-    read more and ask again. A format that a later version wrote raises StoreFailed, too.
+    data: the first bytes of the object; key: for messages. On None read more and ask again. A format of a
+    later version raises StoreFailed, too.
     """
     try:
         entry = tarfile.TarInfo.frombuf(data[:TAR_BLOCK], "ascii", "strict")
@@ -105,30 +105,26 @@ def marker_of(step: str) -> str:
 
 
 def house_folder(house: str) -> str:
-    """Where a house's objects lie in a packed root, with a trailing slash.
+    """Folder of a house or object in a packed root, with a trailing slash.
 
-    house: id of a house or of an object, each of which has a top folder of its own. A folder of two
-    hex digits of the id's sha256 lies between, so that no folder holds all houses.
+    Two hex digits of the id's sha256 come first, so that no folder holds all houses.
     """
     top = keys.FOLDERS[keys.is_object(house)]
     return f"{top}/{keys.sha256(house.encode())[:2]}/{house}/"
 
 
 def pack_key(house: str, view: str, group: str) -> str:
-    """The object that holds what a group of steps, or a step, made of a view.
+    """Key of the pack of a group of steps, or of a step, of a view.
 
-    group: a key of GROUPS ("labels", "light", "pictures"), or the name of a step that is written
-    alone.
+    group: a key of GROUPS ("labels", "light", "pictures"), or the name of a step that is written alone.
     """
     return f"{house_folder(house)}packs/{group}.{view}.tar"
 
 
 def object_key(key: str) -> str:
-    """The object of a key that is of no view.
+    """The object of a key that does not belong to a view; `key_of_object` is the inverse.
 
-    Of a house or object the folder is spread as `house_folder` says; all other keys (jobs, reports)
-    stay as they are. Files of views lie in packs and have no object of their own. `key_of_object`
-    goes back.
+    The folders of houses and objects are spread as by `house_folder`; other keys (jobs, reports) stay.
     """
     top, _, rest = key.partition("/")
     house, slash, below = rest.partition("/")

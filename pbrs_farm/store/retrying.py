@@ -44,8 +44,8 @@ def retry(
 class RetryingStore:
     """A store that retries each call of the inner store while that is unavailable.
 
-    A finished picture is thus held in memory through an outage and not rendered again.
-    timeout_s: then StoreUnavailable is raised. on_wait: called with the reason before each pause.
+    A finished picture survives an outage in memory and is not rendered again. timeout_s: then
+    StoreUnavailable is raised. on_wait: called with the reason before each pause.
     """
 
     def __init__(
