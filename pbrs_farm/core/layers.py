@@ -14,12 +14,9 @@ from pbrs_farm.core.errors import MachineFailed
 from pbrs_farm.core.plugins import plugins
 
 # How pages and films draw a layer. "picture": unchanged. "classes": NYU40's colours. "ids": a
-# colour
-# per id. "mask": light on dark. "depth": a ramp of depth in mm, "depth_m" in metres, "disparity"
-# the
-# inverse. "flow", "flow_kitti": hue by direction. "high_byte": of 16 bits per channel. "range":
-# each
-# channel scaled to its range in the picture. "": not a picture.
+# colour per id. "mask": light on dark. "depth": a ramp of depth in mm, "depth_m" in metres,
+# "disparity" the inverse. "flow", "flow_kitti": hue by direction. "high_byte": of 16 bits per
+# channel. "range": each channel scaled to its range in the picture. "": not a picture.
 ShownAs: TypeAlias = Literal[
     "", "picture", "classes", "ids", "mask", "depth", "depth_m", "disparity", "flow", "flow_kitti",
     "high_byte", "range",

@@ -29,10 +29,10 @@ def n_samples(context: Any, wanted: int) -> int:
 
 
 def open_context() -> Any:
-    """A headless OpenGL 3.3 context; raises MachineFailed when there is none.
+    """A headless OpenGL 3.3 context; raises MachineFailed without one.
 
-    Through EGL, which needs no display; else through what moderngl finds (X11, CGL, WGL). Where its
-    libraries have other names glcontext looks for them, with a process for each: 0.1 s of a large one.
+    Through EGL, which needs no display; else through moderngl's default (X11, CGL, WGL). For libraries with
+    unusual names glcontext starts a process each: 0.1 s for a large parent.
     """
     faults = []
     ways: dict[str, Any] = {

@@ -47,9 +47,8 @@ def far_plane(camera: Camera, low: F64, high: F64) -> float:
 def boxes_in_view(clip: Matrix4, low: F64, high: F64) -> Bools:
     """(N,) bool: the box is not wholly outside one plane of the view frustum.
 
-    clip: of clip_from_world. low, high: (N, 3) corners in metres. A box that is outside by
-    several planes together, but by no single one, counts as in view: that costs a draw call
-    and no pixel.
+    clip: of clip_from_world. low, high: (N, 3) corners in metres. A box outside by several planes together,
+    but by no single one, counts as in view: that costs a draw call and no pixel.
     """
     # Read the six planes off the clip matrix (Gribb and Hartmann 2001).
     planes = np.concatenate([clip[3] + clip[:3], clip[3] - clip[:3]])

@@ -131,10 +131,7 @@ class Rasterizer:
         self.close()
 
     def close(self) -> None:
-        """Release the context and everything on it.
-
-        Calling it again does nothing; drawing afterwards fails. A with statement does it by itself.
-        """
+        """Release the context and everything on it, as a with statement does; drawing afterwards fails."""
         if self._context is not None:
             self._context.release()
             self._context = None

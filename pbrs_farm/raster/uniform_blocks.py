@@ -57,7 +57,7 @@ def light_blocks(house: House, n_best: int) -> F32:
 
 
 def aligned_rows(rows: F32, alignment_bytes: int) -> F32:
-    """Rows padded so that each starts at a multiple of alignment_bytes.
+    """Rows padded with 0 so that each starts at a multiple of alignment_bytes.
 
     rows: (N, K) float32; alignment_bytes: the driver's required alignment, a multiple of 4. Padding is 0.
     """

@@ -86,9 +86,9 @@ def llvm_libraries() -> list[tuple[tuple[int, ...], Path]]:
 
 
 def find_llvm() -> Path | None:
-    """The library Dr.Jit should load: DRJIT_LIBLLVM_PATH when new enough, else the newest found.
+    """The LLVM library for Dr.Jit: DRJIT_LIBLLVM_PATH if new enough, else the newest installed one.
 
-    None when there is none of version 17 or later.
+    None without one of version 17 or later.
     """
     # Honour the user's choice unless that library is known to crash.
     named = os.environ.get("DRJIT_LIBLLVM_PATH", "")

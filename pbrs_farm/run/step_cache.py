@@ -106,8 +106,7 @@ def run_unless_done(
     if old is not None and old.digest == digest:
         return Outcome(old, was_done=True)
     # Remove the marker before its files change, so that a crash leaves an unfinished step. Valid
-    # files
-    # outlast a step that fails to add to them.
+    # files outlast a step that fails to add to them.
     if old is not None and not is_valid:
         work.store.delete(key)
 

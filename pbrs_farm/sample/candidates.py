@@ -61,7 +61,7 @@ def cameras_looking(
 ) -> list[Camera]:
     """Camera.look for many at once: eyes, towards (N, 3), neither parallel to up.
 
-    roll: (N,) radians by which each is turned clockwise about its axis; upright when None.
+    roll: (N,) radians clockwise about the axis; None = upright.
     """
     # Build OpenGL axes: x right, y up, z back.
     back = -towards / np.linalg.norm(towards, axis=1, keepdims=True)

@@ -106,10 +106,10 @@ def _camera_report(
 
 
 def add_rig_views(views: Iterable[View], rig: RigFields | None) -> tuple[View, ...]:
-    """For each view those of the rig's cameras, which stands where the view's camera does.
+    """The views of all cameras of a rig at the place of each view.
 
-    The first camera's view keeps the id. All have the intrinsics of the view. Without a rig the
-    views are as they are.
+    The first camera's view keeps the id. All have the intrinsics of the view. Without a rig the views are
+    unchanged.
     """
     if rig is None:
         return tuple(views)

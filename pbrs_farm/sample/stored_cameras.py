@@ -63,7 +63,6 @@ def views_from_cameras(
     columns = object_columns(house)
     views: list[View] = []
     used: dict[tuple[str, int], int] = {}
-    # Name each view by room, sector and a running number.
     known = {room.id: room for room in house.rooms}
     for camera, room_id in cameras:
         room = known.get(room_id or "") or room_of(house, camera)

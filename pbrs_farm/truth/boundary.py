@@ -13,7 +13,7 @@ from pbrs_farm.core.camera import Camera
 OCCLUSION_GAP_M = 0.03  # least step in depth of an occlusion boundary
 OCCLUSION_GAP_SHARE = 0.02  # the same as a share of the nearer depth: far pixels are far apart
 CREASE_RAD = float(np.radians(30))  # least angle between normals of a crease
-OWNER, HIDDEN = 255, 128  # the side that owns the occluding edge, the side that is occluded
+OWNER, HIDDEN = 255, 128  # the side that owns the occluding edge, the occluded side
 
 
 def instance_boundary(instance: NDArray[Any]) -> NDArray[np.uint8]:
@@ -41,12 +41,11 @@ def block_edges(right: Mask, down: Mask) -> Mask:
 def typed_boundaries(hit: HitRecord, camera: Camera) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
     """(H, W) occlusion and (H, W) crease boundaries.
 
-    Occlusion: two neighbours whose depths differ by more than 3 cm and 2 % of the nearer one, and
-    of which neither lies that near to the other's tangent plane, nor do the planes meet between
-    the two. OWNER (255) on the nearer side, whose edge it is, HIDDEN (128) on the farther;
-    something before nothing counts.
-    Crease, 255 in the block sense of instance_boundary: neighbours without occlusion whose
-    geometric normals differ by more than 30 degrees.
+    Occlusion: two neighbours whose depths differ by more than 3 cm and 2 % of the nearer one, and of which neither is
+    that near to the other's tangent plane, nor do the planes meet between the two. OWNER (255) on the nearer side,
+    whose edge it is, HIDDEN (128) on the farther; something before nothing counts.
+    Crease, 255 in the block sense of instance_boundary: neighbours without occlusion whose geometric normals differ by
+    more than 30 degrees.
     """
     _, rays = camera.rays()
     occlusion = np.zeros(hit.face.shape, np.uint8)

@@ -194,10 +194,9 @@ def disparity_label(found: Correspondence) -> NDArray[np.uint16]:
 
 
 def partners_of(view: View, views: Mapping[str, View]) -> dict[Relation, View]:
-    """The partners that a view has among the views of its house (id -> view).
+    """Partners of a view among the views of its house (id -> view): "stereo", "next" and "previous".
 
-    "stereo", "next" and "previous", as far as they are there; a view that is neither of a rig nor
-    of a sequence has none. Each camera of a rig has neighbours of its own.
+    A view outside rigs and sequences has none. Each camera of a rig has its own neighbours.
     """
     found: dict[Relation, View] = {}
     other = _rectified_partner(view, views)
@@ -205,7 +204,6 @@ def partners_of(view: View, views: Mapping[str, View]) -> dict[Relation, View]:
         found["stereo"] = other
     if view.frame is None:
         return found
-    # Frames are numbered; those of each camera of a rig are a sequence of their own.
     neighbours: tuple[tuple[Relation, int], ...] = (("next", 1), ("previous", -1))
     for relation, step in neighbours:
         neighbour = views.get(view.shot.partner(step).id)
@@ -215,9 +213,9 @@ def partners_of(view: View, views: Mapping[str, View]) -> dict[Relation, View]:
 
 
 def _rectified_partner(view: View, views: Mapping[str, View]) -> View | None:
-    """The nearest view of the same instant whose rows are this one's: a rig's stereo pair; None without.
+    """The nearest view of the same instant with the same rows: a rig's stereo pair; None without one.
 
-    It has the same lens and axes, and stands to the right or the left. Of two as near the first counts.
+    It has the same lens and axes, and is to the right or the left. Of two at one distance the first counts.
     """
     if view.rig is None:
         return None

@@ -226,9 +226,8 @@ OPTIONAL_NAMES = tuple(_LAYER_FUNCTIONS)
 def optional_layers(names: Collection[str], inputs: LabelInputs) -> dict[str, NDArray[Any]]:
     """The named optional layers, as layers.py says: PNG arrays, and float32 for the EXR ones.
 
-    A layer between views is left out where the view has no such partner. Raises KeyError for a
-    name that is no optional label layer, BadInput for one that needs planar depth from a lens
-    without.
+    A layer between views is left out if the view has no such partner. Raises KeyError for a name that is no optional
+    label layer, BadInput for one that needs planar depth from a lens without.
     """
     check_lens(names, inputs.camera.intrinsics.lens)
     made = [n for n in names if not LAYER[n].partner or LAYER[n].partner in inputs.to_partners]
@@ -243,11 +242,7 @@ def _function(name: str) -> Callable[[LabelInputs], NDArray[Any]]:
 
 
 def check_lens(names: Collection[str], lens: Lens) -> None:
-    """Raise BadInput for a named layer that a lens cannot have.
-
-    Names that are no layer are passed over here; they are refused elsewhere. Call it before the
-    first view is rendered.
-    """
+    """Raise BadInput for a named layer that a lens cannot have, before rendering. Ignores unknown names."""
     for layer in (LAYER[name] for name in names if name in LAYER):
         if layer.needs == "planar depth" and not lens.depth_is_planar:
             what = f"needs depth along the axis, which lens.model {lens.model} has not"
@@ -258,7 +253,7 @@ def check_lens(names: Collection[str], lens: Lens) -> None:
 
 
 def optional_tables(names: Collection[str], house: House) -> dict[str, Any]:
-    """What view.json needs to read the named layers: "materials" and "source_classes" by id.
+    """Tables of view.json for the named layers: "materials" and "source_classes" by id.
 
     Keys are ids as text, from 1; 0 in a layer is nothing. Only layers that need a table have one.
     """

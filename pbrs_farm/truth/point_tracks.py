@@ -1,7 +1,7 @@
-"""Tracks of surface points through the frames of a film: where each is seen, and in which frames it is hidden.
+"""Tracks of surface points through the frames of a film: position, and occlusion in each frame.
 
-No effects of its own: rays are cast by the functions that each frame brings. A point moves with the face that it
-lies on, and is chosen at a pixel's centre of one of the film's frames.
+No effects of its own: rays are cast by the functions of each frame. A point moves with its face, and is chosen at a
+pixel's centre of one of the film's frames.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from pbrs_farm.truth.optical_flow import inside_picture, points_of_pixels, proje
 
 MOST_POINTS: Final = 1024
 _QUERY_FRAMES: Final = 8  # spread over the film, in which points are chosen
-_MOVING_SHARE: Final = 0.5  # of the points, on what moves where that is seen
+_MOVING_SHARE: Final = 0.5  # share of points on visible moving surfaces
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,7 +41,7 @@ class PointTracks:
     occluded: Bools  # (N, T) hidden, outside the picture, or behind the camera
     depth_m: F32  # (N, T) as the layer depth_z has it; 0 behind the camera
     query_frame: I32  # (N,) number in the film of the frame in which the point was chosen
-    instance: NDArray[np.uint16]  # (N,) of the item that it lies on
+    instance: NDArray[np.uint16]  # (N,) of the point's item
 
 
 def point_tracks(

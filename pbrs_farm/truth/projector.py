@@ -1,7 +1,7 @@
-"""What an infrared projector of dots throws on a room, as the camera beside it sees it; no effects.
+"""Dots of an infrared projector in a room, as the camera beside it sees them; no effects.
 
-Active stereo cameras (Intel's D400) and structured light (a first Kinect) have one, so that bare
-walls have something to match.
+Active stereo cameras (Intel's D400) and structured light (a first Kinect) have one, so that bare walls have
+something to match.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.frames import linear_from_srgb, srgb_from_linear
 from pbrs_farm.truth.optical_flow import reaches
 
-BESIDE_M: Final = 0.05  # to the right of a camera that is none of a pair
+BESIDE_M: Final = 0.05  # to the right of a camera without a partner
 CELL_RAD: Final = (
     0.006  # of the grid that holds at most one dot a cell: some 30,000 in 70 x 50 degrees
 )
@@ -32,12 +32,12 @@ def projector_label(
     albedo: NDArray[np.uint8],
     first_hit: FirstHit,
 ) -> NDArray[np.uint8]:
-    """(H, W) uint8: what of the dots comes back to the camera, by reflectance, slant and distance.
+    """(H, W) uint8: light of the dots that returns to the camera, by reflectance, slant and distance.
 
-    The projector stands in the middle of a stereo pair (partner: the other camera), else BESIDE_M to
-    the right, and looks where the camera looks: both pictures of a pair show the same dots on the
-    same surfaces. albedo: (H, W, 3) uint8 sRGB; dyes are bright in infrared, so that the brightest
-    channel is taken. Encoded as sRGB is. 0 where no dot is, in the projector's shadow, and where nothing is hit.
+    The projector is in the middle of a stereo pair (partner: the other camera), else BESIDE_M to the right, and has the
+    camera's direction: both pictures of a pair show the same dots on the same surfaces. albedo: (H, W, 3) uint8 sRGB;
+    dyes are bright in infrared, so that the brightest channel is taken. Encoded as sRGB is. 0 between the dots, in the
+    projector's shadow, and where nothing is hit.
     """
     pixels = np.flatnonzero(hit.valid.ravel())
     points = hit.points.position_world.reshape(-1, 3)[pixels].astype(np.float64)
@@ -75,7 +75,7 @@ def _reached(
 def _dots(angles: F64) -> F64:
     """(N,) brightness 0..1 of the pattern in directions (N, 2) in radians, right and up.
 
-    A dot lies anywhere in the middle half of its cell; which cells have one is a hash of the cell.
+    A dot is anywhere in the middle half of its cell; a hash of the cell decides if it has one.
     """
     cell = np.floor(angles / CELL_RAD)
     key = (cell.astype(np.int64) & 0xFFFF).astype(np.uint64)

@@ -17,12 +17,10 @@ VISIBLE_M = 0.05  # a corner is visible when the depth at its pixel is at most t
 def layout_table(room: Room, camera: Camera, depth_z: DepthZ) -> list[dict[str, Any]]:
     """A row per corner of the room's polygon, at its floor and at its nominal ceiling.
 
-    corner: number in the polygon. at: "floor" or "ceiling". world: (x, y, z) in metres. pixel:
-    (x, y) in px, also beyond the picture's edges; None where the lens does not see it. visible:
-    it lies in the picture and nothing in depth_z (H, W) occludes it. A sloped or stepped ceiling
-    is not followed.
+    corner: number in the polygon. at: "floor" or "ceiling". world: (x, y, z) in metres. pixel: (x, y) in px, also beyond
+    the picture's edges; None if the lens does not see it. visible: in the picture and not occluded in depth_z (H, W).
+    Sloped or stepped ceilings are not followed.
     """
-    # List the polygon's corners at both heights, with their pixels and depths.
     rows = []
     for at, y in (("floor", room.floor_y), ("ceiling", room.ceiling_y)):
         corners = np.insert(room.polygon, 1, y, axis=1)
@@ -62,7 +60,7 @@ def _is_visible(pixel: list[float], z: float, depth_z: DepthZ) -> bool:
     height, width = depth_z.shape
     if not (0 <= column < width and 0 <= row < height):
         return False
-    # Take the farthest depth around: a corner lies on three surfaces, none of them before it.
+    # A corner joins three surfaces: compare with the farthest depth around it.
     around = depth_z[max(row - 1, 0) : row + 2, max(column - 1, 0) : column + 2]
     farthest = float(np.where(around > 0, around, np.inf).max())
     return farthest >= z - VISIBLE_M

@@ -25,7 +25,6 @@ def depth_mm(depth_z: DepthZ) -> NDArray[np.uint16]:
     Overflow: 65.535 m and beyond is stored as 65535 (layer depth_z keeps the metres). A hit nearer
     than half a millimetre is stored as 1, so that 0 always means nothing. NaN is nothing.
     """
-    # Round to millimetres; keep 0 for nothing.
     z = np.where(np.isnan(depth_z), np.float32(0), depth_z)
     rounded = np.clip(np.rint(z * np.float32(1000.0)), 1, DEPTH_MAX_MM)
     return np.where(z > 0, rounded, 0).astype(np.uint16)
@@ -44,7 +43,6 @@ def normal_label(normal_world: UnitVectors, world_from_camera: Matrix4) -> NDArr
     x right, y forward, z up (docs/spec/suncg.md section 5). A normal that is not of unit length (nothing there,
     a triangle without area, NaN) is stored as n = 0: 32768 in all three channels.
     """
-    # Turn world normals into the published camera frame.
     published_from_world = PUBLISHED_FROM_OPENGL @ world_from_camera[:3, :3].T
     normal = _clean(normal_world) @ published_from_world.T.astype(np.float32)
     return encoded_normal(normal)
@@ -53,7 +51,7 @@ def normal_label(normal_world: UnitVectors, world_from_camera: Matrix4) -> NDArr
 def encoded_normal(normal: UnitVectors) -> NDArray[np.uint16]:
     """(H, W, 3) uint16 round((n + 1) 65535 / 2), clipped; halves are rounded to even.
 
-    normal: (H, W, 3) float32 in [-1, 1]; what lies outside is clipped. Back: v * 2 / 65535 - 1.
+    normal: (H, W, 3) float32. Back: v * 2 / 65535 - 1.
     """
     scaled = (normal + np.float32(1)) * np.float32(65535 / 2)
     return np.asarray(np.clip(np.rint(scaled), 0, 65535), np.uint16)

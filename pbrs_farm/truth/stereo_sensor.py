@@ -1,7 +1,7 @@
-"""The layers depth_sensor_stereo and depth_sensor_d455: depth as stereo cameras with block matching have it.
+"""The layers depth_sensor_stereo and depth_sensor_d455: depth of stereo cameras with block matching.
 
-No effects. Disparity has noise, is quantised, near edges belong to the nearer side, and what the left
-camera alone sees has none (data sheet of Intel's D400 family; Keselman et al. 2017).
+No effects. Disparity has noise, is quantised, near edges belongs to the nearer side, and is missing where only the
+left camera sees the surface (data sheet of Intel's D400 family; Keselman et al. 2017).
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from pbrs_farm.core.camera import Camera
 
 STEREO_DISPARITY_NOISE_PX = 0.08  # standard deviation of sub-pixel matching on a textured wall
 STEREO_STEPS_PER_PX = 32  # quantisation of disparity
-MAX_DISPARITY_PX = 126.0  # of the search: what is nearer has no depth
+MAX_DISPARITY_PX = 126.0  # of the search: nearer surfaces have no depth
 WINDOW = 5  # px of the sensor's own picture, of a matched block
 NOISE_GRAIN_PX = 1.5  # neighbouring blocks overlap: their noise is alike
 
@@ -47,7 +47,7 @@ def stereo_depth(
     Equal seeds give equal noise. Not modelled: walls without texture (the projector gives them
     one), repeated patterns, reflections, glass.
     """
-    # A block takes the nearest of what lies in it: objects grow by half a block.
+    # A block takes its nearest depth: objects grow by half a block.
     rng = np.random.default_rng(seed)
     size = max(round(WINDOW * hit.face.shape[1] / sensor.width_px) | 1, 3)
     z = np.where(hit.valid, hit.depth_z.astype(np.float64), np.inf)

@@ -1,4 +1,4 @@
-"""Layers of the surface that is hit: albedo, gloss, shading normals, model coordinates, hha; no effects."""
+"""Layers of the hit surface: albedo, gloss, shading normals, model coordinates, hha; no effects."""
 
 from __future__ import annotations
 
@@ -33,10 +33,9 @@ def albedo_label(
 ) -> NDArray[np.uint8]:  # fmt: skip
     """(H, W, 3) uint8 sRGB: diffuse colour times texture, multiplied in linear light; 0 = nothing.
 
-    most: what the product is held to in each channel, as the light that was traced holds it.
-
-    textures: id -> (H, W, 3 or 4) uint8 sRGB, row 0 = top (v = 1), repeated; looked up between the
-    four nearest texels, not filtered over the pixel. A missing texture counts as white.
+    most: upper limit of the product in each channel, as in the traced light. textures: id -> (H, W, 3 or 4) uint8 sRGB,
+    row 0 = top (v = 1), repeated; interpolated between the four nearest texels, not filtered over the pixel. A missing
+    texture counts as white.
     """
     linear = np.zeros((*hit.face.shape, 3), np.float32)
     if len(geometry.faces):
@@ -128,7 +127,7 @@ def _f0_srgb8(material: Material) -> NDArray[np.uint8]:
 def _of_materials(
     value: Callable[[Material], object], n: int, hit: HitRecord, house: House, geometry: Geometry
 ) -> NDArray[np.uint8]:
-    """(H, W, n) uint8 value of the material that is hit; 0 = nothing."""
+    """(H, W, n) uint8 value of the hit material; 0 = nothing."""
     if not len(geometry.faces):
         return np.zeros((*hit.face.shape, n), np.uint8)
     table = np.array([value(m) for m in house.materials], np.uint8).reshape(-1, n)
@@ -188,8 +187,8 @@ def _bent(geometry: Geometry, faces: I32, seen: F64, mapped: F64) -> F64:
 def nocs_label(hit: HitRecord, house: House) -> NDArray[np.uint16]:
     """(H, W, 3) uint16: 65535 times the point's x, y, z in its model's frame; (0, 0, 0) = nothing.
 
-    The model's axis-aligned box in its own frame is moved to have its centre at 0.5 and scaled by
-    one over its diagonal. Items that are no placed model are nothing.
+    The model's axis-aligned box in its own frame is centred at 0.5 and scaled by one over its diagonal. Items that are
+    not placed models count as nothing.
     """
     out = np.zeros((*hit.face.shape, 3), np.uint16)
     for instance in np.unique(hit.item[hit.valid]):
@@ -223,15 +222,13 @@ def _transformed_normals(points: F64, matrix: F64) -> F64:
 def hha_label(hit: HitRecord, camera: Camera) -> NDArray[np.uint8]:
     """(H, W, 3) uint8: H, H, A; (0, 0, 0) = nothing.
 
-    R: 31000 / depth_z in cm, depth held to at least 100 cm. G: height in cm above the lowest point
-    in view, or above 130 cm below the camera when no point lies more than 90 cm below it. B: degrees
-    between gravity and the normal that points away from the camera, plus 38: floors are 38, walls
-    128, ceilings 218. Each is rounded and held to 0..255.
+    R: 31000 / depth_z in cm, depth at least 100 cm. G: height in cm above the lowest visible point, or above 130 cm
+    below the camera when no point is more than 90 cm below it. B: degrees between gravity and the normal that points
+    away from the camera, plus 38: floors are 38, walls 128, ceilings 218. Each is rounded and clipped to 0..255.
     """
     out = np.zeros((*hit.face.shape, 3), np.float32)
     if not hit.valid.any():
         return out.astype(np.uint8)
-    # Estimate the floor's height from the lowest point in view.
     above_eye_cm = (hit.points.position_world[..., 1] - np.float32(camera.eye[1])) * np.float32(100)
     lowest_cm = float(above_eye_cm[hit.valid].min())
     floor_cm = lowest_cm if lowest_cm <= _FLOOR_IN_VIEW_CM else _ASSUMED_FLOOR_CM

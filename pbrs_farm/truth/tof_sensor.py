@@ -82,7 +82,7 @@ def tof_depth(
 
 
 def _edges(z: F64, valid: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """(H, W) where a pixel's neighbours lie apart, or one sees nothing."""
+    """(H, W) True at jumps in depth, and beside pixels without depth."""
     high = ndimage.maximum_filter(np.where(valid, z, np.inf), 3, mode="nearest")
     low = ndimage.minimum_filter(np.where(valid, z, np.inf), 3, mode="nearest")
     with np.errstate(invalid="ignore"):
@@ -91,7 +91,7 @@ def _edges(z: F64, valid: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 
 def incidence_rad(hit: HitRecord, camera: Camera) -> F64:
-    """(H, W) angle between each pixel's ray and the normal of what it meets."""
+    """(H, W) angle between each pixel's ray and the normal of its surface."""
     _origin, rays = camera.exact_rays()
     cosine = np.abs(np.einsum("...i,...i->...", hit.geo_normal_world.astype(np.float64), rays))
     return np.asarray(np.arccos(np.clip(cosine / np.linalg.norm(rays, axis=-1), 0, 1)))

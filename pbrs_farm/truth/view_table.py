@@ -44,23 +44,19 @@ def view_table(
 ) -> dict[str, Any]:  # fmt: skip
     """The part of view.json that labels need: the camera's table and "instances".
 
-    cut_outs: of the house's materials, as its caster has them: no item covers what lies in its holes.
+    cut_outs: holes of the house's materials, of the caster; items do not cover pixels through their holes.
 
-    instances: a row for each instance id in item_buffer (H, W), by id: id, item, name, kind, nyu40,
-    class, nyu13, class13, source_class, room, pixels, fraction (of the picture), visible_fraction
-    (pixels / pixels when alone in this picture; None unless with_visible_fraction), truncated (see
-    is_truncated), box2d (x0, y0, x1, y1 in px, right and bottom exclusive, of the visible pixels)
-    and box3d (centre, half, axes: rows are unit axes; world, metres). What hangs in the air has
-    floating, true.
-    An empty view has an empty list.
+    instances: a row for each instance id in item_buffer (H, W), by id: id, item, name, kind, nyu40, class, nyu13,
+    class13, source_class, room, pixels, fraction (of the picture), visible_fraction (pixels / pixels when alone in this
+    picture; None unless with_visible_fraction), truncated (see is_truncated), box2d (x0, y0, x1, y1 in px, right and
+    bottom exclusive, of the visible pixels) and box3d (centre, half, axes: rows are unit axes; world, metres). Items in
+    the air have floating, true.
     """
-    # Count the pixels and find the pixel box of each visible instance.
     classes = nyu40_of_instance(house)
     counts = np.bincount(item_buffer.reshape(-1), minlength=len(house.items) + 1)
     visible = [int(i) for i in np.nonzero(counts)[0] if i > 0]
     slices = ndimage.find_objects(item_buffer.astype(np.int32), max_label=len(house.items))
 
-    # Compare the visible pixels with those the item would cover alone.
     rows = []
     for instance in visible:
         item, pixels = house.items[instance - 1], int(counts[instance])
@@ -123,10 +119,10 @@ def _box3d(item: Item) -> dict[str, Any]:
 
 
 def is_truncated(item: Item, camera: Camera) -> bool:
-    """Whether part of the item lies outside the picture: behind the camera, or beyond an edge.
+    """True if part of the item is outside the picture: behind the camera, or beyond an edge.
 
-    Exact for a pin-hole: the view pyramid is convex, so triangles are inside when their vertices
-    are; of other lenses it says whether all vertices are. A panorama sees everything.
+    Exact for a pin-hole: the view pyramid is convex, so triangles are inside when their vertices are; for other lenses
+    all vertices are tested. A panorama sees everything.
     """
     if camera.intrinsics.lens.is_panorama:
         return False

@@ -44,10 +44,8 @@ class Event:
     """Something that happened to a step, or the end of a task."""
 
     # done: made now; kept: done before; end: of a task. planned: the views of a house to make,
-    # known after
-    # its cameras and without dark rooms. under_way: facts hold the finished "share" of a long step.
-    # lacking:
-    # the machine cannot do the step, for the reason in message.
+    # known after its cameras and without dark rooms. under_way: facts hold the finished "share" of
+    # a long step. lacking: the machine cannot do the step, for the reason in message.
     kind: Literal["begin", "done", "kept", "failed", "lacking", "end", "planned", "under_way"]
     house_id: str
     view_id: str | None

@@ -77,7 +77,6 @@ def way_through_rooms(space: WalkSpace, length_m: float, rng: np.random.Generato
     for _leg in range(_MOST_LEGS):
         if length >= length_m:
             break
-        # Stay for some places, then go on to the nearest room that was not visited.
         for _place in range(int(rng.integers(_PLACES_A_ROOM[0], _PLACES_A_ROOM[1] + 1))):
             cost, before = graph.from_cell(at)
             drawn = rng.choice(members[here], min(_CHOICES, len(members[here])), replace=False)
