@@ -13,7 +13,7 @@ from pydantic import Field, model_validator
 from pbrs_farm.core.camera import Intrinsics
 from pbrs_farm.core.distortion import radius_of_angle
 from pbrs_farm.core.lenses import COEFFICIENTS, Lens, LensModel
-from pbrs_farm.core.recipe_fields import FieldGroup, Share
+from pbrs_farm.core.recipe_fields import FieldGroup, Share, field
 
 
 class BlurFields(FieldGroup):
@@ -21,28 +21,25 @@ class BlurFields(FieldGroup):
 
     steps = ("light",)
 
-    aperture_mm: float = Field(
-        0.0, ge=0, le=1000, description="diameter of the entrance pupil; 0 = everything is sharp"
+    aperture_mm: float = field(
+        0.0, "diameter of the entrance pupil; 0 = everything is sharp", 0, 1000
     )
-    focus_m: float = Field(0.0, ge=0, le=1e4, description="depth; 0 = what the middle shows")
-    shutter_s: float = Field(
+    focus_m: float = field(0.0, "depth; 0 = what the middle shows", 0, 1e4)
+    shutter_s: float = field(
         0.0,
-        ge=0,
-        le=60,
-        description="open that long; 0 = nothing moves. Of a walk: along it; things that move blur, too",
+        "open that long; 0 = nothing moves. Of a walk: along it; things that move blur, too",
+        0,
+        60,
     )
-    rolling_s: float = Field(
-        0.0,
-        ge=0,
-        le=60,
-        description="from the top row's light to the bottom one's; 0 = all at once",
+    rolling_s: float = field(
+        0.0, "from the top row's light to the bottom one's; 0 = all at once", 0, 60
     )
-    right_mps: float = Field(0.0, ge=-1e3, le=1e3, description="motion without a walk, camera axes")
-    up_mps: float = Field(0.0, ge=-1e3, le=1e3)
-    forward_mps: float = Field(0.0, ge=-1e3, le=1e3)
-    pan_dps: float = Field(0.0, ge=-1e4, le=1e4, description="to the right, degrees a second")
-    tilt_dps: float = Field(0.0, ge=-1e4, le=1e4, description="upwards")
-    roll_dps: float = Field(0.0, ge=-1e4, le=1e4, description="clockwise, of the camera")
+    right_mps: float = field(0.0, "motion without a walk, camera axes", -1e3, 1e3)
+    up_mps: float = field(0.0, low=-1e3, high=1e3)
+    forward_mps: float = field(0.0, low=-1e3, high=1e3)
+    pan_dps: float = field(0.0, "to the right, degrees a second", -1e4, 1e4)
+    tilt_dps: float = field(0.0, "upwards", -1e4, 1e4)
+    roll_dps: float = field(0.0, "clockwise, of the camera", -1e4, 1e4)
 
     @property
     def is_on(self) -> bool:
@@ -96,25 +93,25 @@ class LensFields(FieldGroup):
 
     steps = ("cameras",)
 
-    preset: Literal["none", "kinect", "tum_vi", "hypersim", "d435", "d455", "fisheye180"] = Field(
-        "none", description="of a known camera; other fields override it"
+    preset: Literal["none", "kinect", "tum_vi", "hypersim", "d435", "d455", "fisheye180"] = field(
+        "none", "of a known camera; other fields override it"
     )
-    model: LensModel = Field("pinhole", description="how directions fall on the picture")
-    width_px: int = Field(640, gt=0, le=16384, description="of the picture that fx to cy are of")
-    height_px: int = Field(480, gt=0, le=16384, description="scaled to image's")
-    fx: Pixels = Field(0.0, description="px; 0 = by cameras.hfov_rad, of a fisheye by hfov_deg")
-    fy: Pixels = Field(0.0, description="0 = fx")
-    cx: Pixels = Field(0.0, description="px from the top left corner; 0 = the middle")
+    model: LensModel = field("pinhole", "how directions fall on the picture")
+    width_px: int = field(640, "of the picture that fx to cy are of", high=16384, above=0)
+    height_px: int = field(480, "scaled to image's", high=16384, above=0)
+    fx: Pixels = field(0.0, "px; 0 = by cameras.hfov_rad, of a fisheye by hfov_deg")
+    fy: Pixels = field(0.0, "0 = fx")
+    cx: Pixels = field(0.0, "px from the top left corner; 0 = the middle")
     cy: Pixels = 0.0
-    hfov_deg: float = Field(0.0, ge=0, le=360, description="fisheye without fx: of the width")
-    k1: Coefficient = Field(0.0, description="radtan and fisheye, as OpenCV has them")
+    hfov_deg: float = field(0.0, "fisheye without fx: of the width", 0, 360)
+    k1: Coefficient = field(0.0, "radtan and fisheye, as OpenCV has them")
     k2: Coefficient = 0.0
     k3: Coefficient = 0.0
-    k4: Coefficient = Field(0.0, description="fisheye")
-    p1: Coefficient = Field(0.0, description="radtan, tangential")
+    k4: Coefficient = field(0.0, "fisheye")
+    p1: Coefficient = field(0.0, "radtan, tangential")
     p2: Coefficient = 0.0
-    max_angle_deg: float = Field(
-        180.0, gt=0, le=180, description="fisheye: of the image circle, from the axis; black beyond"
+    max_angle_deg: float = field(
+        180.0, "fisheye: of the image circle, from the axis; black beyond", high=180, above=0
     )
 
     @model_validator(mode="before")
@@ -245,36 +242,31 @@ class SensorFields(FieldGroup):
 
     steps = ("develop",)
 
-    preset: Literal["none", "kinect", "phone", "slr", "webcam"] = Field(
-        "none", description="a kind of camera; other fields override it"
+    preset: Literal["none", "kinect", "phone", "slr", "webcam"] = field(
+        "none", "a kind of camera; other fields override it"
     )
-    is_on: bool = Field(False, description="off: pictures are as the light alone makes them")
-    f_number: float = Field(2.0, ge=0.5, le=64)
-    shutter_s: float = Field(0.0, ge=0, le=60, description="0 = automatic, up to shutter_max_s")
-    shutter_min_s: float = Field(1e-4, gt=0, le=60, description="the shortest automatic one")
-    shutter_max_s: float = Field(1 / 30, gt=0, le=60, description="the longest automatic one")
-    iso_min: float = Field(100.0, ge=1, le=1e6, description="the base; full_well_e is of it")
-    iso_max: float = Field(1600.0, ge=1, le=1e6, description="what automatic exposure goes up to")
-    compensation_ev: float = Field(0.0, ge=-10, le=10, description="stops above what is automatic")
-    lag_s: float = Field(
-        0.0, ge=0, le=10, description="automatic exposure follows a walk's light with this delay"
+    is_on: bool = field(False, "off: pictures are as the light alone makes them")
+    f_number: float = field(2.0, low=0.5, high=64)
+    shutter_s: float = field(0.0, "0 = automatic, up to shutter_max_s", 0, 60)
+    shutter_min_s: float = field(1e-4, "the shortest automatic one", high=60, above=0)
+    shutter_max_s: float = field(1 / 30, "the longest automatic one", high=60, above=0)
+    iso_min: float = field(100.0, "the base; full_well_e is of it", 1, 1e6)
+    iso_max: float = field(1600.0, "what automatic exposure goes up to", 1, 1e6)
+    compensation_ev: float = field(0.0, "stops above what is automatic", -10, 10)
+    lag_s: float = field(0.0, "automatic exposure follows a walk's light with this delay", 0, 10)
+    full_well_e: float = field(6000.0, "electrons that saturate a pixel", 10, 1e7)
+    read_noise_e: float = field(3.0, "electrons, standard deviation", 0, 1e4)
+    bits: int = field(10, "of the raw values", 1, 16)
+    black_level: float = field(
+        1 / 16, "of the raw range, at which no light stands: noise has room", 0, 0.5
     )
-    full_well_e: float = Field(6000.0, ge=10, le=1e7, description="electrons that saturate a pixel")
-    read_noise_e: float = Field(3.0, ge=0, le=1e4, description="electrons, standard deviation")
-    bits: int = Field(10, ge=1, le=16, description="of the raw values")
-    black_level: float = Field(
-        1 / 16,
-        ge=0,
-        le=0.5,
-        description="of the raw range, at which no light stands: noise has room",
+    mosaic: bool = field(True, "a Bayer mosaic (RGGB), demosaiced again")
+    vignetting: Share = field(0.0, "light lost in the corners")
+    aberration_px: float = field(
+        0.0, "lateral: red against blue in the corners, px of 640 across", 0, 50
     )
-    mosaic: bool = Field(True, description="a Bayer mosaic (RGGB), demosaiced again")
-    vignetting: Share = Field(0.0, description="light lost in the corners")
-    aberration_px: float = Field(
-        0.0, ge=0, le=50, description="lateral: red against blue in the corners, px of 640 across"
-    )
-    headroom: float = Field(4.0, ge=1, le=100, description="saturation over the white of the tone")
-    jpeg_quality: int = Field(0, ge=0, le=100, description="0 = no JPEG")
+    headroom: float = field(4.0, "saturation over the white of the tone", 1, 100)
+    jpeg_quality: int = field(0, "0 = no JPEG", 0, 100)
 
     @model_validator(mode="before")
     @classmethod

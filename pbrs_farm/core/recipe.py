@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping
 from functools import cache
 from typing import Any, Self, get_args
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import ValidationError, model_validator
 from pydantic_core import ErrorDetails
 
 from pbrs_farm.core import keys
@@ -38,6 +38,7 @@ from pbrs_farm.core.recipe_fields import (
     SkyFields,
     SurroundingFields,
     ToneFields,
+    field,
 )
 from pbrs_farm.core.rig_fields import RigFields, stereo_rig
 from pbrs_farm.core.shot import Shot
@@ -85,15 +86,13 @@ class Recipe(FieldGroup):
     """
 
     name: str = "fast"
-    seed: int = Field(0, ge=0, lt=2**64)
+    seed: int = field(0, low=0, below=2**64)
     read: ReadFields = ReadFields()
     dress: DressFields = DressFields()
     repair: RepairFields = RepairFields()
     surroundings: SurroundingFields = SurroundingFields()
     cameras: CameraFields = CameraFields()
-    rig: RigFields | None = Field(
-        None, description="cameras that take each view together, by --rig"
-    )
+    rig: RigFields | None = field(None, "cameras that take each view together, by --rig")
     lens: LensFields = LensFields()
     blur: BlurFields = BlurFields()
     sensor: SensorFields = SensorFields()

@@ -11,7 +11,7 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.camera import Intrinsics
 from pbrs_farm.core.checked_json import exactly
 from pbrs_farm.core.optics_fields import LensFields
-from pbrs_farm.core.recipe_fields import FieldGroup
+from pbrs_farm.core.recipe_fields import FieldGroup, field
 
 _UNIT: Final = 0.01  # a quaternion's length may differ from 1 by so much
 Metres = Annotated[float, Field(ge=-100, le=100)]
@@ -27,18 +27,14 @@ class RigCamera(FieldGroup):
 
     name: Name
     translation_m: Annotated[tuple[Metres, Metres, Metres], exactly(3)] = (0.0, 0.0, 0.0)
-    rotation_wxyz: Annotated[tuple[float, float, float, float], exactly(4)] | None = Field(
-        None, description="unit quaternion, rig from camera; instead of the three angles"
+    rotation_wxyz: Annotated[tuple[float, float, float, float], exactly(4)] | None = field(
+        None, "unit quaternion, rig from camera; instead of the three angles"
     )
-    yaw_deg: Degrees = Field(0.0, description="to the right")
-    pitch_deg: Degrees = Field(0.0, description="up, after yaw")
-    roll_deg: Degrees = Field(0.0, description="clockwise, after yaw and pitch")
-    hfov_deg: float = Field(
-        0.0, ge=0, lt=175, description="of a pin-hole's width; 0 = as all cameras have it"
-    )
-    lens: LensFields | None = Field(
-        None, description="a lens of its own, as the recipe's group lens"
-    )
+    yaw_deg: Degrees = field(0.0, "to the right")
+    pitch_deg: Degrees = field(0.0, "up, after yaw")
+    roll_deg: Degrees = field(0.0, "clockwise, after yaw and pitch")
+    hfov_deg: float = field(0.0, "of a pin-hole's width; 0 = as all cameras have it", 0, below=175)
+    lens: LensFields | None = field(None, "a lens of its own, as the recipe's group lens")
 
     @field_validator("rotation_wxyz")
     @classmethod
