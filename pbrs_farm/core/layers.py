@@ -8,7 +8,8 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import Final, Literal, TypeAlias
+from functools import partial
+from typing import Any, Final, Literal, TypeAlias
 
 from pbrs_farm.core.errors import MachineFailed
 from pbrs_farm.core.plugins import plugins
@@ -80,27 +81,17 @@ MOST_VARIANTS: Final = 8
 """Of a view's further pictures of `mlt_il_ol`, by other cameras (recipe: tone.variants)."""
 
 
+def _truth_layer(
+    name: str, channels: str, dtype: str, unit: str, nodata: str = "0", file: str = "", **more: Any
+) -> Layer:
+    """A label that the step `truth` writes. more: other fields of Layer."""
+    return Layer(name, file or f"{name}.png", channels, dtype, unit, nodata, "truth", **more)
+
+
 def _picture_layer(name: str, step: str, title: str = "", *, optional: bool = False) -> Layer:
     return Layer(
         name, f"{name}.png", "RGB", "uint8", "sRGB", "-", step, optional,
         shown_as="picture", resized="area", title=title,
-    )  # fmt: skip
-
-
-def _label_layer(
-    name: str,
-    channels: str,
-    dtype: str,
-    unit: str,
-    nodata: str = "0",
-    *,
-    shown_as: ShownAs,
-    resized: Resized = "nearest",
-    title: str = "",
-) -> Layer:
-    return Layer(
-        name, f"{name}.png", channels, dtype, unit, nodata, "truth",
-        shown_as=shown_as, resized=resized, title=title,
     )  # fmt: skip
 
 
@@ -123,46 +114,26 @@ def optional_layer(
         >>> optional_layer("height", "Y", "uint16", "mm above the lowest floor").file
         'height.png'
     """
-    file = file or f"{name}.png"
     shown_as = shown_as or ("picture" if dtype == "uint8" else "range")
-    return Layer(
-        name, file, channels, dtype, unit, nodata, "truth", optional=True, needs=needs,
-        shown_as=shown_as, resized=resized,
+    return _truth_layer(
+        name, channels, dtype, unit, nodata, file, optional=True, needs=needs, shown_as=shown_as, resized=resized
     )  # fmt: skip
 
 
-def _along_axis(
-    name: str, channels: str, dtype: str, unit: str, *, shown_as: ShownAs = ""
-) -> Layer:
-    return optional_layer(name, channels, dtype, unit, needs="planar depth", shown_as=shown_as)
+_along_axis: Final = partial(optional_layer, needs="planar depth")
 
 
-def _between(
-    name: str,
-    partner: str,
-    channels: str,
-    dtype: str,
-    unit: str,
-    nodata: str = "0",
-    ending: str = "png",
-    needs: str = "",
-    *,
-    shown_as: ShownAs,
-    resized: Resized = "nearest",
-    version: int = 1,
-) -> Layer:
-    file = f"{name}.{ending}"
-    return Layer(
-        name, file, channels, dtype, unit, nodata, "truth", True, partner, needs,
-        shown_as=shown_as, resized=resized, version=version,
-    )  # fmt: skip
+def _between(name: str, partner: str, *columns: str, ending: str = "png", **more: Any) -> Layer:
+    """A label that needs another view. columns: channels, dtype, unit and perhaps nodata."""
+    layer = _truth_layer(name, *columns, optional=True, partner=partner, **more)
+    return replace(layer, file=f"{name}.{ending}")
 
 
 def _flow(name: str, partner: str) -> tuple[Layer, ...]:
     unit = f"px right, px down, to the {partner} frame"
     kitti = "64 x + 2^15, 64 y + 2^15, 1 = seen there (KITTI)"
     return (
-        _between(f"flow_{name}", partner, "X Y", "float16", unit, "0, 0", "exr",
+        _between(f"flow_{name}", partner, "X Y", "float16", unit, "0, 0", ending="exr",
                  shown_as="flow", resized="pixels"),
         _between(f"flow_{name}_kitti", partner, "RGB", "uint16", kitti, "0 in all three",
                  shown_as="flow_kitti", resized="pixels", version=_REACH_VERSION),
@@ -233,15 +204,15 @@ OWN_LAYERS: Final[tuple[Layer, ...]] = (
         "light",
     ),
     # Labels of every view, all from one hit record.
-    _label_layer("depth", "Y", "uint16", "planar z, mm", shown_as="depth"),
-    _label_layer(
+    _truth_layer("depth", "Y", "uint16", "planar z, mm", shown_as="depth"),
+    _truth_layer(
         "normal", "RGB", "uint16", "camera frame x right, y forward, z up; round((n + 1) 65535 / 2)",
         "32768 in all three, valid = 0", shown_as="high_byte", title="Normals",
     ),
-    _label_layer("valid", "Y", "uint8", "0 / 255", shown_as="mask"),
-    _label_layer("semantic", "Y", "uint8", "NYU40 id", shown_as="classes", title="Classes"),
-    _label_layer("instance", "Y", "uint16", "instance id", shown_as="ids", title="Instances"),
-    _label_layer("boundary", "Y", "uint8", "0 / 255", shown_as="mask", resized="lines", title="Boundaries"),
+    _truth_layer("valid", "Y", "uint8", "0 / 255", shown_as="mask"),
+    _truth_layer("semantic", "Y", "uint8", "NYU40 id", shown_as="classes", title="Classes"),
+    _truth_layer("instance", "Y", "uint16", "instance id", shown_as="ids", title="Instances"),
+    _truth_layer("boundary", "Y", "uint8", "0 / 255", shown_as="mask", resized="lines", title="Boundaries"),
     # Labels that --layers asks for.
     optional_layer("depth_z", "Z", "float32", "planar z, m", file="depth_z.exr", shown_as="depth_m"),
     optional_layer("position", "X Y Z", "float32", "world, m", file="position.exr", shown_as="range"),
@@ -312,7 +283,7 @@ OWN_LAYERS: Final[tuple[Layer, ...]] = (
     *_flow("backward", "previous"),
     _between(
         "scene_flow", "next", "X Y Z", "float32", "m, world: what things themselves move to the next frame",
-        "0, 0, 0", "exr", shown_as="range",
+        "0, 0, 0", ending="exr", shown_as="range",
     ),
     _between("disparity", "stereo", "Y", "uint16", "256 x px between the pictures of a pair (KITTI)", needs="rows", shown_as="disparity", resized="pixels"),
     _between("occlusion_stereo", "stereo", "Y", "uint8", _SEEN_THERE, "128", shown_as="mask", version=_REACH_VERSION),
