@@ -36,11 +36,7 @@ FirstHit = Callable[[F64, F64], tuple[F32, I32]]
 
 
 def triple(values: NDArray[np.floating]) -> tuple[float, float, float]:
-    """Three numbers as a value that can be compared and hashed; ValueError for more or fewer.
-
-    For a (3,) array that becomes a dictionary key or a field of a frozen value; the numbers are
-    Python floats afterwards.
-    """
+    """Three numbers of an array as Python floats, to compare and hash; ValueError for more or fewer."""
     x, y, z = (float(v) for v in values)
     return (x, y, z)
 
@@ -65,11 +61,7 @@ class HitRecord:
 
     @cached_property
     def points(self) -> SurfacePoints:
-        """Positions, shading normals and texture coordinates: a third of a record's time.
-
-        Computed at the first call and kept. Where nothing is hit all values are 0. Read it only in
-        layers that need more than face, item, depth and geometric normal.
-        """
+        """Positions, shading normals and texture coordinates: a third of a record's time, cached."""
         return self.interpolate()
 
     @property

@@ -48,21 +48,12 @@ class Intrinsics:
 
     @staticmethod
     def from_hfov(width_px: int, height_px: int, hfov_rad: float = PAPER_HFOV_RAD) -> Intrinsics:
-        """Square pixels, principal point in the middle, full horizontal field of view hfov_rad.
-
-        The default field of view is the paper's. The principal point is (width / 2, height / 2),
-        since pixel centres lie at +0.5; fy equals fx, so the vertical field of view follows from
-        the height.
-        """
+        """Square pixels, principal point in the middle, full horizontal field of view hfov_rad."""
         f = 0.5 * width_px / math.tan(0.5 * hfov_rad)
         return Intrinsics(width_px, height_px, f, f, 0.5 * width_px, 0.5 * height_px)
 
     def resized(self, width_px: int, height_px: int) -> Intrinsics:
-        """The same field of view on another pixel grid.
-
-        Both focal lengths and the principal point scale with the grid; the lens is kept. A size of
-        another aspect stretches the picture: fx and fy then differ.
-        """
+        """The same field of view on another pixel grid; another aspect stretches the picture."""
         sx, sy = width_px / self.width_px, height_px / self.height_px
         return Intrinsics(
             width_px, height_px, self.fx * sx, self.fy * sy, self.cx * sx, self.cy * sy, self.lens
@@ -84,13 +75,7 @@ class Intrinsics:
         return np.array([[self.fx, 0, self.cx], [0, self.fy, self.cy], [0, 0, 1]], np.float64)
 
     def directions(self, pixels: F64) -> F64:
-        """(N, 3) of pixel coordinates (N, 2): x right, y down, z forward, as Lens.directions.
-
-        Pixels are float64 (x, y) with the origin at the top left and centres at +0.5: the centre of
-        the first pixel is (0.5, 0.5). Where the lens has no ray (outside a fisheye's circle, beyond
-        a fold) the direction is as Lens.directions says. The axes are OpenCV's, in the camera's
-        frame.
-        """
+        """(N, 3) directions of pixel coordinates (N, 2), OpenCV's axes, as Lens.directions."""
         plane = (pixels - [self.cx, self.cy]) / [self.fx, self.fy]
         return self.lens.directions(plane)
 
@@ -383,10 +368,7 @@ def rigid_motion(matrix: Any, call: str, name: str) -> F64:
 
 @functools.lru_cache(maxsize=4)
 def _lens_grid(i: Intrinsics) -> F64:
-    """(H, W, 3) directions through the pixels' centres, OpenGL's camera axes; not to be written to.
-
-    Kept for the last lenses: the views of a run share one, and undistorting takes a while.
-    """
+    """(H, W, 3) directions through the pixels' centres, OpenGL's camera axes; cached, do not write to it."""
     x, y = np.meshgrid(np.arange(i.width_px) + 0.5, np.arange(i.height_px) + 0.5)
     found = i.directions(np.stack([x.ravel(), y.ravel()], axis=1)) * _FLIP
     found.setflags(write=False)

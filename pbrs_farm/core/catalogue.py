@@ -70,11 +70,7 @@ class Shape:
 
     @property
     def bounds(self) -> F64:
-        """(2, 3) minimum and maximum in the piece's frame, metres.
-
-        Computed at each call: keep it where it is used more than once. ValueError for a shape
-        without surfaces.
-        """
+        """(2, 3) minimum and maximum in the piece's frame, metres; ValueError without surfaces. Not cached."""
         return np.array(points_bounds(np.concatenate([s.positions for s in self.surfaces])))
 
 
@@ -107,11 +103,7 @@ class Catalogue:
     _shapes: dict[str, Shape | None] = field(default_factory=dict, init=False, repr=False)
 
     def of(self, *groups: str) -> tuple[Piece, ...]:
-        """The pieces of these groups, in the catalogue's order.
-
-        Empty for a group that the catalogue does not have: callers fall back to another piece or
-        leave the place free.
-        """
+        """The pieces of these groups, in the catalogue's order."""
         return tuple(p for p in self.pieces if p.group in groups)
 
     def shape(self, piece: Piece) -> Shape | None:

@@ -30,12 +30,9 @@ class DataFormat:
     beside: tuple[str, ...] = ()  # patterns of names of files that lie beside one and are no homes
 
     def is_sure_of(self, suffix: str, head: bytes) -> bool:
-        """Whether a file of this suffix (lower case) that begins with head is of this format.
+        """True if the suffix (lower case) and the first bytes of a file prove this format.
 
-        A suffix of this format alone is enough. A suffix that several formats share
-        (`shared_suffixes`) needs `contains` to be found in head, the first bytes of the file. False
-        does not say that the file is of another format: only that its name and beginning do not
-        decide.
+        A suffix that several formats share (`shared_suffixes`) needs `contains` in head.
         """
         if suffix not in self.suffixes:
             return False

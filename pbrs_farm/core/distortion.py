@@ -29,12 +29,10 @@ _RESIDUAL: Final = 1e-10  # of a solution, at z = 1: a ten-millionth of a pixel
 
 
 def distorted(points: F64, coefficients: Coefficients) -> F64:
-    """(N, 2) points in the plane of undistorted points (N, 2) at z = 1.
+    """(N, 2) distorted points of undistorted points (N, 2) at z = 1, by Brown's model (head of this module).
 
-    Brown's radial-tangential model: coefficients are (k1, k2, p1, p2, k3), in OpenCV's order, for
-    points x / z and y / z before the camera. It is defined everywhere, but beyond `largest_radius`
-    it folds back over points nearer to the axis: callers leave those out. Brown 1966; the formula
-    is in the head of this module.
+    Coefficients: (k1, k2, p1, p2, k3), OpenCV's order. Beyond `largest_radius` it folds back: callers
+    leave such points out.
     """
     k1, k2, p1, p2, k3 = coefficients
     a, b = points[:, 0], points[:, 1]
@@ -179,10 +177,9 @@ def angle_of_radius(radius: F64, coefficients: Coefficients, largest_rad: float)
 
 
 def directions_of_fisheye(plane: F64, coefficients: Coefficients, largest_rad: float) -> F64:
-    """(N, 3) unit directions of points (N, 2) of the plane; NaN beyond largest_rad.
+    """(N, 3) unit directions of points (N, 2) of the plane, OpenCV's axes; NaN beyond largest_rad.
 
-    OpenCV's axes: x right, y down, z forward; an angle above 90 degrees has z < 0. The plane's unit
-    is the focal length, the axis at (0, 0).
+    The plane's unit is the focal length. An angle above 90 degrees has z < 0.
     """
     radius = np.linalg.norm(plane, axis=1)
     angle = angle_of_radius(radius, coefficients, largest_rad)
@@ -192,11 +189,7 @@ def directions_of_fisheye(plane: F64, coefficients: Coefficients, largest_rad: f
 
 
 def fisheye_of_directions(directions: F64, coefficients: Coefficients, largest_rad: float) -> F64:
-    """(N, 2) the plane's points of directions (N, 3) of any length; NaN beyond largest_rad.
-
-    OpenCV's axes. The direction exactly behind the camera has no side, and the one along the axis
-    is the centre: both give (0, 0), the first only where largest_rad reaches 180 degrees.
-    """
+    """(N, 2) the plane's points of directions (N, 3) of any length, OpenCV's axes; NaN beyond largest_rad."""
     across = np.linalg.norm(directions[:, :2], axis=1)
     angle = np.arctan2(across, directions[:, 2])
     radius = radius_of_angle(angle, coefficients)

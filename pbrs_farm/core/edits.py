@@ -195,11 +195,7 @@ def edits_digest(edits: Sequence[Edit]) -> str:
 
 
 def edited_id(house_id: str, edits: Sequence[Edit]) -> str:
-    """The id of a house with edits: `<house>-e<8 hex>`; its own without any.
-
-    Eight digits tell the edits of one house apart; where equality must be sure, compare
-    `edits_digest`.
-    """
+    """The id of a house with edits: `<house>-e<8 hex of edits_digest>`; its own without any."""
     return f"{house_id}{SUFFIX}{edits_digest(edits)[:8]}" if edits else house_id
 
 

@@ -23,11 +23,7 @@ PUBLISHED_FROM_OPENGL: F64 = np.array([[1.0, 0, 0], [0, 0, -1.0], [0, 1.0, 0]], 
 
 
 def opencv_world_from_camera(world_from_camera: Matrix4) -> Matrix4:
-    """Pose of a camera with OpenCV axes from the pose with OpenGL axes.
-
-    (4, 4) in and out. Positions and scale stay; the camera's y and z axes are turned round. The
-    same call maps back, since the change of axes is its own inverse.
-    """
+    """(4, 4) pose of a camera with OpenCV axes from that with OpenGL axes; it is its own inverse."""
     return world_from_camera @ OPENCV_FROM_OPENGL
 
 
@@ -77,12 +73,7 @@ def is_flattening(matrix: F64) -> bool:
 
 
 def transform_points(a_from_b: F64, points_b: NDArray[np.floating]) -> F64:
-    """(N, 3) points in frame a; a_from_b is (4, 4) affine.
-
-    points_b is (N, 3) of any float type; the result is float64. For directions and normals take the
-    rotation alone: this adds the translation. The last row of the matrix is not read, so a
-    projection is not divided out.
-    """
+    """(N, 3) float64 points in frame a; a_from_b is (4, 4) affine. Use the rotation alone for directions."""
     p = np.asarray(points_b, np.float64)
     return np.asarray(p @ a_from_b[:3, :3].T + a_from_b[:3, 3])
 

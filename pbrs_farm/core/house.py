@@ -108,21 +108,14 @@ class Material:
 
     @property
     def is_metal(self) -> bool:
-        """Whether its colour is that of its highlights: of no picture, Ks bright and four times Kd.
-
-        Light, and OpenGL, which has nothing for a metal to mirror, both ask it.
-        """
+        """True if highlights give its colour: no picture, Ks bright and four times Kd."""
         brightness = float(linear_from_srgb(np.clip(self.specular, 0, 1)) @ LUMINANCE)
         dark = 4 * float(linear_from_srgb(np.clip(self.diffuse, 0, 1)) @ LUMINANCE) < brightness
         return self.texture_id is None and brightness > _LEAST_METAL and dark
 
     @property
     def shows_maps(self) -> bool:
-        """Whether light follows its roughness and normal maps: glass and bulbs stay flat.
-
-        The light renderer and the layers of surfaces both ask it, so that pictures and labels agree
-        on which maps count.
-        """
+        """True if light and labels follow its roughness and normal maps: glass and bulbs stay flat."""
         return self.kind in (MaterialKind.OPAQUE, MaterialKind.MIRROR, MaterialKind.SHADE)
 
 
@@ -143,11 +136,7 @@ class Surface:
 
 
 def corners_of_surfaces(surfaces: Iterable[Surface]) -> F64:
-    """(F, 3, 3) corners of all triangles of surfaces in their order, in double precision.
-
-    (0, 3, 3) without surfaces, so that callers need no special case. Which surface a triangle is of
-    is not kept: count the faces, or take `geometry_from_house`.
-    """
+    """(F, 3, 3) float64 corners of all triangles of surfaces in their order; (0, 3, 3) without any."""
     found = [triangle_corners(s.positions, s.faces) for s in surfaces]
     return np.concatenate([np.zeros((0, 3, 3)), *found])
 
@@ -180,11 +169,7 @@ class Box:
 
     @property
     def corners(self) -> F64:
-        """(8, 3) corners in the world; corner i has the sign of bit k of i along axis k.
-
-        float64, metres. Corner 0 is the least and corner 7 the greatest along all three axes of the
-        box; corners i and i ^ 1 share an edge along the first axis.
-        """
+        """(8, 3) float64 corners in the world, metres; corner i has the sign of bit k of i along axis k."""
         signs = np.array([[1 if i >> k & 1 else -1 for k in range(3)] for i in range(8)])
         return np.asarray(self.centre + (signs * self.half) @ self.axes.T)
 
@@ -269,11 +254,7 @@ class Item:
 
     @property
     def bounds(self) -> F64:
-        """(2, 3) axis-aligned minimum and maximum, metres; NaN for an item without vertices.
-
-        Computed from all vertices at each call, also those that no face uses: keep it where a loop
-        needs it. A NaN compares false with everything, so an item without vertices meets no box.
-        """
+        """(2, 3) axis-aligned minimum and maximum of all vertices, metres; NaN without any. Not cached."""
         points = [s.positions for s in self.surfaces if len(s.positions)]
         if not points:
             return np.full((2, 3), np.nan)
@@ -282,11 +263,7 @@ class Item:
 
     @property
     def oriented_box(self) -> Box:
-        """The item's box, or its axis-aligned one.
-
-        `box` where a reader knew the item's own axes. The axis-aligned one is NaN for an item
-        without vertices.
-        """
+        """The item's box of its reader, or its axis-aligned one, which is NaN without vertices."""
         if self.box is not None:
             return self.box
         low, high = self.bounds
@@ -439,18 +416,13 @@ class House:
         raise KeyError(room_id)
 
     def with_items(self, items: Iterable[Item]) -> House:
-        """The same house with other items (instance ids follow their order).
-
-        Levels, rooms, materials and textures are shared with this house. Labels and triangle
-        numbers belong to one order of items: arrays made from the old house do not fit the new one.
-        """
+        """The same house with other items; instance ids follow their order."""
         return replace(self, items=tuple(items))
 
     def surfaces(self) -> Iterator[tuple[int, Item, int, Surface]]:
-        """(instance id, item, index in the item, surface) of every surface, in order.
+        """(instance id from 1, item, index in the item, surface) of every surface, in order.
 
-        The instance id counts items from 1, as in the item buffer (0 = nothing). The position in
-        this sequence is the number in Geometry.face_surface, with and without panes.
+        The position in this sequence is the number in Geometry.face_surface, with and without panes.
         """
         for index, item in enumerate(self.items):
             for j, surface in enumerate(item.surfaces):
@@ -482,10 +454,8 @@ class Geometry:
 def geometry_from_house(house: House, *, with_panes: bool = True) -> Geometry:
     """Concatenate every surface of house; with_panes False leaves out window panes (light only).
 
-    float32 positions in metres, int32 faces into them, and for each face the instance id (uint32,
-    from 1), the material and the number of its surface in `House.surfaces`. Surface numbers are the
-    same with and without panes. Nothing is welded: vertices are as many as all surfaces have.
-    Normals and texture coordinates are zeros for a surface without.
+    Surface numbers are the same with and without panes. Nothing is welded. Missing normals and texture
+    coordinates are zeros.
     """
     positions, normals, uvs, faces = [], [], [], []
     face_item, face_material, face_surface = [], [], []

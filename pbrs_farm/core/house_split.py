@@ -60,11 +60,9 @@ def home_of(house: str) -> str:
 
 
 def split_of_house(house: str, shares: SplitShares | None = None) -> str:
-    """ "train", "val" or "test" of a house's id.
+    """ "train", "val" or "test" of a house's id, by the sha256 of the home's name.
 
-    Decided by the home's name alone, through sha256: adding houses moves none of the others,
-    variants of one home stay together, and every machine says the same. The shares hold only on
-    average; of a few houses one split may be empty.
+    Adding houses moves no other, and variants of one home stay together. The shares hold on average.
     """
     shares = shares or SplitShares()
     # Take a number of 0..1 from the home's name.

@@ -60,11 +60,7 @@ def slug(name: str) -> str:
 
 
 def house_id(file_stem: str, source_sha256: str) -> str:
-    """`<slug of the file name>-<first 8 hex of the source's sha256>`.
-
-    The file's name is for people; the digest makes the id that of the content. So another content
-    is another id, and two files of one content and name share theirs.
-    """
+    """`<slug of the file name>-<first 8 hex of the source's sha256>`: another content is another id."""
     return f"{slug(file_stem)}-{source_sha256[:8]}"
 
 

@@ -65,10 +65,10 @@ class Lens:
 
     @property
     def largest_angle_rad(self) -> float:
-        """The angle from the axis beyond which nothing is seen.
+        """The widest angle from the axis with an image.
 
-        For a fisheye the image circle or the fold, whichever is nearer; for a radtan lens the angle
-        of its fold, or 90 degrees without one; 180 degrees for panoramas.
+        For a fisheye the image circle or the fold, the nearer one; for a radtan lens its fold, or 90 degrees;
+        180 degrees for panoramas.
         """
         if self.model == "fisheye":
             return min(self.max_angle_rad, angle_of_fold(self.coefficients))

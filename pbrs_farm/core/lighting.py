@@ -68,8 +68,7 @@ def flux_lm(
 ) -> float:
     """Luminous flux in lm of one light source (docs/spec/sky.md: one photometric scale).
 
-    share: the part of the lamp's power that falls to this source (1 / number of sources).
-    lamp_lm: the flux of a Sweet Home 3D lamp of power 0.5; lm_per_watt: for SUNCG's watts.
+    share: of the lamp's power. lamp_lm: flux of a Sweet Home 3D lamp of power 0.5; lm_per_watt: SUNCG's.
     """
     if unit is PowerUnit.SWEETHOME3D:
         return float(lamp_lm * (power / 0.5) ** 2 * share)

@@ -22,11 +22,7 @@ _NO_NORMAL = 100 * np.finfo(np.float64).eps  # of a face in a plane: twice its a
 
 
 def triangle_corners(positions: NDArray[np.floating], faces: NDArray[np.integer]) -> F64:
-    """(F, 3, 3) corners of the faces (F, 3) of a mesh, in double precision.
-
-    positions is (V, 3) in any float type, faces (F, 3) indices below V; (0, 3, 3) for no faces.
-    Corners are copies: changing them does not change the mesh.
-    """
+    """(F, 3, 3) corners of the faces (F, 3) of positions (V, 3), in double precision, as copies."""
     return np.asarray(positions[faces], np.float64)
 
 
@@ -115,11 +111,7 @@ def cross_products(a: F64, b: F64) -> F64:
 
 
 def area_vectors(corners: F64) -> F64:
-    """(F, 3) normals of triangles (F, 3, 3), twice the area long; their front is anticlockwise.
-
-    (0, 0, 0) for a triangle without area. Their sum over a closed mesh is 0. Take `unit_normals`
-    where only the direction counts.
-    """
+    """(F, 3) normals of triangles (F, 3, 3), twice the area long; their front is anticlockwise."""
     return cross_products(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
 
 
@@ -145,10 +137,7 @@ def faces_with_area(corners: F64, least_m2: float) -> Bools:
 
 
 def signed_volume(corners: F64, origin: F64) -> float:
-    """Volume in cubic metres that closed triangles (F, 3, 3) bound; negative if they face inward.
-
-    origin: (3,) a point near the mesh, so that rounding stays small.
-    """
+    """m3 inside closed triangles (F, 3, 3), negative if they face inward; origin (3,): a near point."""
     # Sum the signed tetrahedra between the origin and each face.
     a, b, c = np.moveaxis(corners - origin, 1, 0)
     return float(np.einsum("ij,ij->i", a, cross_products(b, c)).sum() / 6)

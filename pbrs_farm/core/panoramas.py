@@ -31,10 +31,9 @@ FACE_AXES: Final[F64] = np.array(
 
 
 def directions_of_equirect(plane: F64) -> F64:
-    """(N, 3) unit directions of (longitude, latitude downwards) (N, 2); NaN beyond the poles.
+    """(N, 3) unit directions, OpenCV's axes, of (longitude, latitude) (N, 2), radians; NaN beyond the poles.
 
-    Angles in radians; (0, 0) is the camera's forward axis, longitude grows to the right. OpenCV's
-    axes. Longitudes beyond pi wrap round and are not NaN.
+    (0, 0) is forward; longitude grows to the right, latitude downwards.
     """
     longitude, latitude = plane[:, 0], plane[:, 1]
     level = np.cos(latitude)
@@ -71,10 +70,9 @@ def directions_of_cubemap(plane: F64) -> F64:
 
 
 def cubemap_of_directions(directions: F64) -> F64:
-    """(N, 2) the strip's points of directions (N, 3) of any length, on the face that sees each.
+    """(N, 2) the strip's points of directions (N, 3) of any length, OpenCV's axes; NaN for length 0.
 
-    OpenCV's axes. On an edge between two faces the one that comes first in FACE_AXES is taken. NaN
-    for a direction of length 0.
+    On an edge between two faces the first one in FACE_AXES is taken.
     """
     number = np.argmax(directions @ FACE_AXES[:, 2].T, axis=1)
     local = np.einsum("nij,nj->ni", FACE_AXES[number], directions)

@@ -44,11 +44,7 @@ class Plugin:
         return f"{self.name} of {self.package} {self.version}"
 
     def load(self) -> Any:
-        """Its object; MachineFailed where its module cannot be imported.
-
-        Imports the package of the plugin and so runs its code; Python keeps the module, so a second
-        call is cheap. Any exception of the import becomes the MachineFailed.
-        """
+        """Import its object; MachineFailed for any error of the import."""
         try:
             return self.entry.load()
         except Exception as error:
@@ -81,11 +77,7 @@ def _order(entry: EntryPoint) -> tuple[str, str]:
 
 
 def plugin(group: str, name: str) -> Plugin:
-    """The plugin of that name; MachineFailed where none is installed, naming those that are.
-
-    Its code is not loaded yet. The hint names the nearest known name, or says that a package is
-    lacking.
-    """
+    """The plugin of that name, not loaded; MachineFailed without one, with the nearest known name."""
     known = plugins(group)
     if name not in known:
         hint = hint_of_choice(name, tuple(known)) if known else "install the package that has it"

@@ -342,11 +342,7 @@ def _fault(fault: ErrorDetails) -> str:
 
 
 def field_paths() -> list[str]:
-    """Every field as --set names it: "seed", "light.spp" ...
-
-    In the order of the model. Fields of a group of fields are "group.field"; a plain field is its
-    own name.
-    """
+    """Every field as --set names it, in the order of the model: "seed", "light.spp" ..."""
     paths = []
     for group, info in Recipe.model_fields.items():
         fields = getattr(info.annotation, "model_fields", None)

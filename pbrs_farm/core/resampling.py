@@ -30,10 +30,9 @@ def resized_by_area(picture: Pixels, width: int, height: int) -> Pixels:
 
 
 def resized_nearest(array: Pixels, width: int, height: int) -> Pixels:
-    """(height, width, ...) of array (H, W, ...): the pixel whose centre is nearest, values kept.
+    """(height, width, ...) of array (H, W, ...): the pixel whose centre is nearest, for ids and classes.
 
-    For ids, classes and any other values that must not be mixed; without a change of size the array
-    itself is returned, not a copy.
+    Without a change of size the array itself is returned, not a copy.
     """
     if array.shape[:2] == (height, width):
         return array

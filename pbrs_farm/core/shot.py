@@ -88,11 +88,7 @@ class Shot:
 
 
 def view_id(room_id: str, sector: int, k: int | None = None) -> str:
-    """`<room>_<sector>`, `_<k>` when a sector has several: the id of a still.
-
-    Room and sector are those of the camera search; k numbers the views of a sector that keeps
-    several.
-    """
+    """`<room>_<sector>` of the camera search, `_<k>` when a sector has several: the id of a still."""
     return f"{room_id}_{sector}" if k is None else f"{room_id}_{sector}_{k}"
 
 

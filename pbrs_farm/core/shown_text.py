@@ -41,11 +41,7 @@ def shown(text: object, most: int = MAX_NAME) -> str:
 
 
 def printable(text: str) -> str:
-    """Text of many lines that can be printed: as shown, but line ends and length are kept.
-
-    Control characters and others that could disturb a terminal become spaces. Use `shown` for a
-    name inside a sentence, where a line end must not survive and length is limited.
-    """
+    """Text of many lines in which control characters became spaces; line ends and length stay."""
     return "\n".join(_cleaned(line) for line in text.split("\n"))
 
 
@@ -85,11 +81,7 @@ _AS_LIKELY: Final = 0.05  # of likeness: a second name is offered where it is ne
 
 
 def near_names(word: str, known: Iterable[str]) -> list[str]:
-    """The known names most like the word, case apart, the likeliest first; none when none is.
-
-    Only the first 100 characters of the word count. Names nearly as likely as the best are given
-    with it.
-    """
+    """The known names most like the word's first 100 characters in any case, the likeliest first."""
     plain = {name.lower(): name for name in known}
     word = word[:100].lower()
     found = get_close_matches(word, plain, n=_MOST, cutoff=_LEAST_LIKENESS)

@@ -26,11 +26,7 @@ class FloorGrid:
 
     @staticmethod
     def over(x0: float, z0: float, x1: float, z1: float) -> FloorGrid:
-        """The grid over a rectangle, two cells wider on every side.
-
-        Metres in the plan, x0 <= x1 and z0 <= z1. Places of the rectangle, and two cells about
-        them, then have indices within the shape.
-        """
+        """The grid over a rectangle x0 <= x1, z0 <= z1 in metres, two cells wider on every side."""
         shape = int((z1 - z0) / CELL_M) + 5, int((x1 - x0) / CELL_M) + 5
         return FloorGrid((x0 - 2 * CELL_M, z0 - 2 * CELL_M), shape)
 
@@ -43,11 +39,7 @@ class FloorGrid:
         return xx, zz
 
     def cells(self, places: F64) -> I64:
-        """(N, 2) row and column of plan places (N, 2); may lie outside.
-
-        places holds world x and z in metres; the cells are int64 (row along z, column along x). Ask
-        `holds` before indexing: a negative index would silently count from the other end.
-        """
+        """(N, 2) int64 row (along z) and column (along x) of plan places (N, 2); see `holds`."""
         cells = np.floor((places - np.asarray(self.origin)) / CELL_M).astype(np.int64)
         return np.asarray(cells[:, ::-1])
 
@@ -60,10 +52,7 @@ class FloorGrid:
         return np.asarray(((cells >= 0) & (cells < self.shape)).all(1))
 
     def marked(self, places: F64) -> Bools:
-        """(H, W) the cells that hold one of the plan places (N, 2).
-
-        Places outside the grid are left out. Several places in one cell mark it once.
-        """
+        """(H, W) the cells that hold one of the plan places (N, 2); places outside the grid are left out."""
         cells = self.cells(places)
         marks = np.zeros(self.shape, bool)
         marks[tuple(cells[self.holds(cells)].T)] = True
@@ -80,10 +69,7 @@ def clearance_m(free: Bools) -> F64:
 
 
 def connected_ways(free: Bools, width_m: float = WALK_M) -> NDArray[np.int32]:
-    """(H, W) number of the connected way that the middle of a person can walk; 0 = none.
-
-    A way's middle keeps half its width from everything.
-    """
+    """(H, W) number of the connected way of the middle of a person, half its width off obstacles; 0 = none."""
     wide = clearance_m(free) >= width_m / 2
     ways, _n = ndimage.label(wide, structure=np.ones((3, 3)))
     return np.asarray(ways, np.int32)

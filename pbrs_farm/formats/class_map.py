@@ -90,11 +90,7 @@ class ClassMap:
         return frozenset(self.names) - objects
 
     def id_of(self, instance: Mapping[str, Any]) -> int:
-        """The class of a row of view.json's `instances`; 0 where no row of the table fits.
-
-        The first row that fits decides: put the special above the general. 0 is also the id of what
-        a table maps to nothing.
-        """
+        """Class of a row of view.json's `instances` by the first matching row of the table; 0 without one."""
         return next((row.id for row in self.rows if row.fits(instance)), 0)
 
     def label(

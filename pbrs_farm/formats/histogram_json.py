@@ -58,19 +58,13 @@ class SparseCounts(Record):
 
     @staticmethod
     def of(counts: NDArray[np.uint32]) -> SparseCounts:
-        """The bins of counts that are not empty.
-
-        counts: (bins,) uint32, one dimension. `dense` gives the same array back.
-        """
+        """The bins of counts (bins,) uint32 that are not empty."""
         bins = np.nonzero(counts)[0]
         filled = tuple(counts[bins].tolist())
         return SparseCounts(size=len(counts), bins=tuple(bins.tolist()), counts=filled)
 
     def dense(self) -> NDArray[np.uint32]:
-        """(size,) uint32.
-
-        A fresh array with 0 in the bins that are not stored; SparseCounts.of is its inverse.
-        """
+        """(size,) uint32 counts; the inverse of SparseCounts.of."""
         counts = np.zeros(self.size, np.uint32)
         counts[list(self.bins)] = self.counts
         return counts

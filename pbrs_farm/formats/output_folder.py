@@ -159,9 +159,5 @@ _OBJECT: Final = TypeAdapter(dict[str, Any])
 
 
 def json_object(path: Path) -> dict[str, Any]:
-    """The JSON object in a file; {} if there is no such file.
-
-    For files that a run may not have written yet (view.json, recipe.json). Raises BadInput where it
-    holds something else than an object, or cannot be read.
-    """
+    """The JSON object in a file; {} if there is no file. Raises BadInput for any other content."""
     return checked(_OBJECT, read_given(path), path) if path.exists() else {}

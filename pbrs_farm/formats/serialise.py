@@ -39,11 +39,7 @@ SHAPES: Final[dict[tuple[str, str], tuple[int | None, ...]]] = {
 
 
 def json_from_value(value: Any) -> Any:
-    """Dicts, lists, numbers and strings that say the same as value, a frozen dataclass with arrays.
-
-    Arrays become (nested) lists. NaN and infinities stay floats, for which strict JSON has no word:
-    whoever writes a file must refuse or replace them before.
-    """
+    """JSON values of a frozen dataclass with arrays; arrays become lists. NaN and infinities stay floats."""
     return to_jsonable_python(value, fallback=_list_from_array, inf_nan_mode="constants")
 
 
@@ -56,8 +52,7 @@ def _list_from_array(value: Any) -> Any:
 def json_bytes(value: Any) -> bytes:
     """Readable JSON, keys sorted, a newline at the end: equal values give equal bytes.
 
-    value: a pydantic model, or JSON values (dicts, lists, numbers, text). Floats are written so that
-    they read back to the same bits. For digests take keys.canonical_json, which has no spaces.
+    value: a pydantic model, or JSON values. Floats read back to the same bits.
     """
     if isinstance(value, BaseModel):
         value = value.model_dump(mode="json")

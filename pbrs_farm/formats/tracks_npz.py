@@ -21,10 +21,7 @@ ARRAYS: Final = {
 
 
 def tracks_npz(tracks: object, frames: Sequence[str]) -> bytes:
-    """The file: the arrays of ARRAYS, attributes of tracks, and the ids of the frames.
-
-    Compressed; nothing is pickled, and equal tracks give equal bytes.
-    """
+    """The file: the arrays of ARRAYS, attributes of tracks, and the ids of the frames. Not pickled."""
     arrays: dict[str, Any] = {name: getattr(tracks, name) for name in ARRAYS}
     buffer = io.BytesIO()
     np.savez_compressed(buffer, allow_pickle=False, frames=np.array(list(frames)), **arrays)

@@ -117,7 +117,7 @@ def catalogue_of(fields: DressFields) -> Catalogue:
 
 
 def fetch_catalogue(fields: DressFields) -> None:
-    """Download the packages of a recipe's catalogue that are not cached.
+    """Download the missing packages of a recipe's catalogue.
 
     Raises MachineFailed, with the command to type, if apt cannot provide them, and BadInput for a user's
     path that is no library.

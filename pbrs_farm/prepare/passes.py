@@ -346,11 +346,7 @@ def versions_of_passes() -> dict[str, int]:
 
 
 def cache_key(source: SourceRef, recipe: Recipe) -> str:
-    """Equal for equal finished houses: of a source, with its edits, and the fields that passes read.
-
-    Changes with every file that the source reads, its edits, and the groups of fields that passes
-    read; fields of light or cameras do not change it.
-    """
+    """Equal for equal finished houses: digest of a source, its edits, and the fields that passes read."""
     return keys.digest(source, recipe.digest(*GROUPS))
 
 

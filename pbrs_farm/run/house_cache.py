@@ -164,11 +164,7 @@ class CachedHouse:
         return views[view_id]
 
     def views(self, cameras_digest: str) -> Mapping[str, View]:
-        """All views of the house by id, in the order of cameras.json; as for view.
-
-        cameras_digest is that of the file in the step's marker: with another one the file is read
-        again.
-        """
+        """All views of the house by id, in the order of cameras.json; cameras_digest as for view."""
         if self._views is None or self._views[0] != cameras_digest:
             key = keys.house_key(self.house_id, "cameras.json")
             self._views = (cameras_digest, views_from_json(self.store.get(key), key))

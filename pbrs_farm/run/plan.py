@@ -90,10 +90,7 @@ def check_layers(want: Wanted, recipe: Recipe) -> None:
 
 
 def house_steps(want: Wanted, house_id: str) -> tuple[str, ...]:
-    """Steps of a house in the order they run, all before the steps of its views.
-
-    The order is one that satisfies what each step reads. Pairs and tracks are of houses only, not of objects.
-    """
+    """Steps of a house in the order they run, before those of its views; no pairs and tracks of objects."""
     needed = [n for step in view_steps(want) for n in needed_of_house(step, house_id)]
     asked = ("pairs",) * want.pairs + ("tracks",) * want.tracks
     return ("house", "cameras", *needed, *(() if keys.is_object(house_id) else asked))
@@ -112,11 +109,7 @@ def has_light(want: Wanted) -> bool:
 
 
 def view_steps(want: Wanted) -> tuple[str, ...]:
-    """Steps of one view in the order they run. Either light mode makes both: one trace fills both.
-
-    `truth` comes first, since others read its labels, and `view` last, since it lists what there
-    is.
-    """
+    """Steps of one view in the order they run; either light mode makes both, since one trace fills both."""
     names = ["truth"]
     names += [name for name in OPENGL_STEPS if Mode(name) in want.modes]
     if has_light(want):

@@ -66,10 +66,7 @@ def make_handler(send: Send) -> Handler:
 
 
 def make_light_handler(send: Send) -> Handler:
-    """As make_handler, with what light needs loaded before it is ready.
-
-    It has nothing to do while the house is made: its first task waits for no library.
-    """
+    """As make_handler, with the libraries of light loaded, while the house is made."""
     _load(_OF_LIGHT)
     return make_handler(send)
 
@@ -155,9 +152,6 @@ def _event_of_outcome(work: Work, name: str, outcome: Outcome, seconds: float) -
 
 
 def limit_threads(step: str, n_threads: int) -> None:
-    """Give Dr.Jit its share of the cores before a step first uses it.
-
-    Does nothing where the process has all cores, and for steps that do not use Dr.Jit.
-    """
+    """Give Dr.Jit its share of the cores before a step first uses it."""
     if n_threads < (os.cpu_count() or 1) and step in _DRJIT_STEPS:
         set_threads(n_threads)

@@ -99,12 +99,7 @@ class LaidOutStore:
         return self.inner.url
 
     def around(self, wrap: Callable[[Store], Store]) -> LaidOutStore:
-        """The same layout over a wrapped store.
-
-        wrap: takes the inner store and gives the one to use in its place, as one that tries again.
-        What this store has read of packs and still holds back is not taken over: wrap before the
-        first use.
-        """
+        """The same layout over a wrapped store (wrap: of the inner one), before the first use of this one."""
         return LaidOutStore(wrap(self.inner), self._packs)
 
     @property
@@ -225,11 +220,7 @@ class LaidOutStore:
         return Head(pack.rows[name][2], whole.modified_s if whole is not None else 0.0)
 
     def list(self, prefix: str = "") -> Iterator[str]:
-        """As Store.list. In a packed root the index of each pack below the prefix is read.
-
-        Keys come as callers know them, not as objects lie; what waits for its pack is written
-        first. In a packed root a listing costs a read for each pack: list no more than is needed.
-        """
+        """As Store.list. In a packed root it reads each pack's index, and writes what waits for its pack."""
         check_prefix(prefix)
         self._flush()
         if not self.is_packed:

@@ -44,19 +44,11 @@ class Store(Protocol):
 
     @property
     def url(self) -> str:
-        """Where the store is, without secrets.
-
-        For messages. Do not tell stores apart by it: the endpoint of an S3 store is not in it, so
-        two services with a bucket of one name look the same.
-        """
+        """Address for messages, without secrets; S3 stores of different endpoints may share it."""
         ...
 
     def put(self, key: str, data: bytes | memoryview) -> None:
-        """Write the object whole, over an older one if there is one.
-
-        For what may change (a job's description, a report). A marker that must be written by one
-        writer alone goes through `put_if_absent`.
-        """
+        """Write the object whole, over an older one. Markers go through `put_if_absent`."""
         ...
 
     def put_if_absent(self, key: str, data: bytes) -> bool:
@@ -71,11 +63,7 @@ class Store(Protocol):
         ...
 
     def get_range(self, key: str, start: int, n_bytes: int) -> bytes:
-        """n_bytes of the object from a byte of it on, which it must have; else as get.
-
-        start counts from 0. Raises ObjectMissing if there is no object. Implementations may answer
-        a range that goes past the end with fewer bytes: take the size from `head` where it matters.
-        """
+        """n_bytes of the object from byte start, or fewer at its end; ObjectMissing without an object."""
         ...
 
     def head(self, key: str) -> Head | None:
@@ -111,11 +99,7 @@ class PackingStore(Store, Protocol):
     """A store with its own way to put a step's results."""
 
     def put_done(self, key: str, marker: bytes, files: Mapping[str, bytes]) -> None:
-        """As the function put_done.
-
-        A store has it where the files of several steps share one object; callers use the function,
-        which falls back to single objects.
-        """
+        """As the function put_done, for stores in which the files of several steps share one object."""
         ...
 
 
@@ -148,11 +132,7 @@ def check_key(key: str) -> str:
 
 
 def check_prefix(prefix: str) -> str:
-    """prefix itself: "" or a folder with a trailing slash; raises StoreFailed otherwise.
-
-    Raises it for a prefix without the slash and for one whose segments no key may have ("..", a
-    leading dot). The root is "".
-    """
+    """The prefix, "" or a folder with a trailing slash; StoreFailed for any other, or an invalid segment."""
     if prefix and not prefix.endswith("/"):
         raise StoreFailed(prefix, "a prefix to list ends with '/'")
     if prefix:

@@ -156,9 +156,6 @@ def groups_of(at: keys.HouseKey) -> tuple[str, ...]:
 
 
 def steps_of(at: keys.HouseKey, group: str) -> tuple[str, ...]:
-    """Steps of a group whose own packs may hold what its pack lacks.
-
-    at: of a marker or a file; of a marker only its own step is looked for.
-    """
+    """Steps of a group whose own packs may hold what its pack lacks; for a marker its own step alone."""
     steps = (at.step,) if at.step else GROUPS[group]
     return tuple(step for step in steps if step != group)
