@@ -68,11 +68,7 @@ class Deb:
 
 
 def cached_deb(package: str, tested_version: str, folder: Path | None = None) -> Deb | None:
-    """The package if it was fetched before, the tested version if there is a choice; else None.
-
-    folder: None = the cache. None says that `fetch` has to be run; nothing is downloaded here, and
-    the file's digest is not compared.
-    """
+    """The cached package, the tested version if there is a choice; None if `fetch` has to be run."""
     # The tested version goes last, where it is taken.
     debs = sorted((folder or cache_folder()).glob(f"{package}_*.deb"))
     debs.sort(key=lambda p: version_of(p) == tested_version)

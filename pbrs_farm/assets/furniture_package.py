@@ -29,10 +29,7 @@ class FurniturePackage:
 
 
 def cached(cache: Path | None = None) -> FurniturePackage | None:
-    """The package of furniture if it was fetched before, else None.
-
-    Touches no network: use `fetch` where the home cannot do without.
-    """
+    """The cached package of furniture, or None; no network."""
     deb = cached_deb(PACKAGE, TESTED_VERSION, cache)
     return _unpacked(deb) if deb else None
 

@@ -112,10 +112,7 @@ class JarResources:
 
 
 def cached(cache: Path | None = None) -> Package | None:
-    """The package of example homes and models if it was fetched before, else None.
-
-    Touches no network: use `fetch` where the home cannot do without.
-    """
+    """The cached package of example homes and models, or None; no network."""
     deb = cached_deb(PACKAGE, TESTED_VERSION, cache)
     return _unpacked(deb) if deb else None
 

@@ -24,10 +24,9 @@ TESTED_VERSION: Final = "12.2.0-14+deb12u1"
 
 
 def load_libatomic() -> None:
-    """Load libatomic, so that libraries loaded afterwards find it by its name.
+    """Load libatomic for libraries loaded afterwards; only on Linux.
 
-    Nothing on systems that are not Linux. Raises MachineFailed, saying what to do, where neither the
-    system nor Debian has it.
+    Raises MachineFailed, with what to do, if neither the system nor Debian has it.
     """
     if sys.platform != "linux":
         return

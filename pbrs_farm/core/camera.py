@@ -60,10 +60,7 @@ class Intrinsics:
         )
 
     def zoomed(self, factor: float) -> Intrinsics:
-        """The focal length times factor: above 1 a narrower field of view.
-
-        Size, principal point and lens stay. Not for panoramas, whose K maps the whole sphere to the pixels.
-        """
+        """The focal length times factor: above 1 a narrower field of view. Not for panoramas."""
         return replace(self, fx=self.fx * factor, fy=self.fy * factor)
 
     @property
@@ -80,10 +77,7 @@ class Intrinsics:
         return self.lens.directions(plane)
 
     def pixels(self, directions: F64) -> F64:
-        """(N, 2) pixel coordinates of directions (N, 3), x right, y down, z forward, any length.
-
-        NaN for those the lens does not see; others may lie beside the picture.
-        """
+        """(N, 2) pixel coordinates of directions (N, 3), OpenCV's axes; NaN for those the lens does not see."""
         return np.asarray(
             self.lens.plane_points(directions) * [self.fx, self.fy] + [self.cx, self.cy]
         )

@@ -49,11 +49,7 @@ class Piece:
 
     @property
     def held_by(self) -> Place:
-        """Its support: the place of its group, or a wall if its library hangs it there.
-
-        Use this, not `place`, to put a piece: a cupboard that its library hangs 1.4 m up belongs to the floor
-        by its group, yet needs a wall.
-        """
+        """Its support: the place of its group, or a wall if its library hangs it there."""
         hangs = self.low_m > 0 and self.place in (Place.FLOOR, Place.SURFACE)
         return Place.WALL if hangs else self.place
 

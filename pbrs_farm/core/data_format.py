@@ -41,9 +41,5 @@ class DataFormat:
         )
 
     def has_keys(self, names: set[str]) -> bool:
-        """True if a JSON file that contains these names is of this format.
-
-        The format lists alternative sets of keys; one complete set is enough. Names count anywhere in the file, so
-        a file of another format may match by chance.
-        """
+        """True if a JSON file that contains these names is of this format: one set of its keys is complete."""
         return any(names.issuperset(keys) for keys in self.keys)

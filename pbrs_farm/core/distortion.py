@@ -105,10 +105,7 @@ def largest_radius(coefficients: Coefficients) -> float:
 
 
 def first_root(polynomial: tuple[float, ...]) -> float:
-    """The least positive real root of the polynomial, constant first; inf without one.
-
-    The coefficients are those of 1, s, s^2 ... Roots with an imaginary part up to rounding count as real.
-    """
+    """The least positive real root of the polynomial c0, c1 ... of 1, s ...; inf without one."""
     roots = np.roots(polynomial[::-1])
     real = roots.real[(np.abs(roots.imag) < 1e-12 * (1 + np.abs(roots))) & (roots.real > 0)]
     return float(real.min()) if len(real) else math.inf
@@ -135,10 +132,9 @@ _FISHEYE_STEPS: Final = 6
 
 
 def radius_of_angle(angle_rad: F64, coefficients: Coefficients) -> F64:
-    """The plane's radius of angles from the axis, of any shape.
+    """The plane's radius of angles from the axis, in focal lengths (Kannala and Brandt 2006).
 
-    Kannala and Brandt 2006: t (1 + k1 t^2 + k2 t^4 + k3 t^6 + k4 t^8), in focal lengths. Beyond
-    `angle_of_fold` the radius shrinks again, and its inverse is ambiguous.
+    t (1 + k1 t^2 + k2 t^4 + k3 t^6 + k4 t^8). Beyond `angle_of_fold` the radius shrinks again.
     """
     k1, k2, k3, k4 = coefficients
     s = angle_rad * angle_rad

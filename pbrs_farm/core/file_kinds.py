@@ -76,10 +76,7 @@ def kind_of(data: bytes) -> FileKind | None:
 
 
 def other_kind(data: bytes, name: object) -> FileKind | None:
-    """The kind of a file where its name says another; None where the name fits, or nothing is known.
-
-    name: of the file, or its path.
-    """
+    """The kind of a file whose name or path says another; None if the name fits, or the kind is unknown."""
     kind, suffix = kind_of(data), PurePath(str(name)).suffix.lower()
     return None if kind is None or suffix in kind.suffixes else kind
 

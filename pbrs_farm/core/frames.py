@@ -28,10 +28,7 @@ def opencv_world_from_camera(world_from_camera: Matrix4) -> Matrix4:
 
 
 def rotation_x(angle_rad: float) -> F64:
-    """(3, 3) right-handed rotation about +x.
-
-    For column vectors, p' = R p: a positive angle takes +y towards +z.
-    """
+    """(3, 3) right-handed rotation about +x of column vectors: takes +y towards +z."""
     c, s = np.cos(angle_rad), np.sin(angle_rad)
     return np.array([[1, 0, 0], [0, c, -s], [0, s, c]], np.float64)
 
@@ -47,10 +44,7 @@ def rotation_y(angle_rad: float) -> F64:
 
 
 def rotation_z(angle_rad: float) -> F64:
-    """(3, 3) right-handed rotation about +z.
-
-    For column vectors, p' = R p: a positive angle takes +x towards +y.
-    """
+    """(3, 3) right-handed rotation about +z of column vectors: takes +x towards +y."""
     c, s = np.cos(angle_rad), np.sin(angle_rad)
     return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]], np.float64)
 
@@ -61,10 +55,9 @@ LYING_ALONG_Z: F64 = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0
 
 
 def is_flattening(matrix: F64) -> bool:
-    """Whether a linear map (D, D) leaves less than D dimensions, so that nothing undoes it.
+    """True if a linear map (D, D) leaves less than D dimensions, whatever its scale.
 
-    How much it shrinks does not count, which a determinant mixes with it: a scale of 1e-5 (quantized
-    vertices, millimetres within millimetres) has one of 1e-15, and is as good as any other.
+    A scale of 1e-5 (quantized vertices) has a determinant of 1e-15 and is no flattening.
     """
     if not np.isfinite(matrix).all():
         return False  # the caller refuses a result with such numbers

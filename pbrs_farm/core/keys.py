@@ -79,11 +79,7 @@ def is_object(house: str) -> bool:
 
 
 def house_key(house: str, file: str = "") -> str:
-    """Key of a house's file; of its folder, with a trailing slash, when file is "".
-
-    Objects have another folder than houses, by their id. The file may contain slashes. `parse_house_key` is the
-    inverse.
-    """
+    """Key of a house's or object's file, perhaps with slashes; of its folder, with a trailing one, for ""."""
     return f"{FOLDERS[is_object(house)]}/{house}/{file}"
 
 
@@ -116,8 +112,7 @@ def unfinished_key(house: str, step: str = "", view: str = "") -> str:
 def parse_house_key(key: str) -> HouseKey | None:
     """The parts of a key that house_key, view_key or marker_key built; None for any other key.
 
-    For a marker `file` is "" and `step` is set, and `view` too for a step of a view. Keys of the root
-    (recipe.json, selection/) give None, and so does an object's id below the houses' folder.
+    For a marker `file` is "" and `step` is set.
     """
     match = _HOUSE_KEY.fullmatch(key)
     if match is None or match["root"] != FOLDERS[is_object(match["house"])]:

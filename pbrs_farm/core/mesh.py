@@ -27,10 +27,7 @@ def triangle_corners(positions: NDArray[np.floating], faces: NDArray[np.integer]
 
 
 def triangle_bounds(corners: F64) -> tuple[F64, F64]:
-    """(F, D) least and greatest coordinates of triangles (F, 3, D), in a fifth of numpy's time.
-
-    D is 3 in space and 2 in a plan. NaN in a corner gives NaN in its box, which meets nothing.
-    """
+    """(F, D) least and greatest coordinates of triangles (F, 3, D), in a fifth of numpy's time."""
     a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
     return np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
 
@@ -57,11 +54,7 @@ def points_bounds(points: NDArray[np.floating]) -> tuple[F64, F64]:
 
 
 def boxes_meeting(low: F64, high: F64, other_low: F64, other_high: F64) -> Bools:
-    """(N,) whether boxes low..high (N, 3) meet or touch the box other_low..other_high (3,).
-
-    A box with NaN meets nothing. Boxes that only touch count as meeting: grow or shrink them by a
-    tolerance where that matters.
-    """
+    """(N,) True if boxes low..high (N, 3) meet or touch the box other_low..other_high (3,); False for NaN."""
     meets = np.asarray((high[:, 0] >= other_low[0]) & (low[:, 0] <= other_high[0]))
     for axis in (1, 2):
         meets &= (high[:, axis] >= other_low[axis]) & (low[:, axis] <= other_high[axis])
@@ -69,11 +62,7 @@ def boxes_meeting(low: F64, high: F64, other_low: F64, other_high: F64) -> Bools
 
 
 def unique_points(points: F64) -> F64:
-    """The different rows of points (N, 3) in lexicographic order, in half of numpy's time.
-
-    Rows count as different unless all three numbers are equal: round first to join points that lie
-    close. NaN differs from itself.
-    """
+    """The different rows of points (N, 3) in lexicographic order, in half of numpy's time."""
     ordered = points[np.lexsort(points.T[::-1])]
     x, y, z = ordered.T
     is_new = (x[1:] != x[:-1]) | (y[1:] != y[:-1]) | (z[1:] != z[:-1])
@@ -99,11 +88,7 @@ def finite_triangles(corners: F64) -> F64:
 
 
 def cross_products(a: F64, b: F64) -> F64:
-    """(..., 3) a x b, to the bit as numpy's, in a third of its time for a few vectors.
-
-    Shapes are broadcast against each other, as (N, 3) with (3,). The type is the wider one of the
-    two.
-    """
+    """(..., 3) a x b, to the bit as numpy's, in a third of its time for a few vectors; shapes broadcast."""
     out = np.empty(np.broadcast_shapes(a.shape, b.shape), np.result_type(a, b))
     for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
         out[..., i] = a[..., j] * b[..., k] - a[..., k] * b[..., j]

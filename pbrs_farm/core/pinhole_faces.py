@@ -79,9 +79,8 @@ class PinholeFaces:
 def faces_of_directions(directions: F64) -> PinholeFaces:
     """The faces that hold all rays of a picture: (H, W, 3), OpenCV's axes, any length, 0 = no ray.
 
-    One face where all rays lie within its widest angle about the axis, six faces of a cube
-    otherwise. The focal length is chosen so that the faces are finer than the finest part of the
-    lens's picture, up to a limit.
+    One face within its widest angle about the axis, else the six of a cube, finer than the finest part of
+    the lens's picture, up to a limit.
     """
     length = np.linalg.norm(directions, axis=-1)
     has_ray = length > 0

@@ -100,9 +100,6 @@ def question(names: list[str]) -> str:
 
 
 def hint_of_choice(word: str, known: Iterable[str]) -> str:
-    """ "did you mean A? of A, B, C": for a word out of a short list.
-
-    For lists that fit a line; of many names take `did_you_mean`, which lists only the near ones.
-    """
+    """ "did you mean A? of A, B, C": for a word of a short list; see `did_you_mean` for long ones."""
     names = list(known)
     return " ".join(x for x in (did_you_mean(word, names), f"of {', '.join(names)}") if x)

@@ -28,11 +28,7 @@ class KeptParts:
 
 
 def checkpoint_npz(kept: KeptParts) -> bytes:
-    """The file.
-
-    An uncompressed .npz: each array under "<part>/<name>", beside them the digest and the seconds
-    spent. Nothing in it is pickled, so reading a stranger's file runs no code.
-    """
+    """The file, an uncompressed .npz without pickles: arrays as "<part>/<name>", the digest, seconds spent."""
     rows: dict[str, Any] = {_DIGEST: np.array(kept.digest), _SPENT: np.array(kept.spent_s)}
     for part, arrays in kept.parts.items():
         rows |= {f"{part}/{name}": array for name, array in arrays.items()}

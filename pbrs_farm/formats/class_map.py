@@ -73,19 +73,12 @@ class ClassMap:
 
     @cached_property
     def names(self) -> dict[int, str]:
-        """Id -> name of each class, by id, 0 left out.
-
-        Where two rows give one id different names, the last row's name counts.
-        """
+        """Id -> name of each class, by id, without 0."""
         return dict(sorted({row.id: row.name for row in self.rows if row.id}.items()))
 
     @cached_property
     def structure(self) -> frozenset[int]:
-        """The ids whose rows all say a part of the building: wall, floor, ceiling, door, window.
-
-        An id for which even one row names an object is no structure. Writers of detection formats
-        leave these ids out where they ask for objects alone.
-        """
+        """The ids whose rows all name a part of the building: wall, floor, ceiling, door, window."""
         objects = {row.id for row in self.rows if row.word not in _STRUCTURE}
         return frozenset(self.names) - objects
 
@@ -96,11 +89,9 @@ class ClassMap:
     def label(
         self, instance: NDArray[Any], instances: Sequence[Mapping[str, Any]]
     ) -> NDArray[np.uint16]:
-        """(H, W) uint16 classes, of a map of instance ids (H, W) and the rows of view.json.
+        """(H, W) uint16 classes of a map of instance ids (H, W), as in instance.png, and its rows in view.json.
 
-        instance: as in instance.png, 0 where nothing is; instances: its rows, each with an "id" >
-        0. An instance id without a row becomes 0. For many pictures of one house the rows are
-        matched anew on each call.
+        An id without a row becomes 0.
         """
         table = np.zeros(max([int(instance.max(initial=0)), *(r["id"] for r in instances)]) + 1)
         for row in instances:

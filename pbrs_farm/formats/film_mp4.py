@@ -42,10 +42,7 @@ def film(pictures: Iterable[Srgb8Image], fps: Fraction) -> bytes:
 
 
 def film_pace(first: tuple[int, float], last: tuple[int, float]) -> Fraction:
-    """Frames a second between two frames, each its number and its time in seconds.
-
-    A film has one pace; 30 where both have the same time.
-    """
+    """Frames a second between two frames, (number, seconds) each; 30 for equal times."""
     frames, seconds = last[0] - first[0], last[1] - first[1]
     pace = frames / seconds if seconds > 0 else _DEFAULT_FPS
     return Fraction(pace).limit_denominator(1001)

@@ -97,11 +97,7 @@ class ViewRecord(Record):
         return self
 
     def json_bytes(self) -> bytes:
-        """The record as canonical JSON: equal records give equal bytes.
-
-        So a record may be compared, or named by a digest, by these bytes. `record_from_json` reads
-        them.
-        """
+        """The record as canonical JSON: equal records give equal bytes."""
         plain = self.model_dump(mode="json")
         return (json.dumps(plain, sort_keys=True, separators=(",", ":")) + "\n").encode()
 

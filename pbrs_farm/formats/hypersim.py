@@ -88,10 +88,9 @@ def ray_lengths(i: Intrinsics) -> F64:
 
 
 def preview(colour: F32, has_surface: NDArray[np.bool_]) -> NDArray[np.uint8]:
-    """(H, W, 3) uint8: linear colour as Hypersim's own tone mapping shows it.
+    """(H, W, 3) uint8: linear colour with the tone mapping of Hypersim's repository.
 
-    Scaled so that of the pixels with a surface a tenth is brighter than 0.8, then to the power of
-    1 / 2.2 (so does the tone mapping of its repository).
+    A tenth of the pixels with a surface is brighter than 0.8, before the power of 1 / 2.2.
     """
     brightness = (colour @ np.array([0.3, 0.59, 0.11], np.float32))[has_surface]
     scale, now = 1.0, float(np.percentile(brightness, _PERCENTILE)) if brightness.size else 0.0

@@ -34,21 +34,13 @@ def manifest_from_markers(markers: Iterable[Marker], attribution: str) -> bytes:
 
 
 def sha256_by_key(manifest: bytes) -> dict[str, str]:
-    """Key -> sha256 of every line; ValueError, KeyError or TypeError when one is no row.
-
-    Keys are whole keys of the store. A damaged manifest raises plainly (ValueError covers text that
-    is no JSON): the caller knows the file's name and says it.
-    """
+    """Key -> sha256 of every line; ValueError, KeyError or TypeError for a damaged one."""
     rows = [json.loads(line) for line in manifest.splitlines()]
     return {row["key"]: row["sha256"] for row in rows}
 
 
 def lines_by_house(manifest: bytes) -> Iterator[tuple[str, bytes]]:
-    """House -> its lines, in the manifest's order: by house, as every manifest is written.
-
-    Lines of a house that do not lie together come as two groups: the manifest must be sorted. A
-    group's bytes are its lines with their ends, ready to be written again.
-    """
+    """House -> its lines, as bytes with their ends, of a manifest sorted by house."""
     lines = io.BytesIO(manifest)  # shares the bytes, does not copy them
     for house, group in groupby(lines, key=_house_of_line):
         yield house, b"".join(group)

@@ -60,11 +60,7 @@ class ViewEntry:
         return Shot.of_row(self.id, self.facts)
 
     def file(self, name: str) -> Path | None:
-        """The view's file of that name, or None.
-
-        name: as in the output folder, "radiance.exr" or "mlt_warm.png". Whether the file is whole
-        is not looked at.
-        """
+        """The path of the view's file of that name ("radiance.exr"), or None without one."""
         path = self.folder / name
         return path if path.is_file() else None
 

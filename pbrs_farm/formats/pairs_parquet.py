@@ -20,11 +20,7 @@ COLUMNS: Final = {
 
 
 def pairs_parquet(rows: Sequence[Mapping[str, Any]]) -> bytes:
-    """The file, written by the step `pairs`; rows have the keys of COLUMNS.
-
-    A key that a row lacks becomes null, one that COLUMNS has not is dropped. Rows keep their order;
-    none at all gives a file with columns alone.
-    """
+    """The file of the step `pairs`; rows have the keys of COLUMNS, missing ones become null."""
     table = pa.Table.from_pylist([dict(row) for row in rows], pa.schema(list(COLUMNS.items())))
     buffer = io.BytesIO()
     pq.write_table(table, buffer)

@@ -24,10 +24,9 @@ def _channels(image: str) -> str:
 
 
 def radiance_exr(images: Mapping[str, F32], *, attribution: str = "") -> bytes:
-    """The file of images by name, (H, W, 3) float32 each. attribution: the file's copyright.
+    """The file of images by name, (H, W, 3) float32 each, of one size; attribution: the file's copyright.
 
-    All images have one size. Each becomes three channels, "<name>." and a letter; values are linear
-    radiance (or albedo, or normals), not tone mapped. `radiance_from_exr` reads the file.
+    Channels are "<name>." and a letter; values are linear.
     """
     planes = {
         f"{name}.{channel}": image[..., k]

@@ -62,10 +62,7 @@ def json_bytes(value: Any) -> bytes:
 
 
 def pretty_json(value: Any) -> str:
-    """JSON with sorted keys, one line per leaf list: equal values give equal text.
-
-    Raises ValueError for a number that is not finite.
-    """
+    """JSON with sorted keys, one line per leaf list; ValueError for a number that is not finite."""
     return _pretty(value, "") + "\n"
 
 
@@ -91,10 +88,7 @@ def _holds_dict(value: Any) -> bool:
 
 
 def value_from_json(kind: type[T], data: Any, file: str) -> T:
-    """The value of a dataclass that JSON values say; arrays and bytes among them pass through.
-
-    Unknown keys are ignored, missing fields take their defaults; what does not fit is BadHouse.
-    """
+    """A dataclass from JSON values, arrays and bytes; unknown keys are ignored. BadHouse for misfits."""
     adapter: TypeAdapter[T] = _adapter_of(kind)
     return checked(adapter, data, file, error=BadHouse)
 

@@ -39,10 +39,9 @@ def fetch_packages(words: str) -> None:
 
 
 def catalogue_of_words(words: str) -> Catalogue:
-    """The catalogue that dress.catalogue names, paths with ":" between: the packages', then those.
+    """The catalogue of dress.catalogue: the packages', then the given paths, with ":" between.
 
-    A missing package is a note of the kind NO_FURNITURE, and the rest serves. BadInput for a given
-    path that does not exist or is no catalogue.
+    A missing package is a note of the kind NO_FURNITURE. BadInput for a path that is no catalogue.
     """
     given = [word for word in words.split(":") if word]
     stamps = tuple((Path(word), _stamp(Path(word))) for word in given if word != GENERATED)

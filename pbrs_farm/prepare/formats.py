@@ -35,10 +35,9 @@ _NAMES: Final = re.compile(rb'"([A-Za-z_]{3,40})"\s*:')
 
 
 def formats() -> Iterator[Format]:
-    """All supported formats, in the order in which they are tried.
+    """All supported formats in the order in which they are tried: packages of read/, then plans.
 
-    Packages of read/ come first, then plans. A generator, because importing a format's module takes time
-    and the first ones serve most words of a command line.
+    A generator, because importing a format takes time and the first ones serve most words.
     """
     yield from _formats_of_packages()
     yield from _formats_of_plans()
@@ -73,10 +72,7 @@ def format_of_plugin(name: str) -> Format:
 
 
 def plugin_of_file(path: Path) -> str | None:
-    """Name of the plugin that reads a path; None if there is no path or no such plugin.
-
-    Loads plugins one by one until one accepts the file.
-    """
+    """Name of the plugin that reads a path, after loading plugins one by one; None without one."""
     names = plugins("readers")
     if not names or not path.exists():
         return None
@@ -99,10 +95,7 @@ def format_of_file(path: Path, *, surely: bool = False) -> Format | None:
 
 
 def is_beside_homes(path: Path) -> bool:
-    """True if a file name, in any case, belongs to a home beside it.
-
-    In a folder of homes such a file is neither a home nor an error.
-    """
+    """True if a file name, in any case, belongs to a home beside it."""
     patterns = [pattern for one in formats() for pattern in one.beside]
     return any(fnmatch(path.name.lower(), pattern) for pattern in patterns)
 

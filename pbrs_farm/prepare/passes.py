@@ -105,10 +105,7 @@ def dress_seed(source: SourceRef, recipe: Recipe) -> int:
 
 
 def uses_catalogue(source: SourceRef, recipe: Recipe) -> bool:
-    """Whether a source's house takes anything from the catalogue of furniture.
-
-    Where it does not, no catalogue needs to be read.
-    """
+    """True if a source's house takes anything from the catalogue of furniture."""
     stands_in = _has_stand_ins(source, recipe) and recipe.read.stand_ins == "pieces"
     return stands_in or _is_furnished(source, recipe) or bool(dress_seed(source, recipe))
 

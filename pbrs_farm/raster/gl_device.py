@@ -99,11 +99,7 @@ class RenderTarget:
         self._drawn.clear(*colour, depth=1.0)
 
     def read(self) -> NDArray[np.float16]:
-        """(H, W, 3) float16 linear colour, row 0 = top.
-
-        Averages the samples of each pixel first. Waits for the graphics driver. A fresh array that
-        may be kept.
-        """
+        """(H, W, 3) float16 linear colour, row 0 = top, averaged over the samples; waits for the driver."""
         self._context.copy_framebuffer(self._resolved, self._drawn)
         raw = self._resolved.read(components=3, dtype="f2", alignment=1)
         pixels = np.frombuffer(raw, np.float16).reshape(*self._size[::-1], 3)
@@ -121,9 +117,5 @@ _SRGB8_OF_HALF: Final = _encoding_table()
 
 
 def srgb8_from_half(linear: NDArray[np.float16]) -> Srgb8Image:
-    """sRGB bytes of linear half floats.
-
-    linear: (..., 3) float16, contiguous in the last axis. By a table of all half floats, so it is
-    exact and quick.
-    """
+    """sRGB bytes of linear half floats (..., 3), by a table of all half floats: exact and quick."""
     return _SRGB8_OF_HALF[linear.view(np.uint16)]

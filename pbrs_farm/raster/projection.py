@@ -32,11 +32,7 @@ def clip_from_world(camera: Camera, far_m: float) -> Matrix4:
 
 
 def far_plane(camera: Camera, low: F64, high: F64) -> float:
-    """Depth of a far plane just beyond every box (N, 3) for the camera, and at least a metre.
-
-    low, high: (N, 3) corners of the boxes in the world, metres. Measured to the farthest corner, so
-    it serves all directions of the camera.
-    """
+    """Depth of a far plane just beyond every box low..high (N, 3) from the camera, at least a metre."""
     if not len(low):
         return 1.0
     # Measure to the farthest corner of the box around all boxes.

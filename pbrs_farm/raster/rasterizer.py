@@ -142,19 +142,11 @@ class Rasterizer:
         return str(self._context.info["GL_RENDERER"])
 
     def render_dl(self, camera: Camera) -> Srgb8Image:
-        """(H, W, 3) OpenGL-DL: a headlight and two directional lights, no shadows (docs/spec/suncg.md section 4).
-
-        (H, W, 3) uint8 sRGB. Fixed lights, so equal houses look equal at any hour; no source of
-        light of the house matters.
-        """
+        """(H, W, 3) uint8 OpenGL-DL: a headlight and two fixed lights (docs/spec/suncg.md section 4)."""
         return self._picture(camera, "dl")
 
     def render_il(self, camera: Camera) -> Srgb8Image:
-        """(H, W, 3) OpenGL-IL: the lamps' lights, the best of them for each object, no shadows.
-
-        (H, W, 3) uint8 sRGB. The sun and the sky are not in it; a house without lamps shows the
-        headlight alone.
-        """
+        """(H, W, 3) uint8 OpenGL-IL: the best lamps for each object, no shadows; a headlight without lamps."""
         return self._picture(camera, "il")
 
     def _picture(self, camera: Camera, mode: str) -> Srgb8Image:

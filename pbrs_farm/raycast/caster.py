@@ -84,18 +84,13 @@ class Caster:
     def hit_record(self, camera: Camera, *, skip_faces: Bools | None = None) -> HitRecord:
         """The first hit of the ray through each pixel's centre (rule 8).
 
-        skip_faces: (F,) bool, faces to ignore; with the transparent ones ignored this is the hit
-        behind glass. Raises ValueError if it is not one entry per face.
+        skip_faces: (F,) bool, faces to ignore: the transparent ones give the hit behind glass.
         """
         tracer = self._tracer if skip_faces is None else self._tracer_without(skip_faces)
         return hit_record_from_faces(self.geometry, camera, _faces_of_surface(tracer, camera))
 
     def item_buffer(self, camera: Camera) -> ItemBuffer:
-        """(H, W) uint32 instance id at each pixel's centre, 0 = nothing.
-
-        What the camera's rays meet first, glass and panes too. The id is the item's number in the
-        house counted from 1. A pixel that a lens does not see is 0.
-        """
+        """(H, W) uint32 instance id of the first hit at each pixel's centre, glass too; 0 = nothing."""
         face = _faces_of_surface(self._tracer, camera)
         if not len(self.geometry.face_item):
             return np.zeros(face.shape, np.uint32)
@@ -103,11 +98,10 @@ class Caster:
         return np.where(face >= 0, self.geometry.face_item[face], np.uint32(0))
 
     def item_counts(self, cameras: Sequence[Camera]) -> NDArray[np.uint32]:
-        """(n_cameras, n_items + 1) pixels each item covers; column 0 counts rays that miss.
+        """(n_cameras, n_items + 1) pixels of each item; column 0 counts rays that miss.
 
-        n_items is the largest instance id of the geometry. Cameras may differ in size. The
-        result aside, memory does not grow with the number of cameras. At edges single pixels may
-        differ from item_buffer (see JitTracer).
+        Cameras may differ in size; memory is bounded. At edges single pixels may differ from item_buffer
+        (see JitTracer).
         """
         if self._tracer is None or not cameras:
             counts = np.zeros((len(cameras), self.n_items + 1), np.uint32)

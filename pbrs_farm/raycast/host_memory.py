@@ -13,8 +13,8 @@ _SLACK: Final = 64  # values: more than a packet of any processor holds
 def with_slack(values: NDArray[Any]) -> NDArray[Any]:
     """A copy of values (N,) with readable memory behind its end.
 
-    Dr.Jit wraps NumPy's memory, and its LLVM kernels read it in whole packets, past the last value. An
-    array that ends where the process' memory does then ends the process with a segmentation fault.
+    Dr.Jit's LLVM kernels read NumPy's memory in whole packets, past the last value: an array at the end of
+    the process' memory would end the process with a segmentation fault.
     """
     padded = np.zeros(len(values) + _SLACK, values.dtype)
     padded[: len(values)] = values

@@ -35,20 +35,17 @@ class RayTracer(Protocol):
         ...
 
     def first_hit(self, origins: F32, directions: F32, max_distance: F32) -> tuple[F32, I32]:
-        """(N,) distance (inf = nothing) and (N,) face (-1 = nothing).
+        """(N,) distance in lengths of the direction (inf = nothing) and (N,) face (-1 = nothing).
 
-        origins, directions: (N, 3) float32, of any length but 0; max_distance: (N,) float32,
-        infinite for any. The distance is in lengths of the direction: multiply by its norm for
-        metres.
+        origins, directions: (N, 3) float32, of any length but 0; max_distance: (N,) float32, maybe infinite.
         """
         ...
 
     def counts(
         self, cameras: Sequence[Camera], face_label: NDArray[np.uint32], n_labels: int
     ) -> NDArray[np.uint32]:
-        """(n_cameras, n_labels) pixels of each label; label 0 also counts what hits nothing.
+        """(n_cameras, n_labels) pixels of each label; label 0 also counts misses. face_label: (F,) uint32.
 
-        face_label: (F,) uint32 below n_labels. uint32; rows sum to the pixels of their camera.
         Pictures need not exist as a whole, so this is the call for scoring thousands of cameras.
         """
         ...

@@ -53,9 +53,7 @@ def _module(name: str) -> Any:
 def llvm_version(library: Path) -> tuple[int, ...]:
     """Version of a libLLVM by its real file name (libLLVM.so.19.1, libLLVM-14.0.6.so.1); () unknown.
 
-    Windows' LLVM-C.dll names none and counts as MIN_LLVM: Dr.Jit says, once it is loaded, which it is.
-
-    Links are followed, so the file must be there for links to name a version.
+    Windows' LLVM-C.dll names none and counts as MIN_LLVM.
     """
     # Resolve links first: libLLVM.so alone names no version.
     name = library.resolve().name
@@ -140,10 +138,9 @@ def choose_variant() -> str:
 
 
 def mitsuba(variant: str | None = None) -> Any:
-    """The mitsuba module with a variant set; that of `choose_variant` when None.
+    """The mitsuba module with a variant set, `choose_variant` by default; before any use of drjit.
 
-    Call it before anything of mitsuba or drjit is used: the variant is the process's, and the
-    last call counts. Raises MachineFailed when the variant cannot be loaded here.
+    Raises MachineFailed when the variant cannot be loaded here.
     """
     name = choose_variant() if variant is None else variant
     module = _module("mitsuba")

@@ -73,11 +73,7 @@ def _paragraph(title: str, lines: set[str]) -> list[str]:
 
 
 def dressing_rows(manifest: bytes) -> list[dict[str, str]]:
-    """The rows of every dress.json in a manifest.
-
-    Only lines of dress.json are parsed, since a root's manifest may have millions. [] for an empty
-    manifest.
-    """
+    """The rows of every dress.json in a manifest; other lines, perhaps millions, are not parsed."""
     found = re.finditer(rb"^.*/" + re.escape(keys.DRESS).encode() + rb".*$", manifest, re.MULTILINE)
     return [json.loads(match[0]) for match in found]
 

@@ -112,11 +112,7 @@ class CachedHouse:
 
     @cached_property
     def rasterizer(self) -> Rasterizer:
-        """The GL renderer.
-
-        Takes a GL context of this thread: use and close it in the thread that asked first. Built
-        with the recipe's raster fields.
-        """
+        """The GL renderer, with a GL context of this thread: use and close it in the thread that asked first."""
         from pbrs_farm.raster import Rasterizer
 
         return Rasterizer(self.house, self.textures, self.recipe.raster)
@@ -129,11 +125,7 @@ class CachedHouse:
 
     @cached_property
     def light_scene(self) -> LightScene:
-        """The scene that carries light.
-
-        Loads Mitsuba, geometry and textures, which takes seconds: ask for it only where light is
-        traced.
-        """
+        """The scene that carries light; loading Mitsuba, geometry and textures takes seconds."""
         from pbrs_farm.transport.light_scene import LightScene
 
         return LightScene.load(self.house, self.textures, self.recipe, self.sky)

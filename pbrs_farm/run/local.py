@@ -66,10 +66,7 @@ def _pool(run: Run) -> Pool:
 
 
 def finishes_apart(run: Run) -> bool:
-    """Whether a second process makes houses and finishes views while the first renders light.
-
-    One render process leaves cores idle while it reads, labels, draws and develops.
-    """
+    """True if a second process makes houses and finishes views while the first renders light."""
     return run.n_jobs <= 1 and is_room_for_two() and "light" in plan.view_steps(run.want)
 
 

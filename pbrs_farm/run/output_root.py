@@ -53,19 +53,13 @@ def finish_house(store: Store, house_id: str) -> int:
 
 
 def merge_manifests(store: Store, house_ids: list[str]) -> None:
-    """Write the root's manifest.jsonl from those of the houses, in the order of the ids.
-
-    Houses without a manifest, which failed before their first marker, add nothing.
-    """
+    """Write the root's manifest.jsonl from those of the houses that have one, in the order of the ids."""
     found = (keys.house_key(house_id, keys.MANIFEST) for house_id in sorted(house_ids))
     store.put(keys.MANIFEST, b"".join(get_or_none(store, key) or b"" for key in found))
 
 
 def finish_root(store: Store, houses: Iterable[str]) -> None:
-    """Write the manifests of these houses, the root's manifest of all its houses, and the attribution.
-
-    Safe to call again, also while other workers write.
-    """
+    """Write the manifests of these houses, the root's manifest of all its houses, and the attribution."""
     for house_id in houses:
         finish_house(store, house_id)
     below = [keys.parse_house_key(key) for top in keys.FOLDERS for key in store.list(f"{top}/")]

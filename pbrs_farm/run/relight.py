@@ -135,8 +135,7 @@ def lamp_factors(rows: Sequence[Mapping[str, Any]], words: Sequence[LampFactor])
 def unlit_lamps(view: Path, words: Sequence[LampFactor]) -> list[dict[str, Any]]:
     """The rows of lamps that words name one by one and that bring no light to a view.
 
-    Words with a * are passed over: who dims all lamps of a kind does not care which of them are
-    seen. BadInput as of `lamp_factors`.
+    Words with a * do not count. BadInput as of `lamp_factors`.
     """
     rows = lamps_of_view(view)
     named = lamp_factors(rows, [w for w in words if "*" not in w.word])

@@ -112,10 +112,7 @@ def _camera_output(views: Sequence[View], report: dict[str, Any], recipe: Recipe
 
 
 def camera_seed(house_id: str, recipe: Recipe) -> int:
-    """The sampler's seed for a house under a recipe.
-
-    Follows from the fields that cameras depend on alone: another light does not move a camera.
-    """
+    """The sampler's seed for a house; another light does not move a camera."""
     return keys.seed(house_id, "cameras", recipe.digest("cameras"))
 
 

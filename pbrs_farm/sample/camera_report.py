@@ -60,10 +60,7 @@ class CameraReport(Record):
 
 
 def total_rejected(rooms: tuple[RoomReport, ...]) -> dict[str, int]:
-    """Rule -> rejected candidates over all sectors of all rooms.
-
-    Each candidate counts once, under the first rule that rejected it.
-    """
+    """Rule -> rejected candidates over all rooms, each under the first rule that rejected it."""
     total = Counter[str]()
     for room in rooms:
         for sector in room.sectors:

@@ -124,10 +124,9 @@ class PhotoChoice:
     _are_alike: dict[frozenset[_Name], bool] = field(default_factory=dict)
 
     def choose(self, rooms: Sequence[RoomCandidates]) -> dict[tuple[str, int], list[int]]:
-        """(room id, sector) -> numbers of the chosen candidates; writes their verdicts.
+        """(room id, sector) -> indices of the chosen candidates; writes their verdicts.
 
-        Sectors take turns by their best score, over all rooms, so that of two near-duplicates the better
-        one stays.
+        Sectors take turns by their best score, so that of two near-duplicates the better one stays.
         """
         sectors = self._filled_sectors(rooms)
         for sector in sectors:
@@ -135,11 +134,7 @@ class PhotoChoice:
         return {(sector.scored.room.id, sector.number): sector.taken for sector in sectors}
 
     def likely(self, rooms: Sequence[RoomCandidates]) -> dict[str, NDArray[np.intp]]:
-        """Room id -> numbers of the candidates that may be chosen once their scores are known better.
-
-        Of each sector the best by score, and those that add most whenever a view is chosen here: the
-        same choice with better scores finds them again. Writes the verdict of low scores.
-        """
+        """Room id -> indices of the candidates that may be chosen with better scores; writes low verdicts."""
         found: dict[str, set[int]] = {scored.room.id: set() for scored in rooms}
         for sector in self._filled_sectors(rooms):
             best = sector.scored.ranked(sector.number)[: _LIKELY_BY_SCORE * self.fields.per_sector]

@@ -180,11 +180,7 @@ def photo_score(seen: PhotoShares) -> F64:
 
 
 def framing_cost(seen: PhotoShares, tilt_deg: F64) -> F64:
-    """(N,) what steep views, close ones and doors cost where likeness counts.
-
-    Such views show least of bare walls: without a cost likeness would prefer them. tilt_deg: (N,)
-    downwards.
-    """
+    """(N,) cost of steep and close views and of doors, which likeness would prefer; tilt_deg: downwards."""
     cost = TILT_COST * np.maximum(tilt_deg - MOST_TILT_DEG, 0)
     cost += CLOSE_COST * np.maximum(NEAR_M - seen.median_m, 0)
     cost += FRAMED_OPENING_COST * np.maximum(seen.opening - FREE_OPENING, 0)

@@ -20,11 +20,7 @@ _MAX_MASK_CELL_M = 0.1  # otherwise half the clearance, at most this
 
 
 def room_grid(house: House, room: Room) -> Grid:
-    """The grid over the box of a room and all its objects; heights count from the box's bottom.
-
-    The paper's grid is that of the floor alone (`paper_rules.room_grid`). Objects that reach out of
-    the room widen it.
-    """
+    """The grid over the box of a room and all its objects; heights count from the box's bottom."""
     (x0, z0), (x1, z1) = room.polygon.min(0), room.polygon.max(0)
     low, high = np.array([x0, room.floor_y, z0]), np.array([x1, room.ceiling_y, z1])
     for item in _items_of(house, room):

@@ -31,9 +31,8 @@ class RoomCamera:
 def cameras_from_text(text: str, file: str, width_px: int, height_px: int) -> list[RoomCamera]:
     """The cameras of a room_camera.txt, in order, on a grid of that size.
 
-    A line is `vx vy vz tx ty tz ux uy uz xf yf value`, and the camera's name where room_camera_name.txt
-    was joined to it; empty lines are passed over. Raises BadInput (file and line) for other lines,
-    numbers that are not finite, and impossible poses.
+    A line is `vx vy vz tx ty tz ux uy uz xf yf value`, and perhaps the camera's name. Raises BadInput (file
+    and line) for other lines, numbers that are not finite, and impossible poses.
     """
     cameras = []
     for number, line in enumerate(text.splitlines(), 1):
@@ -45,8 +44,7 @@ def cameras_from_text(text: str, file: str, width_px: int, height_px: int) -> li
 def with_names(text: str, names: str, file: str) -> str:
     """The lines of a room_camera.txt, each followed by its line of room_camera_name.txt.
 
-    Blank lines of either do not count. Raises BadInput where the numbers of lines differ: SUNCG's
-    two files belong together line by line.
+    Blank lines do not count. Raises BadInput for different numbers of lines.
     """
     lines = [line for line in text.splitlines() if line.strip()]
     named = [line.strip() for line in names.splitlines() if line.strip()]

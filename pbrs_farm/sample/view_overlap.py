@@ -49,9 +49,5 @@ def shared_part(a: Camera, depth_a: F32, b: Camera, depth_b: F32) -> float:
 
 
 def overlap(a: Camera, depth_a: F32, b: Camera, depth_b: F32) -> float:
-    """The larger of both directions' shared parts: 1 = one view shows nothing the other does not.
-
-    depth_a, depth_b: (H, W) float32, along the axis, metres, of the two cameras. Symmetric, in [0,
-    1].
-    """
+    """The larger of both directions' shared parts, 0..1; depth_a, depth_b: (H, W) float32 of two cameras."""
     return max(shared_part(a, depth_a, b, depth_b), shared_part(b, depth_b, a, depth_a))

@@ -24,11 +24,7 @@ class Scored:
 
 
 def object_columns(house: House) -> NDArray[np.intp]:
-    """Instance ids of what the paper calls objects: all but wall, ceiling, floor and ground.
-
-    For columns of counts by instance id, whose column 0 is nothing. Doors and windows are objects
-    here.
-    """
+    """Instance ids of the paper's objects, doors and windows too: all but wall, ceiling, floor, ground."""
     ids = [i + 1 for i, item in enumerate(house.items) if not item.kind.is_structure]
     return np.array(ids, np.intp)
 

@@ -116,11 +116,9 @@ class FolderStore:
             raise self._failure(key, error) from error
 
     def sweep(self, older_than_s: float = 24 * 3600.0) -> int:
-        """Remove unfinished files that killed writers left; their count.
+        """Remove the files of killed writers that are older than older_than_s; their count.
 
-        older_than_s: age of the youngest file to remove, seconds by this machine's clock; a file
-        that a writer still fills is younger than a day. Only the folder of unfinished files is
-        looked into, no object is touched.
+        Unfinished files of live writers are younger than a day.
         """
         n_removed = 0
         oldest = time.time() - older_than_s  # younger ones may be in use
@@ -131,11 +129,7 @@ class FolderStore:
         return n_removed
 
     def tidy(self) -> None:
-        """Remove the folder of unfinished files where there is none; the next write makes it again.
-
-        A folder that still holds unfinished files stays, and so does one that may not be removed:
-        nothing is raised.
-        """
+        """Remove the folder of unfinished files if it is empty; the next write makes it again."""
         with contextlib.suppress(OSError):
             (self.root / TEMPORARY).rmdir()
 

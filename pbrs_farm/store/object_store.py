@@ -84,10 +84,7 @@ class Store(Protocol):
 
 
 def get_or_none(store: Store, key: str) -> bytes | None:
-    """The object's bytes, None if it is missing: one request, not two.
-
-    Raises StoreFailed as `get` for everything but a missing object.
-    """
+    """The object's bytes, None if it is missing: one request, not two. Raises StoreFailed as `get`."""
     try:
         return store.get(key)
     except ObjectMissing:
@@ -119,10 +116,10 @@ def put_done(store: Store, key: str, marker: bytes, files: Mapping[str, bytes]) 
 
 
 def check_key(key: str) -> str:
-    """key itself; raises StoreFailed when it could name anything outside the store.
+    """The key; StoreFailed when it could name anything outside the store.
 
-    Refused: empty segments, `..`, a leading dot or slash, characters that a shell or a URL takes
-    amiss, and lengths that S3 or a file system does not hold.
+    Refused: empty segments, `..`, a leading dot or slash, characters that a shell or a URL takes amiss, and
+    lengths that S3 or a file system does not hold.
     """
     segments = key.split("/")
     # Refuse empty segments, "." and "..", as well as names too long for S3 or a disk.

@@ -105,19 +105,13 @@ def marker_of(step: str) -> str:
 
 
 def house_folder(house: str) -> str:
-    """Folder of a house or object in a packed root, with a trailing slash.
-
-    Two hex digits of the id's sha256 come first, so that no folder holds all houses.
-    """
+    """Folder of a house or object in a packed root, below two hex digits of the id's sha256."""
     top = keys.FOLDERS[keys.is_object(house)]
     return f"{top}/{keys.sha256(house.encode())[:2]}/{house}/"
 
 
 def pack_key(house: str, view: str, group: str) -> str:
-    """Key of the pack of a group of steps, or of a step, of a view.
-
-    group: a key of GROUPS ("labels", "light", "pictures"), or the name of a step that is written alone.
-    """
+    """Key of the pack of a view's group of steps (a key of GROUPS), or of a step that is written alone."""
     return f"{house_folder(house)}packs/{group}.{view}.tar"
 
 

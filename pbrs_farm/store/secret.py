@@ -12,11 +12,7 @@ class Secret:
         self._text = text
 
     def reveal(self) -> str:
-        """The text itself, for whoever must send it.
-
-        Everywhere else (messages, logs, repr) a Secret shows no more than that it is one: call this
-        as late as can be, and keep the answer in no field.
-        """
+        """The text itself, for its receiver. Messages, logs and repr hide it: call this late and do not keep it."""
         return self._text
 
     def __bool__(self) -> bool:

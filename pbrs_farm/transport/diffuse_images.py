@@ -77,10 +77,9 @@ def shading_by_group(
 def intrinsic_parts(
     radiance: RadianceImage, albedo: F32, shading: RadianceImage
 ) -> tuple[NDArray[np.float16], NDArray[np.float16]]:
-    """(shading, residual) in half floats, so that albedo x shading + residual is radiance to half a step.
+    """(shading, residual) in half floats: albedo x shading + residual is radiance to half a step.
 
-    radiance: of some light groups, denoised where shading is; albedo: (H, W, 3) linear, of the label.
-    The residual is of either sign.
+    albedo: (H, W, 3) linear, of the label. The residual may be negative.
     """
     stored = np.clip(shading, 0, _MOST_HALF).astype(np.float16)
     left = radiance - albedo * stored.astype(np.float32)

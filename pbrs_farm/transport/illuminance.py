@@ -120,8 +120,7 @@ def illuminance_lx(
 ) -> tuple[float, float]:
     """(outdoor, indoor) mean illuminance in lx of level surfaces at points (N, 3), facing up.
 
-    points: metres, away from surfaces (`floor_points`). Monte Carlo with few samples a point: meant
-    for the mean over many points, not for one. The seed makes it repeatable.
+    Monte Carlo with few samples a point, for the mean over many points; repeatable by the seed.
     """
     up = np.tile([0.0, 1.0, 0.0], (len(points), 1))
     # A white matte surface reflects E / pi: times pi and lm/W it is illuminance.

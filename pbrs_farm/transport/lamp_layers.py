@@ -75,11 +75,9 @@ def relit_indoor(
 def lamp_shares(
     indoor: RadianceImage, layers: Mapping[int, RadianceImage]
 ) -> dict[int, RadianceImage]:
-    """Number -> the lamp's part of denoised indoor light, so that relit_indoor is a sum of them.
+    """Number -> the lamp's part of denoised indoor light (H, W, 3), so that relit_indoor is a sum of them.
 
-    indoor: (H, W, 3) float32, denoised; layers: number -> the lamp's own noisy light of the same
-    size. Each pixel of indoor is divided as the layers are there; where all are black, in equal
-    parts.
+    layers: number -> the lamp's own noisy light. They divide each pixel; black ones in equal parts.
     """
     total = indoor_from_lamps(layers, {}, indoor.shape)
     equal = np.float32(1 / max(1, len(layers)))

@@ -173,8 +173,7 @@ def flow_label(found: Correspondence) -> F32:
 def flow_kitti(found: Correspondence) -> NDArray[np.uint16]:
     """(H, W, 3) uint16 as KITTI stores flow: 64 x + 2**15, 64 y + 2**15, 1 = seen in the other picture.
 
-    x to the right, y down, in pixels. 0, 0, 0 where the point is not seen in the other picture, and
-    where the motion is 512 pixels or more, for which the format has no number.
+    0, 0, 0 if it is not, and for a motion of 512 pixels or more, for which the format has no number.
     """
     steps = np.rint(found.flow * KITTI_FLOW_STEP) + 2**15
     valid = (found.state == SEEN) & ((steps >= 0) & (steps <= 65535)).all(-1)
@@ -185,8 +184,7 @@ def flow_kitti(found: Correspondence) -> NDArray[np.uint16]:
 def disparity_label(found: Correspondence) -> NDArray[np.uint16]:
     """(H, W) uint16 as KITTI stores disparity: 256 times the pixels by which rows are shifted.
 
-    At least 1 where a surface is, hidden in the other picture or not; 0 = nothing. Beyond 255.99
-    px it is stored as that.
+    1..65535 for a surface, hidden in the other picture or not; 0 = nothing.
     """
     shift = np.abs(found.flow[..., 0])
     steps = np.clip(np.rint(shift * KITTI_DISPARITY_STEP), 1, 65535)

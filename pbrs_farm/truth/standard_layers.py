@@ -20,11 +20,7 @@ UNIT_TOLERANCE = 0.1
 
 
 def depth_mm(depth_z: DepthZ) -> NDArray[np.uint16]:
-    """(H, W) uint16 planar z in millimetres, rounded; 0 = nothing.
-
-    Overflow: 65.535 m and beyond is stored as 65535 (layer depth_z keeps the metres). A hit nearer
-    than half a millimetre is stored as 1, so that 0 always means nothing. NaN is nothing.
-    """
+    """(H, W) uint16 planar z in millimetres, 1..65535 for a hit; 0 = nothing."""
     z = np.where(np.isnan(depth_z), np.float32(0), depth_z)
     rounded = np.clip(np.rint(z * np.float32(1000.0)), 1, DEPTH_MAX_MM)
     return np.where(z > 0, rounded, 0).astype(np.uint16)
@@ -40,8 +36,8 @@ def unit_mask(normal: UnitVectors) -> Mask:
 def normal_label(normal_world: UnitVectors, world_from_camera: Matrix4) -> NDArray[np.uint16]:
     """(H, W, 3) uint16 normals in the published camera frame: round((n + 1) 65535 / 2).
 
-    x right, y forward, z up (docs/spec/suncg.md section 5). A normal that is not of unit length (nothing there,
-    a triangle without area, NaN) is stored as n = 0: 32768 in all three channels.
+    x right, y forward, z up (docs/spec/suncg.md section 5). Normals that are not of unit length are stored
+    as 32768 in all three channels.
     """
     published_from_world = PUBLISHED_FROM_OPENGL @ world_from_camera[:3, :3].T
     normal = _clean(normal_world) @ published_from_world.T.astype(np.float32)
@@ -106,11 +102,7 @@ def semantic_label(item: ItemBuffer, house: House) -> NDArray[np.uint8]:
 
 
 def instance_label(item: ItemBuffer, house: House) -> NDArray[np.uint16]:
-    """(H, W) uint16 instance id, 0 = nothing.
-
-    An id is the item's place in house.items, from 1: the same in every view of the house. Raises
-    BadHouse beyond 65,535 items.
-    """
+    """(H, W) uint16 instance id, the item's place in house.items from 1; BadHouse beyond 65,535 items."""
     check_instances(house)
     return item.astype(np.uint16)
 

@@ -152,10 +152,7 @@ class Message:
     body: dict[str, Any] = field(default_factory=dict)  # JSON values that its parent understands
 
     def line(self) -> bytes:
-        """The message as message_from_line reads it.
-
-        One line, its end included; the body must be JSON values.
-        """
+        """The message as one line for message_from_line; the body must be JSON values."""
         return json.dumps(asdict(self), separators=(",", ":")).encode() + b"\n"
 
 

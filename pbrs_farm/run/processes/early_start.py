@@ -20,10 +20,9 @@ _STARTED: Final[dict[str, tuple[ChildProcess, tempfile.TemporaryDirectory[str]]]
 
 
 def start_early(target: str) -> None:
-    """Start a process of `target` (see task_loop.main) for the next child_of to take.
+    """Start a process of `target` (see task_loop.main) for the next child_of, while options are being read.
 
-    It loads libraries while its parent still reads options. Call it once a target, and
-    `end_untaken` at the end of whoever called it.
+    Call it once per target, and `end_untaken` at the end of the caller.
     """
     folder = tempfile.TemporaryDirectory(prefix="pbrs-farm-")
     _STARTED[target] = (ChildProcess(target, Path(folder.name) / "early.log"), folder)

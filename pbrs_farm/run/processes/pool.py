@@ -87,11 +87,7 @@ class Pool:
         return sum(w.task is not None for w in self._workers)
 
     def idle_houses(self, lane: int) -> list[str]:
-        """The house each idle process holds in memory ("" for none): a place per idle process.
-
-        A process that is not started yet holds "". As many entries as tasks that the lane can take
-        now.
-        """
+        """The house of each idle process, "" for none: one entry per task that the lane can take now."""
         idle = [w.held_house for w in self._of(lane) if w.task is None]
         return idle + [""] * (self._lanes[lane] - len(self._of(lane)))
 
@@ -100,11 +96,10 @@ class Pool:
         return {w.task.house_id for w in self._workers if w.task is not None}
 
     def give(self, task: RenderTask, lane: int) -> None:
-        """Hand a task to an idle process of the lane, one that holds its house if there is one.
+        """Hand a task to an idle process of the lane (`idle_houses`).
 
-        Only where `idle_houses` of the lane says that one is free. Loading a house costs more than
-        the views of a room, so one that holds it comes first, then one that holds nothing, then
-        any.
+        Loading a house costs more than the views of a room: a process that holds it comes first, then one
+        without a house, then any.
         """
         idle = [w for w in self._of(lane) if w.task is None]
         idle.sort(key=lambda w: (w.held_house != task.house_id, w.held_house != ""))

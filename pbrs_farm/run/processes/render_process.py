@@ -121,11 +121,7 @@ class RenderProcess:
         return None if line is None else self._heard(message_from_line(line))
 
     def kill(self, cause: str, text: str) -> Ended:
-        """End the running task and its process.
-
-        cause is a word as of Ended, text the sentence for people. The next task
-        starts a new process.
-        """
+        """End the running task and its process; cause as of Ended, text for people."""
         self.stop()
         return Ended(self._clock() - self._begun_at, cause, text)
 

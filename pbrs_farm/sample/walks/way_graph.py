@@ -48,11 +48,7 @@ class WayGraph:
         self._matrix = csr_matrix((np.concatenate(weights), (rows, columns)), shape=(n, n))
 
     def from_cell(self, start: int) -> tuple[F64, NDArray[np.int32]]:
-        """(n,) cost of the way from a cell to each, and the cell before each on it.
-
-        start: number of a cell. Cost is infinite for cells that no way reaches; the cell before is
-        negative for these and for the start. Dijkstra over the whole storey: once per start.
-        """
+        """(n,) cost of the way from a cell to each, inf without one, and the cell before each on it."""
         cost, before = dijkstra(
             self._matrix, directed=False, indices=np.array([start]), return_predecessors=True
         )

@@ -71,10 +71,7 @@ def choose_exposure(wanted: float, fields: SensorFields) -> Exposure:
 
 
 def lag_exposure(wanted: Sequence[float], times_s: Sequence[float], lag_s: float) -> float:
-    """The factor of the last of some frames when it follows the wanted ones with a delay of lag_s.
-
-    A first-order filter of the logarithm: after lag_s, 63 % of a step is made up.
-    """
+    """The factor of the last frame when it follows the wanted ones by a first-order filter of lag_s."""
     level = math.log(wanted[0])
     for k in range(1, len(wanted)):
         share = 1 - math.exp(-(times_s[k] - times_s[k - 1]) / lag_s) if lag_s > 0 else 1.0
@@ -215,11 +212,7 @@ def _electrons_read(light: F64, iso: float, sensor: SensorFields, rng: np.random
 
 
 def compress_as_jpeg(picture: Srgb8Image, quality: int) -> Srgb8Image:
-    """The picture as it comes out of JPEG of that quality, 1..100.
-
-    picture: (H, W, 3) uint8 sRGB. Pillow chooses the chroma subsampling. Bytes of the result depend
-    on the version of libjpeg: do not compare them between machines.
-    """
+    """The picture after JPEG of a quality 1..100; its bits depend on the version of libjpeg."""
     buffer = io.BytesIO()
     Image.fromarray(picture).save(buffer, "JPEG", quality=quality)
     back: NDArray[np.uint8] = np.array(Image.open(buffer))

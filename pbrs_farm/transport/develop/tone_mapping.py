@@ -39,11 +39,7 @@ _SHARPENED_PX: Final = 0.8  # standard deviation of the blur that sharpening com
 def tone(
     radiance: RadianceImage, fields: ToneFields, *, exposure: float | None = None
 ) -> Srgb8Image:
-    """(H, W, 3) uint8 sRGB of a radiance image.
-
-    exposure: a factor (see `exposure_of`); the image's own when None. A black image stays black.
-    Non-finite and negative values count as 0.
-    """
+    """(H, W, 3) uint8 sRGB of a radiance image; exposure: a factor, None = `exposure_of` the image."""
     rgb = _finite_light(radiance)
     if fields.preset == "released":
         return _eight_bits(srgb_from_linear(_reinhard(rgb, fields.key, exposure)))
@@ -123,9 +119,8 @@ def add_veil(light: F64, fields: ToneFields) -> F64:
 def flatten_light(light: F64, fields: ToneFields) -> F64:
     """Exposed light (H, W, 3) with large differences of luminance reduced and detail kept.
 
-    The large part is the logarithm of luminance by a guided filter (He, Sun, Tang 2013), whose
-    edges stay where the light's are, so that nothing gets a halo; `local_contrast` of its distance
-    to the key is taken out.
+    The base is the logarithm of luminance by a guided filter (He, Sun, Tang 2013), which gives no halo;
+    `local_contrast` of its distance to the key is taken out.
     """
     if fields.local_contrast == 0:
         return light
@@ -164,8 +159,7 @@ def _reinhard(rgb: F64, key: float, exposure: float | None) -> F64:
 def roll_off(rgb: F64, white: float) -> F64:
     """The curve of `photo`: straight up to the shoulder, then a logarithm that reaches 1 at white.
 
-    It maps the largest component and keeps the hue; from a luminance of 1 on colours pale, and at white they are
-    white, as a sensor's channels saturate one after the other.
+    It maps the largest component and keeps the hue; above a luminance of 1 colours turn pale.
     """
     # Skip pixels on the linear part of the curve, which are most of a picture.
     top = np.maximum(np.maximum(rgb[..., 0], rgb[..., 1]), rgb[..., 2])
@@ -188,11 +182,7 @@ def _shoulder(rgb: F64, top: F64, white: float) -> F64:
 
 @functools.cache
 def knee_of(white: float) -> float:
-    """The k for which _SHOULDER + k log(1 + (white - _SHOULDER) / k) is 1.
-
-    white: the value that becomes 1, more than _SHOULDER. Found by halving between 1e-4 and 1e4, so
-    a white so near to 1 that no curve bends gives an end of that range.
-    """
+    """The k for which _SHOULDER + k log(1 + (white - _SHOULDER) / k) is 1, by bisection in 1e-4..1e4."""
     low, high = 1e-4, 1e4
     for _ in range(_HALVINGS):
         k = (low * high) ** 0.5

@@ -53,11 +53,7 @@ class ArrivalRates:
         self.set_rates(None)
 
     def set_rates(self, rates: F64 | None) -> None:
-        """Set the rates of a view: (voxels, N_KINDS), None = every ray arrives.
-
-        rates: float64 in (0, 1], as `arrival_rates` gives them; one row is broadcast. Stored as
-        float32, and not a part of the compiled kernel, so another view costs no compilation.
-        """
+        """Set the rates of a view, (voxels, N_KINDS) in (0, 1]; None = every ray arrives. Compiles nothing."""
         rows = np.ones((self.grid.n_voxels, N_KINDS), np.float32)
         if rates is not None:
             rows[:] = rates
@@ -89,11 +85,7 @@ class ArrivalRates:
         return ArrivalCounts(dr.zeros(mi.UInt32, n), dr.zeros(mi.UInt32, n))
 
     def count(self, counts: ArrivalCounts, p: Any, kind: Any, is_cast: Any, arrives: Any) -> None:
-        """Count shadow rays from p.
-
-        is_cast, arrives: Bool of each lane. Adds atomically, so it may be called from all lanes at
-        once; a count wraps at 2^32.
-        """
+        """Count shadow rays from p, atomically; is_cast, arrives: Bool of each lane."""
         place = self.grid.voxel(p) * N_KINDS + kind
         # Add in place: a copy for each thread would put the number of voxels into the kernel.
         one, mode = mi.UInt32(1), dr.ReduceMode.Direct

@@ -78,10 +78,9 @@ def evaluate_bsdf(bsdf: Bsdf, wi: Any, wo: Any, *, least_diffuse: float = 0.0) -
 
 
 def diffuse_reflection(bsdf: Bsdf, cos_o: Any) -> Any:
-    """f |cos wo| of diffuse reflection alone, less diffuse_response() to wi; both are above.
+    """f |cos wo| of diffuse reflection alone, less diffuse_response() to wi; cos_o > 0, both are above.
 
-    cos_o: cosine of the outgoing direction, > 0. Under a coat it is Ashikhmin and Shirley's diffuse
-    term (2000); times `diffuse_response` of the other direction it is reciprocal.
+    Under a coat it is Ashikhmin and Shirley's diffuse term (2000), reciprocal with the other response.
     """
     coated = 28 / 23 * (1 - bsdf.f0) * _ashikhmin(cos_o)
     return bsdf.kd * dr.select(bsdf.alpha > 0, coated, 1.0) * (cos_o * dr.inv_pi)
@@ -104,12 +103,10 @@ def white_share(value: Any, wo: Any) -> Any:
 
 
 def sample_bsdf(bsdf: Bsdf, wi: Any, u_lobe: Any, uv: Any, *, least_diffuse: float = 0.0) -> Any:
-    """A direction wo drawn with the pdf of evaluate_bsdf().
+    """A direction wo drawn with the pdf of evaluate_bsdf(); it may be below the surface.
 
-    wi: unit, local, z along the normal. u_lobe in [0, 1) chooses the lobe and is used up by it. The
-    direction may lie below the surface (transmission, or a coat at grazing angles): evaluate the
-    BSDF before it is used. least_diffuse: Kd that counts in the choice at least, where what arrives is
-    asked for, too.
+    wi: unit, local, z along the normal. u_lobe in [0, 1) chooses the lobe and is used up by it.
+    least_diffuse: minimum Kd in the choice, if arriving light is asked for, too.
     """
     p_diffuse, p_coat = _lobe_probabilities(bsdf, wi, least_diffuse)
     cosine = mi.warp.square_to_cosine_hemisphere(uv)
@@ -120,10 +117,9 @@ def sample_bsdf(bsdf: Bsdf, wi: Any, u_lobe: Any, uv: Any, *, least_diffuse: flo
 
 
 def coat_reflection(f0: Any, alpha: Any, wi: Any, wo: Any) -> Any:
-    """f |cos wo| of the coat alone; local directions, both above, alpha > 0.
+    """f |cos wo| of the coat alone; local directions, both above. f0: Color3f; alpha > 0: GGX roughness.
 
-    f0: Color3f at normal incidence; alpha: GGX roughness. Trowbridge-Reitz with height-correlated
-    masking; Schlick's Fresnel.
+    Trowbridge-Reitz with height-correlated masking; Schlick's Fresnel.
     """
     h = dr.normalize(wi + wo)
     fresnel = _schlick(f0, dr.maximum(dr.dot(wi, h), 0))
@@ -132,20 +128,12 @@ def coat_reflection(f0: Any, alpha: Any, wi: Any, wo: Any) -> Any:
 
 
 def is_reconnectable(bsdf: Bsdf) -> Any:
-    """Whether the surface is rough enough that a path through it may be seen from elsewhere.
-
-    A coat below the least roughness reflects nearly one direction: a path through it seen from
-    elsewhere would have next to no light.
-    """
+    """True for a surface rough enough that a path through it carries light when seen from elsewhere."""
     return (bsdf.alpha <= 0) | (bsdf.alpha >= _MIN_RECONNECT_ALPHA)
 
 
 def view_independent_pdf(bsdf: Bsdf, ng: Any, w: Any) -> Any:
-    """A pdf per solid angle like sample_bsdf()'s that does not depend on wi; world directions.
-
-    Positive wherever sample_bsdf() may go from wi on the side of ng: a weight of the balance
-    heuristic that stays the same when wi moves.
-    """
+    """A pdf like sample_bsdf()'s, positive where it may go, that does not depend on wi; world directions."""
     is_thin = dr.max(bsdf.tau) > 0
     reflected, transmitted = luminance(bsdf.kd), luminance(bsdf.tau)
     p_above = dr.clip(reflected / dr.maximum(reflected + transmitted, 1e-9), 0.05, 0.95)

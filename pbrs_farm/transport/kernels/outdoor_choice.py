@@ -59,11 +59,7 @@ class OutdoorChoice:
         self.set_weights(np.ones(1))
 
     def set_weights(self, weights: F64) -> None:
-        """Set the weights of a view: (techniques,), or (voxels, techniques); rows sum to 1.
-
-        One row serves all voxels. Techniques beyond those given get chance 0. Not a part of the
-        compiled kernel.
-        """
+        """Set a view's weights: (techniques,) or (voxels, techniques), rows sum to 1; compiles nothing."""
         rows = np.zeros((self._grid.n_voxels, MAX_TECHNIQUES), np.float32)
         rows[:, : weights.shape[-1]] = weights
         self._rows = device_array(mi.Float, rows.ravel())

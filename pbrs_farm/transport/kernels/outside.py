@@ -99,10 +99,7 @@ class Outside:
 
     @dr.syntax
     def lets_through(self, o: Any, d: Any, active: Any) -> Any:
-        """Color3f of light that comes from infinity to o (Point3f) past everything outside.
-
-        d: unit Vector3f to where it comes from. 1 for lanes that are not active.
-        """
+        """Color3f of light from infinity, direction d, that reaches o past everything outside."""
         clear = mi.Color3f(1)
         if active:
             clear = self._scene.transmittance(o, d, mi.Float(dr.inf), active)

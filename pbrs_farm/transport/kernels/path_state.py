@@ -180,10 +180,7 @@ class StepResult(NamedTuple):
 
 
 def device_fields(fields: LightFields, *, max_depth: int | None = None) -> DeviceFields:
-    """Device values of the fields the kernels use; max_depth replaces the fields' own.
-
-    Opaque, so that another depth runs the same kernel.
-    """
+    """Opaque device values of the kernels' fields; max_depth replaces the fields' own."""
     return DeviceFields(
         dr.opaque(mi.UInt32, fields.max_depth if max_depth is None else max_depth),
         dr.opaque(mi.UInt32, fields.rr_depth),
@@ -192,11 +189,7 @@ def device_fields(fields: LightFields, *, max_depth: int | None = None) -> Devic
 
 
 def film_position(u: Any, is_tent: Any) -> Any:
-    """Position relative to a pixel's corner, spread by the reconstruction filter.
-
-    u: Point2f in [0, 1)^2. With the box filter it stays in the pixel; the tent reaches half a pixel
-    beyond on each side.
-    """
+    """Position relative to a pixel's corner, spread by the box or tent filter; u: Point2f in [0, 1)^2."""
     tent = mi.Point2f(_tent(u.x), _tent(u.y)) + 0.5
     return dr.select(is_tent, tent, u)
 
@@ -214,11 +207,7 @@ def camera_path(
 
 
 def surface_path(vertex: Vertex, d: Any, pdf: Any) -> PathState:
-    """The path that leaves a vertex in direction d, drawn with a pdf.
-
-    d: unit Vector3f in the world; pdf: per solid angle, for the first emitter it may hit. The
-    vertex must know its lamps (near).
-    """
+    """The path from a vertex, which knows its lamps (near), in direction d with a pdf per solid angle."""
     assert vertex.near is not None
     origin = offset_ray_origin(vertex.si.p, vertex.si.ng)
     return _first_ray(origin, d, mi.UInt32(1), vertex.near.reference, mi.Float(pdf))
@@ -231,11 +220,7 @@ def _first_ray(o: Any, d: Any, depth: Any, reference: ReferencePoint, pdf: Any) 
 
 
 def white_vertex(p: Any, n: Any, near: NearbyLamps) -> Vertex:
-    """A vertex on a white matte surface at p, seen from above.
-
-    n: unit; the vertex looks along it. For illuminance and light maps, where no surface of the
-    scene is asked for.
-    """
+    """A vertex on a white matte surface at p with unit normal n, for illuminance and light maps."""
     white = Bsdf(mi.Color3f(1), mi.Color3f(0), mi.Color3f(0), mi.Float(0), mi.UInt32(0))
     no, yes, none = mi.Bool(False), mi.Bool(True), mi.UInt32(NO_LAMP)
     si = SurfaceInteraction(yes, p, n, n, n, none, white, no, mi.UInt32(0), mi.Float(0), none)

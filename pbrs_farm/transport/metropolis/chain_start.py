@@ -31,11 +31,7 @@ def flat_film(shape: tuple[int, int]) -> Film:
 def with_importance(
     context: ChainContext, shape: tuple[int, int], n_paths: int, seed: int
 ) -> ChainContext:
-    """The context with the film's importance, estimated by n_paths independent paths.
-
-    shape: (height, width). Chains then visit dark parts of a picture about as often as bright ones;
-    the estimate stays unbiased.
-    """
+    """The context with the film's importance, estimated by n_paths paths: chains visit dark parts, too."""
     pilot = _draw_paths(context, n_paths, seed)
     importance = pixel_importance(shape, pilot.pixel.numpy(), pilot.target.numpy())
     on_device = device_array(mi.Float, importance.ravel())

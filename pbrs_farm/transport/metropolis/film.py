@@ -76,11 +76,7 @@ def target_function(film: Film, pixel: Any, light: Any, active: Any = True) -> A
 
 
 def splat(film: Film, chain: Any, pixel: Any, value: Any, active: Any) -> None:
-    """Add a value to a pixel of the half that the chain belongs to.
-
-    value: Color3f; chain: UInt32. Even and odd chains have a half each, so that the halves may be
-    compared. Adds atomically.
-    """
+    """Add a value to a pixel of the chain's half of the film (even and odd chains), atomically."""
     first = ((chain & 1) * (film.width * film.height) + pixel) * 3
     for c in range(3):
         # In this mode the kernel does not depend on the picture's size.

@@ -242,10 +242,9 @@ def _restored(context: ChainContext, kept: Arrays) -> tuple[ChainContext, _Start
 def _path_context(
     scene: DeviceScene, emitters: Emitters, group: Group, fields: LightFields
 ) -> PathContext:
-    """Paths that see one group.
+    """Paths that see one group, with late roulette: an ended path's neighbours are lost to the chain.
 
-    Roulette is late: where it ends a path early, the path's neighbours are lost to the chain, too;
-    and never at the first two vertices, so that a suffix does not depend on its prefix.
+    There is none at the first two vertices, so that a suffix does not depend on its prefix.
     """
     every = dr.opaque(mi.Int32, ALL_EMITTERS)
     is_indoor = group is Group.INDOOR

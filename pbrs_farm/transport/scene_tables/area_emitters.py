@@ -88,9 +88,8 @@ def _flux_and_rgb(
 ) -> tuple[float, F64]:
     """(flux in lm, colour of luminance 1) of a light part.
 
-    The source states the flux that leaves the lamp. Its shade keeps part of the bulb's flux, so
-    the bulb emits more: flux over the light output ratio, which repair stores as part.escape. A
-    bare part's flux is its surfaces' own.
+    The source states the flux that leaves the lamp: the bulb emits that over the light output ratio,
+    part.escape. A bare part's flux is its surfaces' own.
     """
     e = recipe.emission
     flux = flux_lm(part.power, part.unit, part.share, lamp_lm=e.lamp_lm, lm_per_watt=e.lm_per_watt)

@@ -106,10 +106,7 @@ def uniform_sky(radiance: tuple[float, float, float]) -> Sky:
 
 
 def choose_panorama(names: list[str], house_id: str, seed: int) -> str:
-    """The panorama of a house, the same at every run, without known interiors and nights.
-
-    Raises BadRecipe when no name is left.
-    """
+    """The panorama of a house, without known interiors and nights; BadRecipe if none is left."""
     skies = sorted(n for n in names if not any(word in n.lower() for word in NO_SKIES))
     if not skies:
         hint = "latitude-longitude .exr or .hdr files; `blender-data` has some"

@@ -49,11 +49,7 @@ _SKY_OF_ONE: Final = (1.0, 1.0, 1.0)  # radiance of a uniform white sky
 
 
 def blocks(picture: F32, n: int = 4) -> F64:
-    """(n, n) mean luminance of a radiance image (H, W, 3), H and W multiples of n.
-
-    Means over blocks of many pixels are nearly normal, which single pixels' radiance is not:
-    `z_scores` needs that.
-    """
+    """(n, n) mean luminance of a radiance image (H, W, 3), nearly normal, for `z_scores`."""
     luminance = picture @ LUMINANCE
     h, w = luminance.shape
     means = luminance.reshape(n, h // n, n, w // n).mean((1, 3))
