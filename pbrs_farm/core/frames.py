@@ -1,4 +1,4 @@
-"""Every axis and unit convention, and every a_from_b transform; no effects. Nothing else converts.
+"""Axis and unit conventions, and the a_from_b transforms between frames; no effects.
 
 World: metres, right-handed, y up. Plan coordinates are (x, z). Camera inside: OpenGL axes
 (x right, y up, looking along -z). Names read as composition: a_from_c = a_from_b @ b_from_c.

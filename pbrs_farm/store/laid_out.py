@@ -104,18 +104,17 @@ class LaidOutStore:
 
     @property
     def is_packed(self) -> bool:
-        """True if the root is packed. Raises StoreFailed for a later layout.
+        """True if the root is packed; False until a root has begun. StoreFailed for a later layout."""
+        return bool(self._layout())
 
-        Read from the store once and cached, except for a root that has not begun (no recipe in it): it gives
-        False until somebody writes.
-        """
+    def _layout(self) -> bool | None:
+        """True if the root is packed, None before it has begun (no recipe in it); then cached."""
         if self._known is None:
             # The layout is written before the recipe: ask in the other order.
             has_begun = self.inner.head(keys.RECIPE) is not None
             data = get_or_none(self.inner, LAYOUT)
-            if data is None and not has_begun:
-                return False
-            self._known = data is not None and _is_packed(data)
+            if data is not None or has_begun:
+                self._known = data is not None and _is_packed(data)
         return self._known
 
     @contextmanager
@@ -126,9 +125,7 @@ class LaidOutStore:
         task fails. reads_whole: packs are read at once, since their pictures are needed.
         """
         store = LaidOutStore(self.inner, self._packs)
-        # Ask once in a worker's life, not once a task.
-        _ask = self.is_packed
-        store._known = self._known
+        store._known = self._layout()
         store._task = _Task(_WHOLE_BYTES if reads_whole else _HEAD_BYTES)
         try:
             yield store
@@ -139,16 +136,12 @@ class LaidOutStore:
                 store._task = None
 
     def put(self, key: str, data: bytes | memoryview) -> None:
-        at = self._of_view(key)
-        if at is not None:
-            raise StoreFailed(key, "a packed root takes a view's files with their marker")
+        self._refuse_view(key)
         self._forget(key)
         self.inner.put(self._object(key), data)
 
     def put_if_absent(self, key: str, data: bytes) -> bool:
-        at = self._of_view(key)
-        if at is not None:
-            raise StoreFailed(key, "a packed root takes a view's files with their marker")
+        self._refuse_view(key)
         if key == keys.RECIPE and self._packs and self.inner.head(key) is None:
             # Write the layout before anything else.
             row = {"format": FORMAT, "layout": "packed"}
@@ -242,6 +235,10 @@ class LaidOutStore:
         check_key(key)
         is_of_house = key.partition("/")[0] in keys.FOLDERS
         return object_key(key) if is_of_house and self.is_packed else key
+
+    def _refuse_view(self, key: str) -> None:
+        if self._of_view(key) is not None:
+            raise StoreFailed(key, "a packed root takes a view's files with their marker")
 
     def _of_view(self, key: str) -> keys.HouseKey | None:
         """The parts of the key of a view's file or marker in a packed root, else None."""
