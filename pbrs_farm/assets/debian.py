@@ -30,10 +30,7 @@ APT_TIMEOUT_S: Final = 600  # of one download
 
 
 def cache_folder() -> Path:
-    """Folder for downloads and derived files: $PBRS_CACHE, else ~/.cache/pbrs_farm.
-
-    It may not exist yet. Everything in it can be deleted; it is downloaded or computed again.
-    """
+    """Folder for downloads and data derived from them: $PBRS_CACHE, else ~/.cache/pbrs_farm."""
     given = os.environ.get("PBRS_CACHE", "")
     return Path(given) if given else Path.home() / ".cache" / "pbrs_farm"
 
@@ -164,11 +161,7 @@ def _download(package: str, scratch: Path) -> None:
 
 
 def write_whole(path: Path, data: bytes) -> None:
-    """Write a file of the cache atomically.
-
-    It is written beside its place and renamed: a process that dies leaves the former file, or none, and of
-    two concurrent writers one wins.
-    """
+    """Write a file of the cache atomically, by renaming it into place."""
     with tempfile.NamedTemporaryFile(dir=path.parent, delete=False) as scratch:
         scratch.write(data)
     Path(scratch.name).replace(path)

@@ -104,10 +104,7 @@ def _view_from_json(row: dict[str, Any]) -> View:
 
 
 def views_from_json(data: bytes, key: str) -> dict[str, View]:
-    """View id -> view of a cameras.json, in its order.
-
-    Raises BadInput, naming the key, for a damaged file or another version's.
-    """
+    """View id -> view of a cameras.json, in its order; BadInput, naming the key, for any other content."""
     try:
         return {v["id"]: _view_from_json(v) for v in json.loads(data)["views"]}
     except (KeyError, TypeError, ValueError) as error:

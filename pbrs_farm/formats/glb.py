@@ -119,11 +119,7 @@ class GlbWriter:
         return _MAGIC + struct.pack("<II", 2, 12 + len(chunks)) + chunks
 
     def gltf(self, document: dict[str, Any], file: str) -> Gltf:
-        """The same in memory, as a parsed document.
-
-        file: name for messages. For scenes assembled by readers of other formats: they take a Gltf, whatever
-        its file.
-        """
+        """The same as a Gltf in memory, for readers of other formats; file: its name in messages."""
         return Gltf(self._whole(document), (bytes(self._binary),), file)
 
     def _whole(self, document: dict[str, Any]) -> dict[str, Any]:
@@ -176,11 +172,7 @@ def _chunks(data: bytes, length: int, file: str) -> dict[int, bytes]:
 
 
 def entry(gltf: Gltf, kind: str, index: Any) -> dict[str, Any]:
-    """document[kind][index]; BadHouse if it does not exist.
-
-    index: from the file, so of any type; a negative number, a bool or a word is invalid. Use it for every
-    reference inside an untrusted file.
-    """
+    """document[kind][index], for references inside a foreign file; BadHouse for any invalid index."""
     entries = gltf.document.get(kind, [])
     fits = isinstance(entries, list) and isinstance(index, int) and not isinstance(index, bool)
     if not fits or not 0 <= index < len(entries) or not isinstance(entries[index], dict):

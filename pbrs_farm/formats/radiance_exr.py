@@ -44,10 +44,7 @@ class RadianceExr:
     place: str  # of the file, for messages
 
     def image(self, name: str) -> F32:
-        """(H, W, 3) float32 image of that name; BadInput if the file has none.
-
-        name: "outdoor", "indoor", "albedo", "normal" or "lamp<n>", as written. Built anew on each call.
-        """
+        """(H, W, 3) float32 "outdoor", "indoor", "albedo", "normal" or "lamp<n>"; BadInput without it."""
         try:
             return np.stack([self.planes[f"{name}.{c}"] for c in _channels(name)], -1)
         except KeyError as error:

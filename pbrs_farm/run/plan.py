@@ -141,10 +141,7 @@ def step_digest(
 
 
 def leaves_out_dark_rooms(recipe: Recipe, want: Wanted, house_id: str) -> bool:
-    """Whether a house's illuminance decides which of its views are made.
-
-    Where light is wanted and the recipe chooses the cameras: a user's own are made whatever they see.
-    """
+    """True if light is wanted and the recipe chooses the cameras: then illuminance decides on views."""
     is_chosen = source_of(recipe.cameras).is_ranked and recipe.selection.min_room_lx > 0
     return is_chosen and "illuminance" in house_steps(want, house_id)
 

@@ -82,10 +82,7 @@ class PhotoSampler:
         return self._scored(placed, left, *self._first_sizes)
 
     def with_better_scores(self, rooms: Sequence[RoomCandidates]) -> list[RoomCandidates]:
-        """Score the promising candidates again from small pictures; the others have no score.
-
-        rooms: all of the house at once, from room_candidates.
-        """
+        """Score the eligible candidates of all rooms again from small pictures; others lose their score."""
         if self._first_sizes == self._sizes:
             return list(rooms)
         first = [replace(scored, verdict=scored.verdict.copy()) for scored in rooms]

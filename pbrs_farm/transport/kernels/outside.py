@@ -86,11 +86,7 @@ class Outside:
 
     @dr.syntax
     def seen(self, home: DeviceScene, o: Any, d: Any, active: Any) -> Seen:
-        """Radiance of rays that have left the home.
-
-        o: Point3f, d: unit Vector3f of rays without a hit at home. valid is False for rays without a hit
-        outside, and for inactive lanes.
-        """
+        """Outdoor surface on rays (o, d) that have left the home; valid is False without one."""
         valid, radiance, albedo = mi.Bool(False), mi.Color3f(0), mi.Color3f(0)
         # Branch: packets of lanes whose rays are all at home pass by.
         if active:

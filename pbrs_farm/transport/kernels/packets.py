@@ -9,11 +9,7 @@ import mitsuba as mi
 
 
 def gather_packets(rows: Any, index: Any, n: int, active: Any = True) -> list[Any]:
-    """The n packets of each lane's row, by its index.
-
-    rows: Float, n packets of four floats for each row; index: UInt32. Four floats per access, since the cost
-    of a gather is per access, not per byte.
-    """
+    """n packets of four floats of each lane's row, by its index: a gather costs by the access."""
     return [dr.gather(mi.Vector4f, rows, index * n + k, active) for k in range(n)]
 
 
