@@ -226,14 +226,6 @@ class CameraFields(FieldGroup):
     walk_turn_dps: float = field(60.0, "walk: degrees a second, at most", 5, 720)
     walk_shake: float = field(0.0, "walk: 1 = as a hand holds a camera", 0, 3)
     stereo_m: float = field(0.0, "baseline: a view more to the right of each; 0 = none", 0, 10)
-    file: str = field("", "camera or trajectory file of the user's, for those sources")
-    exact: bool = field(False, "score every candidate at full size")
-    walk_frames: int = field(150, "walk: views along it", 2, 100_000)
-    walk_fps: float = field(30.0, "walk: frames a second", high=1_000, above=0)
-    walk_speed_mps: float = field(0.8, "walk: of the eye, at most", 0.1, 10)
-    walk_turn_dps: float = field(60.0, "walk: degrees a second, at most", 5, 720)
-    walk_shake: float = field(0.0, "walk: 1 = as a hand holds a camera", 0, 3)
-    stereo_m: float = field(0.0, "baseline: a view more to the right of each; 0 = none", 0, 10)
 
     @property
     def source_name(self) -> str:
