@@ -32,10 +32,12 @@ GL: Final = "GL"
 """The part whose lack leaves path tracing and takes the two OpenGL modes."""
 _EXCEPTION: Final = re.compile(r"^(pbrs_farm\.[\w.]+|\w+Error): ")  # before a traceback's last text
 
+# fmt: off
 _PACKAGES: Final = (
     "numpy", "pydantic", "mitsuba", "drjit", "moderngl", "trimesh", "manifold3d", "pyoidn",
     "OpenImageIO", "shapely",
-)  # fmt: skip
+)
+# fmt: on
 _GIVES: Final = {
     "LLVM": GIVES["llvm"],
     "mitsuba cuda_ad_rgb": "light of a view in a second or two",

@@ -15,22 +15,29 @@ from typing import Final
 
 from pbrs_farm.core.errors import MachineFailed
 
+# fmt: off
 EXTRA_OF: Final = {
     "moderngl": "", "glcontext": "", "mitsuba": "", "drjit": "", "pyoidn": "", "obstore": "s3", "celery": "workers", "kombu": "workers",
     "redis": "workers", "prometheus_client": "workers", "h5py": "selection", "faiss": "selection",
     "starlette": "board", "uvicorn": "board", "torch": "study", "av": "video", "pxr": "usd",
     "ifcopenshell": "ifc", "DracoPy": "gltf", "opengl_basisu": "gltf", "mujoco": "physics", "coacd": "physics",
     "onnx": "study", "onnxscript": "study", "tensorboard": "tensorboard", "wandb": "wandb",
-}  # fmt: skip
+}
+# fmt: on
 """Module -> the extra of pyproject.toml that installs it; "" where every installation has it."""
 
 GIVES: Final = {
     "llvm": "light and labels several times faster, where the system has no LLVM",
-    "s3": "stores on S3", "workers": "a farm of many machines", "board": "a run in a browser",
-    "selection": "choosing views by photographs", "video": "films of walks",
-    "physics": "models that fall and lie", "usd": "homes from and to USD", "ifc": "homes from IFC",
+    "s3": "stores on S3",
+    "workers": "a farm of many machines",
+    "board": "a run in a browser",
+    "selection": "choosing views by photographs",
+    "video": "films of walks",
+    "physics": "models that fall and lie",
+    "usd": "homes from and to USD",
+    "ifc": "homes from IFC",
     "gltf": "packed meshes and textures of glTF",
-}  # fmt: skip
+}
 """Extra that a user may want -> what it gives."""
 
 # System -> what is needed -> the command that installs it.

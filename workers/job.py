@@ -60,17 +60,28 @@ class FarmOptions(Record):
 
     gpu: bool = option(False, "light goes to the queue light.gpu")
     priority: int = option(
-        DEFAULT_PRIORITY, f"0 goes first, {LEAST_URGENT} last", ge=0, le=LEAST_URGENT,
+        DEFAULT_PRIORITY,
+        f"0 goes first, {LEAST_URGENT} last",
+        ge=0,
+        le=LEAST_URGENT,
         choices=tuple(range(LEAST_URGENT + 1)),
-    )  # fmt: skip
+    )
     max_slots: int = option(
-        0, "at most N of its tasks in flight at once (0: as many as there are slots)", ge=0,
-        metavar="N", least=0,
-    )  # fmt: skip
+        0,
+        "at most N of its tasks in flight at once (0: as many as there are slots)",
+        ge=0,
+        metavar="N",
+        least=0,
+    )
     budget_h: float = option(
-        0.0, "slot-hours after which it pauses itself (0: none)", ge=0,
-        name="budget", metavar="HOURS", least=0, expected="slot-hours, 0 or more",
-    )  # fmt: skip
+        0.0,
+        "slot-hours after which it pauses itself (0: none)",
+        ge=0,
+        name="budget",
+        metavar="HOURS",
+        least=0,
+        expected="slot-hours, 0 or more",
+    )
     after: tuple[str, ...] = option((), "begin when this job is done, repeatable", metavar="JOB")
     preempt: bool = option(
         False, "urgent: running tasks of other jobs make room, and keep what they have rendered"

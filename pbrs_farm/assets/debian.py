@@ -149,8 +149,12 @@ def _download(package: str, scratch: Path) -> None:
     try:
         done = subprocess.run(
             ["apt-get", "download", package],
-            cwd=scratch, capture_output=True, text=True, timeout=APT_TIMEOUT_S, check=False,
-        )  # fmt: skip
+            cwd=scratch,
+            capture_output=True,
+            text=True,
+            timeout=APT_TIMEOUT_S,
+            check=False,
+        )
     except (OSError, subprocess.TimeoutExpired) as error:
         raise MachineFailed(f"apt-get download {package}: {error}", hint=_HINT) from None
     if done.returncode != 0:

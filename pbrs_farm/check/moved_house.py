@@ -133,8 +133,9 @@ def _move_row(row: dict[str, Any], pose: F64) -> None:
     if row.get("joints"):
         row["joints"] = [
             {
-                **joint, "axis": (turn @ np.array(joint["axis"])).tolist(),
+                **joint,
+                "axis": (turn @ np.array(joint["axis"])).tolist(),
                 "point": (turn @ np.array(joint["point"]) + pose[:3, 3]).tolist(),
             }
             for joint in row["joints"]
-        ]  # fmt: skip
+        ]

@@ -150,9 +150,12 @@ def _dress(args: argparse.Namespace) -> int:
     glb, description = bundle_from_house(house)
     text = attribution_text([house.source.attribution], report.credits)
     files = {
-        "house.glb": glb, "house.json": description, keys.DRESS: json_bytes(report),
-        "repair.json": json_bytes(repairs), keys.ATTRIBUTION: text.encode(),
-    }  # fmt: skip
+        "house.glb": glb,
+        "house.json": description,
+        keys.DRESS: json_bytes(report),
+        "repair.json": json_bytes(repairs),
+        keys.ATTRIBUTION: text.encode(),
+    }
     files = {name: data for name, data in files.items() if data}
     files |= pictures
     for name, data in files.items():

@@ -176,10 +176,11 @@ def _asked_for(args: argparse.Namespace) -> tuple[list[MadeHome], Programme | No
     given = [f"--{k}" for k in ("rooms", "area", "offices") if args.programme and getattr(args, k)]
     if args.programme and args.storeys not in (None, "1"):
         raise BadInput(
-            "--programme", str(args.programme),
+            "--programme",
+            str(args.programme),
             "names the rooms of one storey and not which of them lie above",
             hint="leave out --storeys, or ask for a house by --storeys 2 --rooms 2..4 --area 90..150",
-        )  # fmt: skip
+        )
     if given:
         raise BadInput("--programme", str(args.programme), f"leaves no choice of {given[0]}")
     if args.seed < 0:

@@ -188,10 +188,15 @@ def packing_of(
     if quality and not quality.isdigit():
         raise BadInput("--colour", options.colour, "expected png, jpeg or jpeg:QUALITY")
     return Packing(
-        size=size_of(options.size), layers=options.layers or LAYERS, shares=shares,
-        modes=options.modes or tuple(modes), views_per_shard=options.shard_size, colour=colour,
-        quality=int(quality or 95), seed=seed,
-    )  # fmt: skip
+        size=size_of(options.size),
+        layers=options.layers or LAYERS,
+        shares=shares,
+        modes=options.modes or tuple(modes),
+        views_per_shard=options.shard_size,
+        colour=colour,
+        quality=int(quality or 95),
+        seed=seed,
+    )
 
 
 def _count_classes(args: argparse.Namespace) -> int:

@@ -247,16 +247,22 @@ def _summary_line(summary: Summary, seconds: float) -> str:
     """The run's outcome as one line of JSON."""
     failures = [dict(zip(("what", "message", "command"), f, strict=True)) for f in summary.failures]
     row = {
-        "event": "summary", "houses": summary.houses, "views": summary.n_views,
-        "steps_done": summary.n_done, "steps_kept": summary.n_kept,
-        "seconds": round(seconds, 1), "peak_mb": round(summary.peak_mb),
+        "event": "summary",
+        "houses": summary.houses,
+        "views": summary.n_views,
+        "steps_done": summary.n_done,
+        "steps_kept": summary.n_kept,
+        "seconds": round(seconds, 1),
+        "peak_mb": round(summary.peak_mb),
         "without_views": [list(pair) for pair in summary.without_views],
         "left_out": [list(pair) for pair in summary.left_out],
-        "dark": [list(pair) for pair in summary.dark], "failures": failures,
+        "dark": [list(pair) for pair in summary.dark],
+        "failures": failures,
         "leaks": [list(pair) for pair in summary.leaks],
-        "walls_lost": [list(pair) for pair in summary.walls_lost], "notes": dict(summary.notes),
+        "walls_lost": [list(pair) for pair in summary.walls_lost],
+        "notes": dict(summary.notes),
         "lacking": summary.lacking,
-    }  # fmt: skip
+    }
     return json.dumps(row)
 
 
@@ -343,9 +349,14 @@ def _step(args: argparse.Namespace) -> int:
     (source,) = variants(resolve(args.home, models=args.models), [args.dress or recipe.dress.seed])
     # One process, one house: the cache keeps it for all steps.
     work = Work(
-        store=store, recipe=recipe, house_id=source.house_id, house_cache=HouseCache(), source=source,
-        view_id=args.view, layers=tuple(args.layers),
-    )  # fmt: skip
+        store=store,
+        recipe=recipe,
+        house_id=source.house_id,
+        house_cache=HouseCache(),
+        source=source,
+        view_id=args.view,
+        layers=tuple(args.layers),
+    )
     # Make first what the step needs of its house, where it is missing.
     for name in needed_of_house(args.step, source.house_id):
         run_step(name, replace(work, view_id=None))

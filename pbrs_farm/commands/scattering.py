@@ -100,13 +100,22 @@ def _scatter(args: argparse.Namespace) -> int:
         for home in _homes_of(args.homes, recipe, seeds):
             for seed in range(recipe.seed, recipe.seed + args.scenes):
                 scene = home.scatter(
-                    found, args.count, on=args.on or None, in_=args.room, seed=seed,
-                    physics=args.physics, floating=args.floating,
-                )  # fmt: skip
+                    found,
+                    args.count,
+                    on=args.on or None,
+                    in_=args.room,
+                    seed=seed,
+                    physics=args.physics,
+                    floating=args.floating,
+                )
                 cameras = scene.cameras_around(
-                    n=args.views, distance_m=distance, min_visible=args.visible, size=size,
-                    K=k, seed=seed,
-                )  # fmt: skip
+                    n=args.views,
+                    distance_m=distance,
+                    min_visible=args.visible,
+                    size=size,
+                    K=k,
+                    seed=seed,
+                )
                 notes.update(note.kind for note in scene.house.notes)
                 left = [c for c in cameras if (scene.id, c.id) not in there]
                 n_kept += len(cameras) - len(left)

@@ -340,8 +340,10 @@ def _worker(args: argparse.Namespace) -> int:
     from workers.node.supervisor import main
 
     given = {
-        "--until": args.until, "--until-idle": args.until_idle, "--preempted-code": args.preempted_code,
-    }  # fmt: skip
+        "--until": args.until,
+        "--until-idle": args.until_idle,
+        "--preempted-code": args.preempted_code,
+    }
     return main(
         [word for name, value in given.items() if value is not None for word in (name, str(value))]
     )

@@ -220,8 +220,11 @@ def _is_listed(value: Any) -> bool:
 
 
 _WORDS: Final = {
-    int: "a whole number", float: "a finite number", str: "text", bool: "True or False",
-}  # fmt: skip
+    int: "a whole number",
+    float: "a finite number",
+    str: "text",
+    bool: "True or False",
+}
 
 
 def words_of(hint: Any) -> str:

@@ -136,11 +136,13 @@ _SENTENCES: Final = {
     "literal_error": "expected {expected}",
     "enum": "expected {expected}",
 }
+# fmt: off
 _WANTED: Final = {
     "string": "a text", "int": "a whole number", "float": "a number", "bool": "true or false",
     "list": "a list", "tuple": "a list", "set": "a list", "frozen": "a list", "none": "null",
     "dict": "an object", "model": "an object", "dataclass": "an object", "mapping": "an object",
-}  # fmt: skip
+}
+# fmt: on
 
 
 def sentence(fault: ErrorDetails) -> str:

@@ -30,6 +30,7 @@ def _kind(start: bytes, words: str, suffixes: str = "", hint: str = "") -> FileK
 
 
 _UNPACK: Final = "unpack it"
+# fmt: off
 _KINDS: Final = (
     _kind(rb"\x89PNG\r\n\x1a\n", "a PNG picture", ".png"),
     _kind(rb"\xff\xd8\xff", "a JPEG picture", ".jpg .jpeg .jpe"),
@@ -66,7 +67,8 @@ _KINDS: Final = (
           "the address that it came from gives a page: fetch the file itself"),
     _kind(rb"version https://git-lfs\.github\.com/spec", "a pointer of Git LFS", "",
           "`git lfs pull` fetches the file that it stands for"),
-)  # fmt: skip
+)
+# fmt: on
 
 
 def kind_of(data: bytes) -> FileKind | None:

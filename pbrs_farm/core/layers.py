@@ -18,10 +18,12 @@ from pbrs_farm.core.plugins import plugins
 # colour per id. "mask": light on dark. "depth": a ramp of depth in mm, "depth_m" in metres,
 # "disparity" the inverse. "flow", "flow_kitti": hue by direction. "high_byte": of 16 bits per
 # channel. "range": each channel scaled to its range in the picture. "": not a picture.
+# fmt: off
 ShownAs: TypeAlias = Literal[
     "", "picture", "classes", "ids", "mask", "depth", "depth_m", "disparity", "flow", "flow_kitti",
     "high_byte", "range",
-]  # fmt: skip
+]
+# fmt: on
 
 # How an export changes its size: by the nearest pixel, by area, lines kept whole, and what measures
 # pixels of the picture itself in those of the new size.
@@ -90,9 +92,18 @@ def _truth_layer(
 
 def _picture_layer(name: str, step: str, title: str = "", *, optional: bool = False) -> Layer:
     return Layer(
-        name, f"{name}.png", "RGB", "uint8", "sRGB", "-", step, optional,
-        shown_as="picture", resized="area", title=title,
-    )  # fmt: skip
+        name,
+        f"{name}.png",
+        "RGB",
+        "uint8",
+        "sRGB",
+        "-",
+        step,
+        optional,
+        shown_as="picture",
+        resized="area",
+        title=title,
+    )
 
 
 def optional_layer(
@@ -116,8 +127,17 @@ def optional_layer(
     """
     shown_as = shown_as or ("picture" if dtype == "uint8" else "range")
     return _truth_layer(
-        name, channels, dtype, unit, nodata, file, optional=True, needs=needs, shown_as=shown_as, resized=resized
-    )  # fmt: skip
+        name,
+        channels,
+        dtype,
+        unit,
+        nodata,
+        file,
+        optional=True,
+        needs=needs,
+        shown_as=shown_as,
+        resized=resized,
+    )
 
 
 _along_axis: Final = partial(optional_layer, needs="planar depth")
@@ -133,13 +153,39 @@ def _flow(name: str, partner: str) -> tuple[Layer, ...]:
     unit = f"px right, px down, to the {partner} frame"
     kitti = "64 x + 2^15, 64 y + 2^15, 1 = seen there (KITTI)"
     return (
-        _between(f"flow_{name}", partner, "X Y", "float16", unit, "0, 0", ending="exr",
-                 shown_as="flow", resized="pixels"),
-        _between(f"flow_{name}_kitti", partner, "RGB", "uint16", kitti, "0 in all three",
-                 shown_as="flow_kitti", resized="pixels", version=_REACH_VERSION),
-        _between(f"occlusion_{name}", partner, "Y", "uint8", _SEEN_THERE, "128", shown_as="mask",
-                 version=_REACH_VERSION),
-    )  # fmt: skip
+        _between(
+            f"flow_{name}",
+            partner,
+            "X Y",
+            "float16",
+            unit,
+            "0, 0",
+            ending="exr",
+            shown_as="flow",
+            resized="pixels",
+        ),
+        _between(
+            f"flow_{name}_kitti",
+            partner,
+            "RGB",
+            "uint16",
+            kitti,
+            "0 in all three",
+            shown_as="flow_kitti",
+            resized="pixels",
+            version=_REACH_VERSION,
+        ),
+        _between(
+            f"occlusion_{name}",
+            partner,
+            "Y",
+            "uint8",
+            _SEEN_THERE,
+            "128",
+            shown_as="mask",
+            version=_REACH_VERSION,
+        ),
+    )
 
 
 _REACH_VERSION: Final = (
@@ -171,9 +217,18 @@ def _intrinsic(ending: str, of: str) -> tuple[Layer, ...]:
 
     def layer(name: str, unit: str, beside: tuple[str, ...]) -> Layer:
         return Layer(
-            name, f"{name}.exr", "R G B", "float16", unit, "0", "develop", optional=True,
-            shown_as="range", resized="area", beside=beside,
-        )  # fmt: skip
+            name,
+            f"{name}.exr",
+            "R G B",
+            "float16",
+            unit,
+            "0",
+            "develop",
+            optional=True,
+            shown_as="range",
+            resized="area",
+            beside=beside,
+        )
 
     unit = f"W m-2 sr-1, linear sRGB: of {of}"
     return (
@@ -183,6 +238,7 @@ def _intrinsic(ending: str, of: str) -> tuple[Layer, ...]:
 
 
 # Layers that every view has, and (optional) those written when --layers names them.
+# fmt: off
 OWN_LAYERS: Final[tuple[Layer, ...]] = (
     # The pictures of the four lighting modes, and what two of them are developed from.
     _picture_layer("opengl_dl", "opengl_dl", "OpenGL, directional"),
@@ -287,7 +343,8 @@ OWN_LAYERS: Final[tuple[Layer, ...]] = (
     ),
     _between("disparity", "stereo", "Y", "uint16", "256 x px between the pictures of a pair (KITTI)", needs="rows", shown_as="disparity", resized="pixels"),
     _between("occlusion_stereo", "stereo", "Y", "uint8", _SEEN_THERE, "128", shown_as="mask", version=_REACH_VERSION),
-)  # fmt: skip
+)
+# fmt: on
 
 
 def _of_plugins() -> tuple[Layer, ...]:

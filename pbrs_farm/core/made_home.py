@@ -23,9 +23,7 @@ MAX_HOMES: Final = 1_000_000
 STYLES: Final = ("classic", "mixed", "modern", "nordic", "vintage")
 """Of furniture; none named: one of them by seed."""
 
-PLANS: Final = (
-    "flat", "alpine", "japanese", "loft", "mediterranean", "nordic", "old_town", "us",
-)  # fmt: skip
+PLANS: Final = ("flat", "alpine", "japanese", "loft", "mediterranean", "nordic", "old_town", "us")
 """Families of plans (generate/plan_families.toml); none named: one of them by seed."""
 
 _AREA_OF_HOMES: Final = ((28, 60), (36, 85), (48, 115), (62, 150), (76, 180))
@@ -164,10 +162,11 @@ def check_wishes(
     if area[1] < least or area[0] > most:
         of = f"{low}" if low == high else f"{low} to {high}"
         raise BadInput(
-            "area", f"{area[0]:g}..{area[1]:g}",
+            "area",
+            f"{area[0]:g}..{area[1]:g}",
             f"homes of {of} bedrooms have {least:g} to {most:g} m2",
             hint=f"area={least:g}..{most:g}",
-        )  # fmt: skip
+        )
 
 
 def _one_of(names: tuple[str, ...], word: str, option: str, text: str) -> str:

@@ -55,6 +55,7 @@ _ASPECT_ERROR: Final = 0.01  # of a picture's width, against the lens's own pict
 Pixels = Annotated[float, Field(ge=0, le=1e6)]
 Coefficient = Annotated[float, Field(ge=-1e3, le=1e3)]
 
+# fmt: off
 LENS_PRESETS: Final[Mapping[str, Mapping[str, Any]]] = {
     "none": {},
     # The colour camera of NYUv2's Kinect: camera_params.m of its toolbox, Silberman et al. 2012.
@@ -84,7 +85,8 @@ LENS_PRESETS: Final[Mapping[str, Mapping[str, Any]]] = {
         "model": "fisheye", "width_px": 512, "height_px": 512, "hfov_deg": 180.0,
         "max_angle_deg": 90.0,
     },
-}  # fmt: skip
+}
+# fmt: on
 """Fields that a preset sets where the user does not."""
 
 
@@ -206,6 +208,7 @@ def fold_of(i: Intrinsics) -> str | None:
     return f"the distortion folds the picture at {math.degrees(angle):.1f} degrees: {where}; {hint}"
 
 
+# fmt: off
 SENSOR_PRESETS: Final[Mapping[str, Mapping[str, Any]]] = {
     "none": {},
     # The colour camera of a first Kinect: a 1/4 inch CMOS of 2.8 um at 640 x 480, no JPEG.
@@ -233,7 +236,8 @@ SENSOR_PRESETS: Final[Mapping[str, Mapping[str, Any]]] = {
         "full_well_e": 4_000, "read_noise_e": 5.0, "bits": 8, "vignetting": 0.35,
         "aberration_px": 1.2, "jpeg_quality": 60, "headroom": 1.6,
     },
-}  # fmt: skip
+}
+# fmt: on
 """Typical numbers of each kind of camera, none a product's measured ones but Kinect's size and rate."""
 
 

@@ -34,6 +34,7 @@ class CameraRow:
 
 # Typical behaviour of each kind, none a product's measured one. Errors of exposure are in stops, of
 # white balance in stops of red over blue (warmth) and of green over both (tint).
+# fmt: off
 CAMERAS: Final[Mapping[str, CameraRow]] = {
     NEUTRAL: CameraRow("a good camera's JPEG, the same for each view"),
     "phone": CameraRow(
@@ -62,7 +63,8 @@ CAMERAS: Final[Mapping[str, CameraRow]] = {
         spread={"exposure_ev": 0.4, "warmth_ev": 0.25, "tint_ev": 0.1, "contrast": 0.1},
         sensor="kinect",
     ),
-}  # fmt: skip
+}
+# fmt: on
 
 ERRING: Final = tuple(name for name, row in CAMERAS.items() if row.spread)
 """The cameras that `drawn` and variants choose from: all but `neutral`."""

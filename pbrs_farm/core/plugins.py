@@ -16,9 +16,11 @@ from pbrs_farm.core.errors import BadInput, MachineFailed
 from pbrs_farm.core.number_ranges import range_of
 from pbrs_farm.core.shown_text import hint_of_choice
 
+# fmt: off
 GROUPS: Final = (
     "homes", "readers", "layers", "cameras", "passes", "furniture", "pictures", "exports",
-)  # fmt: skip
+)
+# fmt: on
 """Of entry points, each `pbrs_farm.<group>`; docs/plugins.md says what each function takes."""
 
 PREFIX: Final = "plugin:"

@@ -27,9 +27,14 @@ Share = Annotated[float, Field(ge=0, le=1)]
 
 
 def field(
-    default: Any, text: str | None = None, low: float | None = None, high: float | None = None,
-    *, above: float | None = None, below: float | None = None,
-) -> Any:  # fmt: skip
+    default: Any,
+    text: str | None = None,
+    low: float | None = None,
+    high: float | None = None,
+    *,
+    above: float | None = None,
+    below: float | None = None,
+) -> Any:
     """A field with its description and limits: low <= value <= high, above < value < below."""
     return Field(default, description=text, ge=low, le=high, gt=above, lt=below)
 
@@ -115,9 +120,10 @@ class DressFields(FieldGroup):
         "", max_length=256, description="plugins' passes after our own, ':' between"
     )
     catalogue: str = Field(
-        "", max_length=4096,
+        "",
+        max_length=4096,
         description="libraries beside the furniture package, ':' between; `generated` = no package",
-    )  # fmt: skip
+    )
 
 
 class RepairFields(FieldGroup):

@@ -203,9 +203,11 @@ class _Examples:
         nearest = dict.fromkeys((row["colour_reference"], row["depth_reference"]))
         neighbours = {name: self._neighbour(name) for name in nearest}
         return {
-            "row": row, "pictures": pictures, "histograms": self._histograms(row),
+            "row": row,
+            "pictures": pictures,
+            "histograms": self._histograms(row),
             "neighbours": neighbours,
-        }  # fmt: skip
+        }
 
     def _neighbour(self, name: str) -> str:
         """A photograph's thumbnail as a data URL, "" where it is not here or cannot be read."""

@@ -174,20 +174,26 @@ def _join_surfaces(some: list[Surface]) -> Surface:
     return replace(
         some[0],
         positions=np.concatenate([s.positions for s in some]),
-        faces=np.concatenate([s.faces + n for s, n in zip(some, starts, strict=False)]).astype(np.int32),
+        faces=np.concatenate([s.faces + n for s, n in zip(some, starts, strict=False)]).astype(
+            np.int32
+        ),
         uvs=np.concatenate(uvs) if len(uvs) == len(some) else None,
         normals=np.concatenate(normals) if len(normals) == len(some) else None,
-    )  # fmt: skip
+    )
 
 
 def _finish_appliance(house: MutableHouse, item: Item, scheme: FinishScheme) -> Item:
     # The body alone: plates, doors and panels keep their glass and black.
     areas = [float(face_areas(triangle_corners(s.positions, s.faces)).sum()) for s in item.surfaces]
     return _finish_some(
-        house, item, scheme.appliance,
-        [a >= _FRONT_SHARE * sum(areas) and _is_bright(house, s)
-         for a, s in zip(areas, item.surfaces, strict=True)],
-    )  # fmt: skip
+        house,
+        item,
+        scheme.appliance,
+        [
+            a >= _FRONT_SHARE * sum(areas) and _is_bright(house, s)
+            for a, s in zip(areas, item.surfaces, strict=True)
+        ],
+    )
 
 
 def _finish_mirror_frame(house: MutableHouse, item: Item, scheme: FinishScheme) -> Item:

@@ -29,9 +29,13 @@ _GAP_M = 0.0005
 
 
 def hang_from_ceiling(
-    house: MutableHouse, catalogue: Catalogue, style: Style, room_id: str, flux_lm: float,
+    house: MutableHouse,
+    catalogue: Catalogue,
+    style: Style,
+    room_id: str,
+    flux_lm: float,
     rng: np.random.Generator,
-) -> bool:  # fmt: skip
+) -> bool:
     """Hang one lamp of that flux; False, and a reason counted, where there is no place for it."""
     space = house_space(house)
     room = space.room(room_id)
@@ -52,9 +56,15 @@ def hang_from_ceiling(
             lit = with_flux(shape, flux_lm)
             turn = float(rng.choice([0.0, np.pi / 2]))
             item = house.placed(
-                piece, lit, at, turn, item_id=next_id(house, PASS), room_id=room_id,
-                level_id=room.room.level_id, scale=factor,
-            )  # fmt: skip
+                piece,
+                lit,
+                at,
+                turn,
+                item_id=next_id(house, PASS),
+                room_id=room_id,
+                level_id=room.room.level_id,
+                scale=factor,
+            )
             house.add(item, PASS, piece)
             return True
     house.refused[f"{PASS}: no place under the ceiling"] += 1

@@ -99,9 +99,14 @@ def _stretches(floor: RoomFloor, free_m: float) -> Sequence[_Stretch]:
 
 
 def _put(
-    house: MutableHouse, catalogue: Catalogue, floor: RoomFloor, stretch: _Stretch, piece: Piece,
-    kind: _Filling, part: str,
-) -> bool:  # fmt: skip
+    house: MutableHouse,
+    catalogue: Catalogue,
+    floor: RoomFloor,
+    stretch: _Stretch,
+    piece: Piece,
+    kind: _Filling,
+    part: str,
+) -> bool:
     """Put the piece at its stretch of wall; False where it would be in the way there."""
     wide, deep, tall = piece.size
     if floor.is_too_full(stretch.length * deep):
@@ -116,10 +121,18 @@ def _put(
     at = stretch.face.point(middle, room.floor_y + _LIFT_M, OUT_M - float(shape.bounds[0][2]))
     house.add(
         house.placed(
-            piece, shape, at, stretch.face.turn_rad, item_id=next_id(house, part),
-            room_id=room.id, level_id=room.level_id, scale=scale,
-        ), part, piece,
-    )  # fmt: skip
+            piece,
+            shape,
+            at,
+            stretch.face.turn_rad,
+            item_id=next_id(house, part),
+            room_id=room.id,
+            level_id=room.level_id,
+            scale=scale,
+        ),
+        part,
+        piece,
+    )
     floor.take(spot.body, spot.front)
     floor.wall_m -= stretch.length
     return True

@@ -56,25 +56,40 @@ def finish_scheme(house: MutableHouse, style: Style) -> FinishScheme:
         railing=_railing_finish(rng, style, trim),
         fitting=Finish("fitting", metal=style.metal),
         radiator=_radiator_finish(rng, trim),
-        pipe=_pick_by_share(rng, (0.5, _white_finish(rng)), (0.25, _metal_finish("brushed steel")), (0.25, _metal_finish("copper"))),
+        pipe=_pick_by_share(
+            rng,
+            (0.5, _white_finish(rng)),
+            (0.25, _metal_finish("brushed steel")),
+            (0.25, _metal_finish("copper")),
+        ),
         appliance=_appliance_finish(rng),
         spotlight=_pick_by_share(
-            rng, (0.35, _metal_finish("brushed steel")), (0.2, _metal_finish("black steel")), (0.2, _white_finish(rng)),
+            rng,
+            (0.35, _metal_finish("brushed steel")),
+            (0.2, _metal_finish("black steel")),
+            (0.2, _white_finish(rng)),
             (0.25, Finish("metal", metal=style.metal)),
         ),
         stone=Finish("stone", aged(rng, _pick(rng, COLOURS["stones"])), 0.6),
         render=Finish("render", aged(rng, _pick(rng, COLOURS["renders"])), 0.85),
-        plaster=Finish("plaster", aged(rng, _pick(rng, (*COLOURS["whites"], *COLOURS["greys"][:3], *COLOURS["renders"]))), 0.7),
-    )  # fmt: skip
+        plaster=Finish(
+            "plaster",
+            aged(rng, _pick(rng, (*COLOURS["whites"], *COLOURS["greys"][:3], *COLOURS["renders"]))),
+            0.7,
+        ),
+    )
 
 
 def _trim_finish(rng: np.random.Generator, style: Style) -> Finish:
     wood = style.wood if rng.random() < 0.5 else WOODS[_pick(rng, WOODS_FOR.trim)]
     grey, painted = aged(rng, _pick(rng, COLOURS["greys"])), _paint_colour(rng, style)
     return _pick_by_share(
-        rng, (0.5, _white_finish(rng)), (0.12, Finish("paint", grey)), (0.12, Finish("paint", painted)),
+        rng,
+        (0.5, _white_finish(rng)),
+        (0.12, Finish("paint", grey)),
+        (0.12, Finish("paint", painted)),
         (0.26, Finish("wood", wood=wood)),
-    )  # fmt: skip
+    )
 
 
 def _leaf_finish(rng: np.random.Generator, style: Style, trim: Finish) -> Finish:
@@ -106,9 +121,13 @@ def _stair_finish(rng: np.random.Generator, style: Style, trim: Finish) -> Finis
 
 def _railing_finish(rng: np.random.Generator, style: Style, trim: Finish) -> Finish:
     return _pick_by_share(
-        rng, (0.3, trim), (0.22, _metal_finish("black steel")), (0.18, _metal_finish("brushed steel")),
-        (0.08, Finish("metal", metal=style.metal)), (0.22, Finish("wood", wood=style.wood)),
-    )  # fmt: skip
+        rng,
+        (0.3, trim),
+        (0.22, _metal_finish("black steel")),
+        (0.18, _metal_finish("brushed steel")),
+        (0.08, Finish("metal", metal=style.metal)),
+        (0.22, Finish("wood", wood=style.wood)),
+    )
 
 
 def _radiator_finish(rng: np.random.Generator, trim: Finish) -> Finish:

@@ -16,10 +16,12 @@ HEIGHT: Final = 0.15  # greatest difference in height, as a share of the old one
 SCALE: Final = (0.8, 1.25)  # models are of their true size
 STRETCH: Final = 1.2
 ALIKE: Final = 0.93
+# fmt: off
 MADE_OF_BOARDS: Final = frozenset(
     {"bed", "desk", "nightstand", "tv_stand", "bookcase", "shelves", "wardrobe", "dresser",
      "cabinet", "dining_table", "coffee_table", "fridge", "washer"}
-)  # fmt: skip
+)
+# fmt: on
 
 Scale = tuple[float, float, float]  # along a piece's width, height, depth
 

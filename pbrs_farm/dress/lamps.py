@@ -97,9 +97,14 @@ def _stand_lamp(
     house: MutableHouse, room: RoomSpace, piece: Piece, shape: Shape, at: F64, turn_rad: float
 ) -> None:
     item = house.placed(
-        piece, shape, at, turn_rad, item_id=next_id(house, PASS), room_id=room.room.id,
+        piece,
+        shape,
+        at,
+        turn_rad,
+        item_id=next_id(house, PASS),
+        room_id=room.room.id,
         level_id=room.room.level_id,
-    )  # fmt: skip
+    )
     house.add(item, PASS, piece)
 
 
@@ -137,7 +142,9 @@ def _floor_is_free(
         return False
     for door in room.doors:
         side = door.side_of(room.room.id)
-        if side is not None and (door.before(side).intersects(disc) or door.swing(side).intersects(disc)):  # fmt: skip
+        if side is not None and (
+            door.before(side).intersects(disc) or door.swing(side).intersects(disc)
+        ):
             return False
     around = radius + 0.02
     low = np.array([place[0] - around, room.room.floor_y + 0.02, place[1] - around])

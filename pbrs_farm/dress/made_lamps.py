@@ -20,7 +20,9 @@ _O = np.zeros(3)
 def ceiling_dome(rng: np.random.Generator, style: Style) -> tuple[Piece, Shape]:
     """A flat opal dish under the ceiling that shines as a whole."""
     r = float(rng.uniform(0.16, 0.24))
-    plate = lathe("plate", np.array([[0, 0.09], [r + 0.01, 0.09], [r + 0.01, 0.11], [0, 0.11]]), _O, 0, n=40)  # fmt: skip
+    plate = lathe(
+        "plate", np.array([[0, 0.09], [r + 0.01, 0.09], [r + 0.01, 0.11], [0, 0.11]]), _O, 0, n=40
+    )
     t = np.linspace(0, np.pi / 2, 9)
     dish = np.stack([r * np.sin(t), 0.085 * (1 - np.cos(t))], -1)
     dish[0, 0] = 0.0
@@ -34,7 +36,15 @@ def globe_pendant(rng: np.random.Generator, style: Style) -> tuple[Piece, Shape]
     """An opal ball on a cord."""
     r, height = float(rng.uniform(0.11, 0.17)), 0.5
     ball = sphere("opal", np.array([0, r, 0]), r, 1, n=32)
-    return _lamp_of("globe_pendant", Place.CEILING, (_cord(2 * r, height), ball), style, emitting=1, at=r, radius=r)  # fmt: skip
+    return _lamp_of(
+        "globe_pendant",
+        Place.CEILING,
+        (_cord(2 * r, height), ball),
+        style,
+        emitting=1,
+        at=r,
+        radius=r,
+    )
 
 
 def shade_pendant(rng: np.random.Generator, style: Style) -> tuple[Piece, Shape]:
@@ -45,7 +55,9 @@ def shade_pendant(rng: np.random.Generator, style: Style) -> tuple[Piece, Shape]
     shell = lathe("shade", np.concatenate([inside, outside, inside[:1]]), _O, 2, n=40)
     bulb = sphere("bulb", np.array([0, 0.3 * tall, 0]), 0.035, 1, n=24)
     parts = (_cord(tall, height), bulb, shell)
-    return _lamp_of("shade_pendant", Place.CEILING, parts, style, emitting=1, at=0.3 * tall, radius=0.035)  # fmt: skip
+    return _lamp_of(
+        "shade_pendant", Place.CEILING, parts, style, emitting=1, at=0.3 * tall, radius=0.035
+    )
 
 
 def floor_lamp(rng: np.random.Generator, style: Style) -> tuple[Piece, Shape]:
@@ -56,7 +68,9 @@ def floor_lamp(rng: np.random.Generator, style: Style) -> tuple[Piece, Shape]:
     )
     pole = lathe("pole", foot, _O, 0, n=32)
     ball = sphere("opal", np.array([0, height + r - 0.01, 0]), r, 1, n=32)
-    return _lamp_of("floor_lamp", Place.FLOOR, (pole, ball), style, emitting=1, at=height + r, radius=r)  # fmt: skip
+    return _lamp_of(
+        "floor_lamp", Place.FLOOR, (pole, ball), style, emitting=1, at=height + r, radius=r
+    )
 
 
 def table_lamp(rng: np.random.Generator, style: Style) -> tuple[Piece, Shape]:
@@ -65,7 +79,9 @@ def table_lamp(rng: np.random.Generator, style: Style) -> tuple[Piece, Shape]:
     foot = np.array([[0, 0], [0.07, 0], [0.07, 0.012], [0.02, 0.03], [0.02, 0.16], [0, 0.16]])
     body = lathe("foot", foot, _O, 0, n=32)
     ball = sphere("opal", np.array([0, 0.15 + r, 0]), r, 1, n=32)
-    return _lamp_of("table_lamp", Place.SURFACE, (body, ball), style, emitting=1, at=0.15 + r, radius=r)  # fmt: skip
+    return _lamp_of(
+        "table_lamp", Place.SURFACE, (body, ball), style, emitting=1, at=0.15 + r, radius=r
+    )
 
 
 def _cord(low: float, high: float) -> Surface:
@@ -82,9 +98,15 @@ def _cord(low: float, high: float) -> Surface:
 
 
 def _lamp_of(
-    family: str, place: Place, surfaces: tuple[Surface, ...], style: Style, *,
-    emitting: int, at: float, radius: float,
-) -> tuple[Piece, Shape]:  # fmt: skip
+    family: str,
+    place: Place,
+    surfaces: tuple[Surface, ...],
+    style: Style,
+    *,
+    emitting: int,
+    at: float,
+    radius: float,
+) -> tuple[Piece, Shape]:
     dark = (0.03, 0.03, 0.03)
     metal = Material(
         style.metal.name, diffuse=dark, specular=style.metal.colour, roughness=style.metal.roughness
@@ -100,9 +122,15 @@ def _lamp_of(
     group = {Place.CEILING: "ceiling_lamp", Place.FLOOR: "floor_lamp"}.get(place, "table_lamp")
     name = family.replace("_", " ").capitalize()
     piece = Piece(
-        f"generated#{family}", name, group, place, LAMP, (w, d, h), ItemKind.LAMP,
+        f"generated#{family}",
+        name,
+        group,
+        place,
+        LAMP,
+        (w, d, h),
+        ItemKind.LAMP,
         library="generated",
-    )  # fmt: skip
+    )
     return piece, shape
 
 

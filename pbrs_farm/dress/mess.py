@@ -94,9 +94,14 @@ def _table_of(house: MutableHouse, space: HouseSpace, index: int, tables: list[i
 
 
 def _pull_out(
-    house: MutableHouse, space: HouseSpace, around: Neighbours, pair: tuple[int, int],
-    areas: tuple[BaseGeometry, BaseGeometry], rng: np.random.Generator, share: float,
-) -> None:  # fmt: skip
+    house: MutableHouse,
+    space: HouseSpace,
+    around: Neighbours,
+    pair: tuple[int, int],
+    areas: tuple[BaseGeometry, BaseGeometry],
+    rng: np.random.Generator,
+    share: float,
+) -> None:
     index, table = pair
     item = house.items[index]
     out = _outwards(space, index, table)
@@ -138,9 +143,12 @@ def _outwards(space: HouseSpace, index: int, table: int) -> F64:
 
 
 def _chair_is_free(
-    around: Neighbours, moved: Item, index: int, before: int,
+    around: Neighbours,
+    moved: Item,
+    index: int,
+    before: int,
     areas: tuple[BaseGeometry, BaseGeometry],
-) -> bool:  # fmt: skip
+) -> bool:
     body = item_footprint(moved)
     if not shapely.contains(areas[0], body) or shapely.intersects(areas[1], body):
         return False

@@ -39,9 +39,13 @@ class MutableHouse:
     """
 
     def __init__(
-        self, house: House, seed: int, mess: float = 0.0, bank: PaintedBank | None = None,
+        self,
+        house: House,
+        seed: int,
+        mess: float = 0.0,
+        bank: PaintedBank | None = None,
         own_share: float = 0.0,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.source = house
         self.seed = seed
         self.mess = mess  # 0..1: how little people have tidied up
@@ -80,10 +84,18 @@ class MutableHouse:
         return self.materials.add(material, textures)
 
     def placed(
-        self, piece: Piece, shape: Shape, at: F64, turn_rad: float, *,
-        item_id: str, room_id: str | None, level_id: str, scale: F64 | float = 1.0,
+        self,
+        piece: Piece,
+        shape: Shape,
+        at: F64,
+        turn_rad: float,
+        *,
+        item_id: str,
+        room_id: str | None,
+        level_id: str,
+        scale: F64 | float = 1.0,
         tags: tuple[str, ...] = (),
-    ) -> Item:  # fmt: skip
+    ) -> Item:
         """The piece as an item of this house, to be passed to `add`.
 
         at: (3,) world metres of the shape's origin: for pieces of the catalogue the centre of the base (of
@@ -105,12 +117,19 @@ class MutableHouse:
         lights = tuple(_moved_light(light, moved, turn) for light in shape.lights)
         matrix = _affine(turn * factor, at)
         return Item(
-            id=item_id, name=piece.name, kind=piece.kind, level_id=level_id, surfaces=surfaces,
-            nyu40=piece.nyu40, source_class=piece.id, room_id=room_id, lights=lights,
+            id=item_id,
+            name=piece.name,
+            kind=piece.kind,
+            level_id=level_id,
+            surfaces=surfaces,
+            nyu40=piece.nyu40,
+            source_class=piece.id,
+            room_id=room_id,
+            lights=lights,
             tags=(f"{ADDED_TAG}{piece.id}", f"seed:{self.seed}", *tags),
             box=_placed_box(shape, turn, factor, at),
             joints=tuple(joint.placed(matrix) for joint in shape.joints),
-        )  # fmt: skip
+        )
 
     def add(self, item: Item, pass_name: str, piece: Piece | None = None) -> None:
         """Add an item after all others; part: the pass that adds it, for the report."""
@@ -139,10 +158,13 @@ class MutableHouse:
             replace(o, cutter=replace(o.cutter, material=0)) for o in self.source.openings
         )
         return replace(
-            self.source, items=items, materials=materials, openings=openings,
+            self.source,
+            items=items,
+            materials=materials,
+            openings=openings,
             textures={i: t for i, t in self.textures.items() if i in named},
             notes=(*self.source.notes, *self.notes),
-        )  # fmt: skip
+        )
 
     def _placed_surface(
         self, surface: Surface, shape: Shape, moved: Callable[[F64], F64], normal_matrix: F64
@@ -189,10 +211,12 @@ def moved_item(item: Item, step: F64, turn: F64 | None = None, about: F64 | None
     box = item.box and Box(moved(item.box.centre), item.box.half, turn @ item.box.axes)
     matrix = _affine(turn, pivot - turn @ pivot + step)
     return replace(
-        item, surfaces=tuple(surface(s) for s in item.surfaces), box=box,
+        item,
+        surfaces=tuple(surface(s) for s in item.surfaces),
+        box=box,
         lights=tuple(_moved_light(light, moved, turn) for light in item.lights),
         joints=tuple(joint.placed(matrix) for joint in item.joints),
-    )  # fmt: skip
+    )
 
 
 def _affine(linear: F64, offset: F64) -> F64:

@@ -94,9 +94,7 @@ _LOW_PART_M: Final = (
     0.05  # maximum height of vertices above an item's base that may touch its support, metres
 )
 _FLAT_M: Final = 0.06  # rugs and mats lie under everything
-_LEFT_ALONE: Final = frozenset(
-    {ItemKind.DOOR, ItemKind.WINDOW, ItemKind.STAIRS}
-)  # fmt: skip
+_LEFT_ALONE: Final = frozenset({ItemKind.DOOR, ItemKind.WINDOW, ItemKind.STAIRS})
 
 
 def things_on(around: Neighbours, index: int) -> tuple[list[int], list[int]]:

@@ -40,6 +40,7 @@ class HeldBy(Enum):
 
 
 # Replaceable groups. Doors, windows and kitchen units are not replaced.
+# fmt: off
 HELD: Final[Mapping[str, HeldBy]] = {
     **dict.fromkeys(
         ("sofa", "armchair", "bed", "desk", "nightstand", "tv_stand", "bookcase", "shelves",
@@ -53,7 +54,8 @@ HELD: Final[Mapping[str, HeldBy]] = {
         HeldBy.CENTRE,
     ),
     "ceiling_lamp": HeldBy.TOP,
-}  # fmt: skip
+}
+# fmt: on
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -176,10 +178,12 @@ def group_of_item(item: Item, catalogue: Mapping[str, Piece]) -> str:
 
 
 # Classes that mean one group, whatever the size.
+# fmt: off
 _GROUP_OF_CLASS: Final[Mapping[int, str]] = {
     4: "bed", 6: "sofa", 14: "desk", 17: "dresser", 32: "nightstand", 33: "toilet", 36: "bathtub",
     5: "chair", 10: "bookcase", 25: "tv",
-}  # fmt: skip
+}
+# fmt: on
 
 
 def plain_id(text: str) -> str:

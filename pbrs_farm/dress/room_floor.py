@@ -105,10 +105,16 @@ class RoomFloor:
         low, high = room.room.floor_y + LOWER_M, room.room.floor_y + 0.9
         free_m = sum(len(face.starts(WALL_CELL_M, low, high, 0.5)) for face in faces) * WALL_CELL_M
         return cls(
-            space, room, faces, bitmap, shapely.difference(room.area, room.walls),
-            shapely.union_all(zones).buffer(_DOOR_MARGIN_M), doors_are_joined(bitmap, room),
-            _largest_way(bitmap), _WALL_SHARE * free_m,
-        )  # fmt: skip
+            space,
+            room,
+            faces,
+            bitmap,
+            shapely.difference(room.area, room.walls),
+            shapely.union_all(zones).buffer(_DOOR_MARGIN_M),
+            doors_are_joined(bitmap, room),
+            _largest_way(bitmap),
+            _WALL_SHARE * free_m,
+        )
 
     def allows(self, body: BaseGeometry, front: BaseGeometry) -> bool:
         """True if a piece may be placed: on free floor, clear of doors, with every way kept open.

@@ -243,13 +243,20 @@ def _supports_of_level(
         found.append(
             turned_to_front(
                 Support(
-                    level.item, room.id, height, height - room.floor_y,
-                    around.grid.cropped(around_it), part, air, sides,
+                    level.item,
+                    room.id,
+                    height,
+                    height - room.floor_y,
+                    around.grid.cropped(around_it),
+                    part,
+                    air,
+                    sides,
                     bool(np.mean(air[part] < 0.6) > 0.5),
                 ),
-                room, has_front=level.has_front,
+                room,
+                has_front=level.has_front,
             )
-        )  # fmt: skip
+        )
     return found
 
 
@@ -361,9 +368,18 @@ def _turn_axes(support: Support, quarter: int) -> Support:
 
     sides = support.open_sides
     return Support(
-        support.item, support.room_id, support.height, support.above_floor, turned,
-        np.asarray(cells(support.mask), np.bool_), np.asarray(cells(support.clear), np.float64),
-        (sides[(0 - quarter) % 4], sides[(1 - quarter) % 4], sides[(2 - quarter) % 4],
-         sides[(3 - quarter) % 4]),
+        support.item,
+        support.room_id,
+        support.height,
+        support.above_floor,
+        turned,
+        np.asarray(cells(support.mask), np.bool_),
+        np.asarray(cells(support.clear), np.float64),
+        (
+            sides[(0 - quarter) % 4],
+            sides[(1 - quarter) % 4],
+            sides[(2 - quarter) % 4],
+            sides[(3 - quarter) % 4],
+        ),
         support.is_covered,
-    )  # fmt: skip
+    )

@@ -144,9 +144,7 @@ class Worktop:
 def turned_size(size: F64, turn_rad: float) -> tuple[float, float, float]:
     """Width, height and depth of the box around a turned box (3,) of width, height, depth."""
     c, s = abs(np.cos(turn_rad)), abs(np.sin(turn_rad))
-    return (
-        float(size[0] * c + size[2] * s), float(size[1]), float(size[0] * s + size[2] * c),
-    )  # fmt: skip
+    return (float(size[0] * c + size[2] * s), float(size[1]), float(size[0] * s + size[2] * c))
 
 
 def _count_in_windows(bad: Bools, n: tuple[int, int], grown: int) -> I32:

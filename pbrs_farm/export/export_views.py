@@ -91,10 +91,17 @@ def finished_entries(folder: Path, selection: str | None = None) -> list[ViewEnt
 
 
 def export_frames(
-    frames: Views, out: Path, name: str, *, layers: str | Sequence[str] | None = None,
-    modes: str | Sequence[str] | None = None, size: tuple[int, int] | None = None,
-    classes: str | Path | None = None, shares: SplitShares | None = None, **options: Any,
-) -> Path:  # fmt: skip
+    frames: Views,
+    out: Path,
+    name: str,
+    *,
+    layers: str | Sequence[str] | None = None,
+    modes: str | Sequence[str] | None = None,
+    size: tuple[int, int] | None = None,
+    classes: str | Path | None = None,
+    shares: SplitShares | None = None,
+    **options: Any,
+) -> Path:
     """Write frames to the new folder out in the form of that name, as `Views.export`; returns out.
 
     Frames that are in no folder are saved into one first. Raises BadInput as `export`, and for
@@ -102,9 +109,10 @@ def export_frames(
     """
     choice = Choice(
         layers=None if layers is None else as_words(layers),
-        modes=None if modes is None else as_words(modes), size=size,
+        modes=None if modes is None else as_words(modes),
+        size=size,
         classes=None if classes is None else class_map(classes),
-    )  # fmt: skip
+    )
     with _stored(frames) as (folder, wanted):
         export(folder, out, name, choice=choice, shares=shares, views=wanted, **options)
     return out

@@ -10,27 +10,36 @@ from pbrs_farm.export.chosen_view import ChosenView
 
 # Classes of NYU40 whose names are no countable nouns, and what of each is counted.
 _COUNTED: Final = {
-    "shelves": "set of shelves", "blinds": "blind", "books": "row of books", "clothes": "piece of clothing",
-    "floor mat": "rug", "paper": "sheet of paper", "night stand": "nightstand",
-}  # fmt: skip
+    "shelves": "set of shelves",
+    "blinds": "blind",
+    "books": "row of books",
+    "clothes": "piece of clothing",
+    "floor mat": "rug",
+    "paper": "sheet of paper",
+    "night stand": "nightstand",
+}
 
 # Classes of no class in particular, and what is said where the thing's name says nothing.
 _VAGUE: Final = {
-    "otherprop": "object", "otherfurniture": "piece of furniture", "otherstructure": "part of the building",
+    "otherprop": "object",
+    "otherfurniture": "piece of furniture",
+    "otherstructure": "part of the building",
     "none": "",
-}  # fmt: skip
+}
 # Classes that hold things which nobody calls so: a word of such a thing's own name -> what it is called.
 _OWN_WORDS: Final = {
     "chair": {word: word for word in ("bench", "stool", "ottoman", "pouf")},
     "curtain": {"curtains": "set of curtains"},
-}  # fmt: skip
+}
 _NOUNS_OF_KINDS: Final = {"plant": "plant", "stairs": "staircase", "person": "person"}
 _PLAIN_NAME: Final = re.compile(r"[A-Za-z]{2,12}(?: [A-Za-z]{2,12})?")
 _PLURALS: Final = {"person": "people", "bookshelf": "bookshelves", "shelf": "shelves"}
+# fmt: off
 _NUMBERS: Final = (
     "no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven",
     "twelve",
-)  # fmt: skip
+)
+# fmt: on
 
 
 def noun_of(view: ChosenView, row: dict[str, Any]) -> str:

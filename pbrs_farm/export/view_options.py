@@ -12,13 +12,17 @@ class ViewOptions(Record):
     """Layers, modes, size and classes of exported views."""
 
     layers: tuple[str, ...] = option(
-        (), "labels by name (`pbrs-farm layers`), default all there are but radiance",
-        metavar="LAYER", many_words=True,
-    )  # fmt: skip
+        (),
+        "labels by name (`pbrs-farm layers`), default all there are but radiance",
+        metavar="LAYER",
+        many_words=True,
+    )
     modes: tuple[str, ...] = option(
-        (), "opengl_dl opengl_il mlt_ol mlt_il_ol (default all there are)",
-        metavar="MODE", many_words=True,
-    )  # fmt: skip
+        (),
+        "opengl_dl opengl_il mlt_ol mlt_il_ol (default all there are)",
+        metavar="MODE",
+        many_words=True,
+    )
     size: str | None = option(None, "resize to, e.g. 320x240 (default as rendered)", metavar="WxH")
     classes: Path | None = option(
         None,

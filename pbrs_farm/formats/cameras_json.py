@@ -46,13 +46,17 @@ def _json_of_view(view: View) -> dict[str, Any]:
         # JSON keys are text.
         "objects": {str(k): n for k, n in sorted(view.objects.items())},
         "intrinsics": {
-            "width_px": i.width_px, "height_px": i.height_px,
-            "fx": i.fx, "fy": i.fy, "cx": i.cx, "cy": i.cy,
+            "width_px": i.width_px,
+            "height_px": i.height_px,
+            "fx": i.fx,
+            "fy": i.fy,
+            "cx": i.cx,
+            "cy": i.cy,
             # Without a lens it is a pin-hole's, as all were before there were others.
             **({} if i.lens.is_pinhole else {"lens": i.lens.table()}),
         },
         "world_from_camera_opengl": view.camera.world_from_camera.tolist(),
-    }  # fmt: skip
+    }
 
 
 def rig_table(view: View) -> dict[str, Any]:

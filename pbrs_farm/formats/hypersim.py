@@ -56,12 +56,15 @@ def cam_from_uv(i: Intrinsics) -> F64:
 def projection(i: Intrinsics) -> F64:
     """(4, 4) OpenGL's projection of a pin-hole, columns of camera axes."""
     deep = _FAR - _NEAR
-    return np.array([
-        [2 * i.fx / i.width_px, 0, 1 - 2 * i.cx / i.width_px, 0],
-        [0, 2 * i.fy / i.height_px, 2 * i.cy / i.height_px - 1, 0],
-        [0, 0, -(_FAR + _NEAR) / deep, -2 * _FAR * _NEAR / deep],
-        [0, 0, -1, 0],
-    ], np.float64)  # fmt: skip
+    return np.array(
+        [
+            [2 * i.fx / i.width_px, 0, 1 - 2 * i.cx / i.width_px, 0],
+            [0, 2 * i.fy / i.height_px, 2 * i.cy / i.height_px - 1, 0],
+            [0, 0, -(_FAR + _NEAR) / deep, -2 * _FAR * _NEAR / deep],
+            [0, 0, -1, 0],
+        ],
+        np.float64,
+    )
 
 
 def intrinsics_of_uv(matrix: F64, width_px: int, height_px: int) -> Intrinsics | None:

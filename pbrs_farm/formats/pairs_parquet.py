@@ -13,10 +13,15 @@ from pbrs_farm.core.errors import BadInput
 
 FILE: Final = "pairs.parquet"
 COLUMNS: Final = {
-    "room": pa.string(), "view_a": pa.string(), "view_b": pa.string(),
-    "a_in_b": pa.float32(), "b_in_a": pa.float32(), "common": pa.float32(),
-    "baseline_m": pa.float32(), "angle_deg": pa.float32(),
-}  # fmt: skip
+    "room": pa.string(),
+    "view_a": pa.string(),
+    "view_b": pa.string(),
+    "a_in_b": pa.float32(),
+    "b_in_a": pa.float32(),
+    "common": pa.float32(),
+    "baseline_m": pa.float32(),
+    "angle_deg": pa.float32(),
+}
 
 
 def pairs_parquet(rows: Sequence[Mapping[str, Any]]) -> bytes:

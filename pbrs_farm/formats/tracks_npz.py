@@ -14,9 +14,12 @@ from pbrs_farm.core.errors import BadInput
 
 FILE: Final = "tracks.npz"
 ARRAYS: Final = {
-    "points": ("float32", 3), "occluded": ("bool", 2), "depth_m": ("float32", 2),
-    "query_frame": ("int32", 1), "instance": ("uint16", 1),
-}  # fmt: skip
+    "points": ("float32", 3),
+    "occluded": ("bool", 2),
+    "depth_m": ("float32", 2),
+    "query_frame": ("int32", 1),
+    "instance": ("uint16", 1),
+}
 """Type and number of axes of each array; the first axis counts points, the second frames."""
 
 

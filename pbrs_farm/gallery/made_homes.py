@@ -103,9 +103,11 @@ def _check_same(path: Path, expected: str) -> None:
         head = b""
     if expected.encode() not in head:
         raise BadInput(
-            path, "", "is there already and is not this home",
+            path,
+            "",
+            "is there already and is not this home",
             hint="another --out, or delete the file",
-        )  # fmt: skip
+        )
 
 
 def _write_home_file(path: Path, data: bytes) -> None:

@@ -42,9 +42,10 @@ def plan_svg(storeys: Sequence[Storey], title: str, stair: Stair | None = None) 
     x1 += apart * (len(storeys) - 1)
     root = svg_file(
         viewBox=f"{x0:.2f} {z0:.2f} {x1 - x0:.2f} {z1 - z0:.2f}",
-        width=round((x1 - x0) * _PX_PER_M), height=round((z1 - z0) * _PX_PER_M),
+        width=round((x1 - x0) * _PX_PER_M),
+        height=round((z1 - z0) * _PX_PER_M),
         font_family="sans-serif",
-    )  # fmt: skip
+    )
     element(root, "title", title)
     element(root, "rect", x=f"{x0:.2f}", y=f"{z0:.2f}", width="100%", height="100%", fill="#ffffff")
     for number, storey in enumerate(storeys):
@@ -110,17 +111,28 @@ def _text(points: Sequence[Point]) -> str:
 def _draw_piece(root: Element, piece: PlacedPiece) -> None:
     is_high = piece.elevation >= _RAISED_M
     element(
-        root, "polygon", points=_text(piece.corners), fill="none" if is_high else "#ffffff",
-        fill_opacity="0.75", stroke="#777", stroke_width="0.02",
+        root,
+        "polygon",
+        points=_text(piece.corners),
+        fill="none" if is_high else "#ffffff",
+        fill_opacity="0.75",
+        stroke="#777",
+        stroke_width="0.02",
         stroke_dasharray="0.08 0.06" if is_high else "",
-    )  # fmt: skip
+    )
     if not is_high:
         # A line along the front says where it faces.
         left, right = piece.corners[3], piece.corners[2]
         element(
-            root, "line", x1=f"{left[0]:.3f}", y1=f"{left[1]:.3f}", x2=f"{right[0]:.3f}",
-            y2=f"{right[1]:.3f}", stroke="#333", stroke_width="0.035",
-        )  # fmt: skip
+            root,
+            "line",
+            x1=f"{left[0]:.3f}",
+            y1=f"{left[1]:.3f}",
+            x2=f"{right[0]:.3f}",
+            y2=f"{right[1]:.3f}",
+            stroke="#333",
+            stroke_width="0.035",
+        )
 
 
 def _draw_opening(root: Element, plan: Plan, opening: PlanOpening) -> None:
@@ -136,12 +148,21 @@ def _draw_opening(root: Element, plan: Plan, opening: PlanOpening) -> None:
     ]
     is_window = opening.kind in (OpeningKind.WINDOW, OpeningKind.FRENCH_WINDOW)
     element(
-        root, "polygon", points=_text(corners), fill="#cfe6f5" if is_window else "#ffffff",
-        stroke="#333" if is_window else "", stroke_width="0.02",
-    )  # fmt: skip
+        root,
+        "polygon",
+        points=_text(corners),
+        fill="#cfe6f5" if is_window else "#ffffff",
+        stroke="#333" if is_window else "",
+        stroke_width="0.02",
+    )
     if is_window:
-        element(root, "polyline", points=_text((hole.start, hole.end)), stroke="#333",
-                stroke_width="0.03")  # fmt: skip
+        element(
+            root,
+            "polyline",
+            points=_text((hole.start, hole.end)),
+            stroke="#333",
+            stroke_width="0.03",
+        )
         return
     if opening.kind is OpeningKind.PASSAGE:
         return
@@ -151,12 +172,15 @@ def _draw_opening(root: Element, plan: Plan, opening: PlanOpening) -> None:
     open_at = (hinge[0] + nx * opening.width, hinge[1] + nz * opening.width)
     turn = (other[0] - hinge[0]) * nz - (other[1] - hinge[1]) * nx
     element(
-        root, "path", fill="none", stroke="#a03c2d" if opening.other is None else "#777",
+        root,
+        "path",
+        fill="none",
+        stroke="#a03c2d" if opening.other is None else "#777",
         stroke_width="0.025",
         d=f"M{hinge[0]:.3f},{hinge[1]:.3f} L{open_at[0]:.3f},{open_at[1]:.3f} "
         f"A{opening.width:g},{opening.width:g} 0 0 {0 if turn > 0 else 1} "
         f"{other[0]:.3f},{other[1]:.3f}",
-    )  # fmt: skip
+    )
 
 
 def _into(plan: Plan, opening: PlanOpening, wall: PlanWall) -> Point:
@@ -191,10 +215,19 @@ def _label(root: Element, room: PlanRoom, pieces: Iterable[PlacedPiece]) -> None
     x, z = min(product(xs, zs), key=lambda at: cost(*at))
     for line, text in enumerate(lines):
         element(
-            root, "text", text, x=f"{x:.2f}", y=f"{z + (line - 0.1) * size * 1.1:.2f}",
-            font_size=f"{size:.2f}", text_anchor="middle", fill="#222",
-            stroke="#ffffff", stroke_width="0.08", stroke_linejoin="round", paint_order="stroke",
-        )  # fmt: skip
+            root,
+            "text",
+            text,
+            x=f"{x:.2f}",
+            y=f"{z + (line - 0.1) * size * 1.1:.2f}",
+            font_size=f"{size:.2f}",
+            text_anchor="middle",
+            fill="#222",
+            stroke="#ffffff",
+            stroke_width="0.08",
+            stroke_linejoin="round",
+            paint_order="stroke",
+        )
 
 
 def _around(piece: PlacedPiece) -> Rect:

@@ -19,12 +19,14 @@ from PIL import ImageDraw, ImageFont
 from pbrs_farm.core.shown_text import shown
 
 Font = ImageFont.FreeTypeFont | ImageFont.ImageFont
+# fmt: off
 _FILES: Final = (
     "DejaVuSans.ttf", "DroidSansFallbackFull.ttf", "DroidSansFallback.ttf",
     "NotoSans-Regular.ttf", "NotoSansCJK-Regular.ttc", "NotoSansThai-Regular.ttf",
     "NotoSansDevanagari-Regular.ttf", "NotoSansSymbols2-Regular.ttf", "NotoEmoji-Regular.ttf",
     "Loma.ttf", "FreeSans.ttf", "wqy-microhei.ttc", "unifont.otf", "unifont.ttf",
-)  # fmt: skip
+)
+# fmt: on
 """Fonts that are used where they are installed, the preferred first."""
 _MOST_LETTERS: Final = 1000  # of a line
 _ASCENT: Final = 0.78  # of the size: from the top of Pillow's own letters down to the base line

@@ -17,13 +17,15 @@ from pbrs_farm.formats.output_folder import ViewEntry
 from pbrs_farm.gallery import label_colours as colours
 from pbrs_farm.regular_files import read_regular
 
+# fmt: off
 TILES: Final = tuple(
     LAYER[name]
     for name in (
         "opengl_dl", "opengl_il", "mlt_ol", "mlt_il_ol",
         "depth", "normal", "semantic", "instance", "boundary",
     )
-)  # fmt: skip
+)
+# fmt: on
 """The layers of a sheet, a column each."""
 NOT_RENDERED: Final = "not rendered"
 """Why a tile is missing whose file there is not."""

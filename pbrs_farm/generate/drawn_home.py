@@ -41,9 +41,13 @@ class DrawnHome:
 
 
 def drawn_home(
-    rng: np.random.Generator, catalogue: Catalogue, *, wishes: Wishes | None = None,
-    programme: Programme | None = None, style: str = "",
-) -> DrawnHome:  # fmt: skip
+    rng: np.random.Generator,
+    catalogue: Catalogue,
+    *,
+    wishes: Wishes | None = None,
+    programme: Programme | None = None,
+    style: str = "",
+) -> DrawnHome:
     """A home by seed, or for a programme. Raises BadInput if no plan fits, or for a style.
 
     A plan whose rooms cannot hold what they must is drawn anew; after a number of tries the home
@@ -89,12 +93,17 @@ def with_offices(plans: tuple[Plan, ...], n: int) -> tuple[Plan, ...]:
     label = RoomType.OFFICE.label
     names = {at: label if n == 1 else f"{label} {k + 1}" for k, at in enumerate(sorted(chosen))}
     return tuple(
-        replace(plan, rooms=tuple(
-            replace(room, type=RoomType.OFFICE, name=names[storey, number]) if (storey, number) in names else room
-            for number, room in enumerate(plan.rooms)
-        ))
+        replace(
+            plan,
+            rooms=tuple(
+                replace(room, type=RoomType.OFFICE, name=names[storey, number])
+                if (storey, number) in names
+                else room
+                for number, room in enumerate(plan.rooms)
+            ),
+        )
         for storey, plan in enumerate(plans)
-    )  # fmt: skip
+    )
 
 
 def _broken(storey: Storey, catalogue: Catalogue) -> list[str]:

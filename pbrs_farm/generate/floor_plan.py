@@ -39,8 +39,12 @@ class RoomType(StrEnum):
     def is_habitable(self) -> bool:
         """Whether people spend their days or nights there: it needs daylight."""
         return self in (
-            RoomType.LIVING, RoomType.KITCHEN, RoomType.BEDROOM, RoomType.OFFICE, RoomType.STUDIO,
-        )  # fmt: skip
+            RoomType.LIVING,
+            RoomType.KITCHEN,
+            RoomType.BEDROOM,
+            RoomType.OFFICE,
+            RoomType.STUDIO,
+        )
 
     @property
     def is_wet(self) -> bool:

@@ -63,9 +63,15 @@ def origin_of_home(home: MadeHome, catalogue: Catalogue, programme: Programme | 
 
 
 def furnish_storeys(
-    plans: Sequence[Plan], given_pieces: Sequence[Sequence[PlacedPiece]], catalogue: Catalogue, key: str, *,
-    seed: int, style: str = "", name: str = "home",
-) -> GeneratedHome:  # fmt: skip
+    plans: Sequence[Plan],
+    given_pieces: Sequence[Sequence[PlacedPiece]],
+    catalogue: Catalogue,
+    key: str,
+    *,
+    seed: int,
+    style: str = "",
+    name: str = "home",
+) -> GeneratedHome:
     """Build the storeys from below; rooms without given pieces are furnished by a seed.
 
     key: identifies the plans; it is combined with the seed.
@@ -76,9 +82,10 @@ def furnish_storeys(
         grounds = [Polygon(room.polygon).buffer(0.02) for room in plan.rooms]
         taken = {piece.room for piece in own}
         drawn = [
-            p for p in furnished(plan, catalogue, rng, style)
+            p
+            for p in furnished(plan, catalogue, rng, style)
             if p.room not in taken and grounds[p.room].contains(Polygon(p.corners))
-        ]  # fmt: skip
+        ]
         storeys.append(Storey(plan, (*own, *drawn)))
     words = [repr(own) for own in given_pieces if own]
     digest = keys.digest("own plan", VERSION, seed, style, key, catalogue.digest, *words)

@@ -10,18 +10,22 @@ from pbrs_farm.generate.floor_plan import RoomType
 from pbrs_farm.generate.programme import Programme, RoomWish
 from pbrs_farm.generate.slicing_goals import STEP_M, Brief, IntRect, shared_length
 
+# fmt: off
 MIN_WIDTH: Final = {
     RoomType.LIVING: 3.2, RoomType.STUDIO: 3.2, RoomType.KITCHEN: 2.1, RoomType.BEDROOM: 2.6,
     RoomType.OFFICE: 2.2,
     RoomType.BATHROOM: 1.55, RoomType.HALL: 1.1, RoomType.WC: 0.9, RoomType.STORE: 0.9,
     RoomType.WARDROBE: 1.4, RoomType.STAIRS: 0.0,
-}  # fmt: skip
+}
+# fmt: on
+# fmt: off
 MAX_ASPECT: Final = {
     RoomType.LIVING: 1.7, RoomType.STUDIO: 1.7, RoomType.KITCHEN: 1.9, RoomType.BEDROOM: 1.6,
     RoomType.OFFICE: 1.8,
     RoomType.BATHROOM: 1.7, RoomType.HALL: 8.0, RoomType.WC: 1.9, RoomType.STORE: 1.8,
     RoomType.WARDROBE: 1.8, RoomType.STAIRS: math.inf,
-}  # fmt: skip
+}
+# fmt: on
 DOOR_WALL_M: Final = 1.2  # a door of 0.9 m, 10 cm from the corner, and the walls' thickness
 DAYLIGHT_M: Final = 2.0  # least length of outer wall for a room with a window
 _FLOOR_A_GLASS_M: Final = 8 * 2.1 / 1.05  # m2 that a metre of French window lights: 8 of its glass

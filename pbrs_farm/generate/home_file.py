@@ -61,13 +61,13 @@ _STEP_M: Final = 0.01  # gap in the wall at a step of its upper edge, metres
 _FIELD_OF_VIEW_RAD: Final = 1.1
 _LAMP_POWER: Final = 0.5
 _DOOR_NAMES: Final = {
-    OpeningKind.DOOR: "Door", OpeningKind.ENTRANCE: "Front door",
+    OpeningKind.DOOR: "Door",
+    OpeningKind.ENTRANCE: "Front door",
     OpeningKind.PASSAGE: "Door frame",
-    OpeningKind.WINDOW: "Window", OpeningKind.FRENCH_WINDOW: "French window",
-}  # fmt: skip
-_FLOOR_GROUPS: Final = {
-    RoomType.KITCHEN: "tiles", RoomType.BATHROOM: "tiles", RoomType.WC: "tiles",
-}  # fmt: skip
+    OpeningKind.WINDOW: "Window",
+    OpeningKind.FRENCH_WINDOW: "French window",
+}
+_FLOOR_GROUPS: Final = {RoomType.KITCHEN: "tiles", RoomType.BATHROOM: "tiles", RoomType.WC: "tiles"}
 _DRY_FLOOR: Final = "dry"
 _OPEN_WELLS: Final = {"level-0": "ceiling", "level-1": "floor"}
 _LEVEL_NAMES: Final = ("Ground floor", "Upper floor")
@@ -129,9 +129,11 @@ def home_contents(
     contents = HomeContents()
     home = contents.home
     home.attrib |= {
-        "version": VERSION, "name": f"{name}.sh3d", "camera": "topCamera",
+        "version": VERSION,
+        "name": f"{name}.sh3d",
+        "camera": "topCamera",
         "wallHeight": _cm(plan.height),
-    }  # fmt: skip
+    }
     # Select a level, or the program shows a blank plan.
     if len(storeys) > 1:
         home.set("selectedLevel", "level-0")
@@ -238,10 +240,16 @@ def _add_properties(home: ET.Element, pieces: list[PlacedPiece], origin: str) ->
 
 
 def _add_surroundings(home: ET.Element, plan: Plan) -> None:
-    ET.SubElement(home, "environment", {
-        "groundColor": "00A8A8A8", "skyColor": "00CCE4FC", "lightColor": "00D0D0D0",
-        "ceillingLightColor": "00D0D0D0",
-    })  # fmt: skip
+    ET.SubElement(
+        home,
+        "environment",
+        {
+            "groundColor": "00A8A8A8",
+            "skyColor": "00CCE4FC",
+            "lightColor": "00D0D0D0",
+            "ceillingLightColor": "00D0D0D0",
+        },
+    )
     xs = [p for wall in plan.walls for p in (wall.start[0], wall.end[0])]
     zs = [p for wall in plan.walls for p in (wall.start[1], wall.end[1])]
     middle, size = (sum((min(xs), max(xs))) / 2, max(zs)), max(max(xs), max(zs))
@@ -251,11 +259,21 @@ def _add_surroundings(home: ET.Element, plan: Plan) -> None:
         ("observerCamera", (x0 + x1) / 2, (z0 + z1) / 2, _EYE_M, 0.14),
         ("topCamera", middle[0], middle[1] + size * 0.6, size * 1.1, 0.9),
     ):
-        ET.SubElement(home, "observerCamera" if tag[0] == "o" else "camera", {
-            "attribute": tag, "x": _cm(x), "y": _cm(z), "z": _cm(y), "yaw": f"{math.pi:.6f}",
-            "pitch": f"{pitch:g}", "fieldOfView": f"{_FIELD_OF_VIEW_RAD:g}",
-            "lens": "PINHOLE", "time": "1700000000000",
-        })  # fmt: skip
+        ET.SubElement(
+            home,
+            "observerCamera" if tag[0] == "o" else "camera",
+            {
+                "attribute": tag,
+                "x": _cm(x),
+                "y": _cm(z),
+                "z": _cm(y),
+                "yaw": f"{math.pi:.6f}",
+                "pitch": f"{pitch:g}",
+                "fieldOfView": f"{_FIELD_OF_VIEW_RAD:g}",
+                "lens": "PINHOLE",
+                "time": "1700000000000",
+            },
+        )
 
 
 def _add_levels(
@@ -268,12 +286,18 @@ def _add_levels(
     found, elevation = [], 0.0
     for number, storey in enumerate(storeys):
         name = f"level-{number}"
-        ET.SubElement(home, "level", {
-            "id": name, "name": (*_LEVEL_NAMES, f"Floor {number}")[min(number, 2)],
-            "elevation": _cm(elevation),
-            "floorThickness": _cm(slab), "height": _cm(storey.plan.height),
-            "elevationIndex": "0",
-        })  # fmt: skip
+        ET.SubElement(
+            home,
+            "level",
+            {
+                "id": name,
+                "name": (*_LEVEL_NAMES, f"Floor {number}")[min(number, 2)],
+                "elevation": _cm(elevation),
+                "floorThickness": _cm(slab),
+                "height": _cm(storey.plan.height),
+                "elevationIndex": "0",
+            },
+        )
         found.append({"level": name})
         elevation += storey.plan.height + slab
     return found
@@ -285,14 +309,27 @@ def _add_stairs(
     shape = staircase(stair, rise, paints.design.colour)
     (x, z), (low, high) = stair.middle, shape.bounds
     width, height, depth = (high - low).tolist()
-    return ET.SubElement(home, "pieceOfFurniture", {
-        "id": f"pieceOfFurniture-{len(home)}", "name": "Staircase",
-        "catalogId": "pbrs_farm#staircase", "creator": AUTHOR,
-        "icon": contents.icon, "model": contents.model("staircase", shape),
-        "x": _cm(x), "y": _cm(z), "elevation": "0", "angle": f"{stair.angle_rad:.6f}",
-        "width": _cm(width), "depth": _cm(depth), "height": _cm(height), "movable": "false",
-        "staircaseCutOutShape": "M0,0 v1 h1 v-1 z",
-    })  # fmt: skip
+    return ET.SubElement(
+        home,
+        "pieceOfFurniture",
+        {
+            "id": f"pieceOfFurniture-{len(home)}",
+            "name": "Staircase",
+            "catalogId": "pbrs_farm#staircase",
+            "creator": AUTHOR,
+            "icon": contents.icon,
+            "model": contents.model("staircase", shape),
+            "x": _cm(x),
+            "y": _cm(z),
+            "elevation": "0",
+            "angle": f"{stair.angle_rad:.6f}",
+            "width": _cm(width),
+            "depth": _cm(depth),
+            "height": _cm(height),
+            "movable": "false",
+            "staircaseCutOutShape": "M0,0 v1 h1 v-1 z",
+        },
+    )
 
 
 def _add_opening(
@@ -307,15 +344,29 @@ def _add_opening(
     key = (
         f"{opening.kind} {opening.width} {opening.height} {wall.thickness} {opening.hinge_at_start}"
     )
-    element = ET.SubElement(home, "doorOrWindow", {
-        "id": f"doorOrWindow-{len(home)}", "name": _DOOR_NAMES[opening.kind],
-        "catalogId": f"pbrs_farm#{opening.kind.value}", "creator": AUTHOR,
-        "icon": contents.icon, "model": contents.model(key, shape),
-        "x": _cm(x), "y": _cm(z), "elevation": _cm(opening.sill), "angle": f"{angle:.6f}",
-        "width": _cm(opening.width), "depth": _cm(float(high[2] - low[2])),
-        "height": _cm(opening.height), "movable": "false",
-        "wallThickness": "1", "wallDistance": "0", "boundToWall": "true",
-    })  # fmt: skip
+    element = ET.SubElement(
+        home,
+        "doorOrWindow",
+        {
+            "id": f"doorOrWindow-{len(home)}",
+            "name": _DOOR_NAMES[opening.kind],
+            "catalogId": f"pbrs_farm#{opening.kind.value}",
+            "creator": AUTHOR,
+            "icon": contents.icon,
+            "model": contents.model(key, shape),
+            "x": _cm(x),
+            "y": _cm(z),
+            "elevation": _cm(opening.sill),
+            "angle": f"{angle:.6f}",
+            "width": _cm(opening.width),
+            "depth": _cm(float(high[2] - low[2])),
+            "height": _cm(opening.height),
+            "movable": "false",
+            "wallThickness": "1",
+            "wallDistance": "0",
+            "boundToWall": "true",
+        },
+    )
     _add_joints(element, shape)
     return element
 
@@ -339,22 +390,39 @@ def _angle_into(plan: Plan, opening: PlanOpening, wall: PlanWall) -> float:
 
 
 def _add_piece(
-    home: ET.Element, placed: PlacedPiece, catalogue: Catalogue, contents: HomeContents,
-    height: float, level: dict[str, str],
-) -> None:  # fmt: skip
+    home: ET.Element,
+    placed: PlacedPiece,
+    catalogue: Catalogue,
+    contents: HomeContents,
+    height: float,
+    level: dict[str, str],
+) -> None:
     piece = placed.piece
     shape = catalogue.shape(piece)
     if shape is None:
         return
     is_light = bool(shape.lights) or piece.group.endswith("_lamp")
-    element = ET.SubElement(home, "light" if is_light else "pieceOfFurniture", {
-        "id": f"pieceOfFurniture-{len(home)}", "name": piece.name, "catalogId": piece.id,
-        "creator": piece.creator or piece.library or AUTHOR, "license": piece.licence,
-        "icon": contents.icon, "model": contents.model(piece.id, shape),
-        "x": _cm(placed.x), "y": _cm(placed.z), "angle": f"{placed.angle_rad:.6f}",
-        "elevation": _cm(min(placed.elevation, height - placed.height)),
-        "width": _cm(placed.width), "depth": _cm(placed.depth), "height": _cm(placed.height),
-    } | level)  # fmt: skip
+    element = ET.SubElement(
+        home,
+        "light" if is_light else "pieceOfFurniture",
+        {
+            "id": f"pieceOfFurniture-{len(home)}",
+            "name": piece.name,
+            "catalogId": piece.id,
+            "creator": piece.creator or piece.library or AUTHOR,
+            "license": piece.licence,
+            "icon": contents.icon,
+            "model": contents.model(piece.id, shape),
+            "x": _cm(placed.x),
+            "y": _cm(placed.z),
+            "angle": f"{placed.angle_rad:.6f}",
+            "elevation": _cm(min(placed.elevation, height - placed.height)),
+            "width": _cm(placed.width),
+            "depth": _cm(placed.depth),
+            "height": _cm(placed.height),
+        }
+        | level,
+    )
     _add_joints(element, shape)
     if placed.mirrored:
         element.set("modelMirrored", "true")
@@ -374,10 +442,17 @@ def _add_light_sources(element: ET.Element, shape: Shape) -> None:
     points = [np.asarray(light.position) for light in shape.lights]
     for point in points or [(low + high) / 2]:
         x, y, z = (point - low) / size
-        ET.SubElement(element, "lightSource", {
-            "x": f"{x:.4f}", "y": f"{1 - z:.4f}", "z": f"{y:.4f}", "color": "00FFE8CC",
-            "diameter": f"{min(0.065 / size[0], 1.0):.4f}",
-        })  # fmt: skip
+        ET.SubElement(
+            element,
+            "lightSource",
+            {
+                "x": f"{x:.4f}",
+                "y": f"{1 - z:.4f}",
+                "z": f"{y:.4f}",
+                "color": "00FFE8CC",
+                "diameter": f"{min(0.065 / size[0], 1.0):.4f}",
+            },
+        )
     for number, material in enumerate(shape.materials):
         if material.kind is MaterialKind.BULB:
             ET.SubElement(element, "lightSourceMaterial", {"name": material_name(shape, number)})
@@ -391,11 +466,21 @@ def _add_walls(home: ET.Element, plan: Plan, paints: Paints, level: dict[str, st
         (x0, z0), (x1, z1) = wall.start, wall.end
         level_top = wall.height or plan.height
         tops = [height for _, height in wall.tops] or [level_top, level_top]
-        element = ET.SubElement(home, "wall", {
-            "id": f"wall-{first + number}", "xStart": _cm(x0), "yStart": _cm(z0), "xEnd": _cm(x1),
-            "yEnd": _cm(z1), "height": _cm(tops[0]),
-            "thickness": _cm(wall.thickness), "pattern": "hatchUp",
-        } | level)  # fmt: skip
+        element = ET.SubElement(
+            home,
+            "wall",
+            {
+                "id": f"wall-{first + number}",
+                "xStart": _cm(x0),
+                "yStart": _cm(z0),
+                "xEnd": _cm(x1),
+                "yEnd": _cm(z1),
+                "height": _cm(tops[0]),
+                "thickness": _cm(wall.thickness),
+                "pattern": "hatchUp",
+            }
+            | level,
+        )
         if tops[1] != tops[0]:
             element.set("heightAtEnd", _cm(tops[1]))
         for attribute, end in (("wallAtStart", 0), ("wallAtEnd", 1)):
@@ -472,9 +557,15 @@ def _drawn_floors(
 
 
 def _add_rooms(
-    home: ET.Element, plan: Plan, paints: Paints, floors: dict[str, Picture], contents: HomeContents,
-    level: dict[str, str], *, has_stair: bool,
-) -> None:  # fmt: skip
+    home: ET.Element,
+    plan: Plan,
+    paints: Paints,
+    floors: dict[str, Picture],
+    contents: HomeContents,
+    level: dict[str, str],
+    *,
+    has_stair: bool,
+) -> None:
     first = len(home.findall("room"))
     for number, room in enumerate(plan.rooms):
         is_wet = room.type in _FLOOR_GROUPS
@@ -482,19 +573,32 @@ def _add_rooms(
         is_well = has_stair and room.type is RoomType.STAIRS
         open_at = _OPEN_WELLS.get(level.get("level", "")) if is_well else ""
         has_ceiling = room.type is not RoomType.BALCONY and open_at != "ceiling"
-        element = ET.SubElement(home, "room", {
-            "id": f"room-{first + number}", "name": room.name,
-            "floorVisible": str(open_at != "floor").lower(),
-            "ceilingVisible": str(has_ceiling).lower(),
-            "floorColor": f"FF{paints.wet_floor if is_wet else paints.floor}",
-            "ceilingColor": f"FF{paints.ceiling}", "areaVisible": "true",
-        } | level)  # fmt: skip
+        element = ET.SubElement(
+            home,
+            "room",
+            {
+                "id": f"room-{first + number}",
+                "name": room.name,
+                "floorVisible": str(open_at != "floor").lower(),
+                "ceilingVisible": str(has_ceiling).lower(),
+                "floorColor": f"FF{paints.wet_floor if is_wet else paints.floor}",
+                "ceilingColor": f"FF{paints.ceiling}",
+                "areaVisible": "true",
+            }
+            | level,
+        )
         picture = floors.get(_FLOOR_GROUPS.get(room.type, _DRY_FLOOR))
         if picture is not None:
-            ET.SubElement(element, "texture", {
-                "attribute": "floorTexture", "name": picture.texture.name,
-                "width": _cm(picture.size[0]), "height": _cm(picture.size[1]),
-                "image": contents.picture(picture),
-            })  # fmt: skip
+            ET.SubElement(
+                element,
+                "texture",
+                {
+                    "attribute": "floorTexture",
+                    "name": picture.texture.name,
+                    "width": _cm(picture.size[0]),
+                    "height": _cm(picture.size[1]),
+                    "image": contents.picture(picture),
+                },
+            )
         for x, z in room.polygon:
             ET.SubElement(element, "point", {"x": _cm(x), "y": _cm(z)})

@@ -76,9 +76,11 @@ def layout(programme: Programme, rng: np.random.Generator, *, is_fixed: bool = F
             )
         return found
     raise BadInput(
-        "programme", "", f"{said} have no plan",
+        "programme",
+        "",
+        f"{said} have no plan",
         hint="fewer rooms, or areas nearer to those of docs/homes.md",
-    )  # fmt: skip
+    )
 
 
 def _easier(programme: Programme) -> list[tuple[str, Programme]]:
@@ -114,9 +116,13 @@ def storey_layout(
 
 
 def _solved_layout(
-    programme: Programme, rng: np.random.Generator, *, is_fixed: bool, core: Core | None = None,
+    programme: Programme,
+    rng: np.random.Generator,
+    *,
+    is_fixed: bool,
+    core: Core | None = None,
     n_tries: int = N_TRIES,
-) -> Layout | None:  # fmt: skip
+) -> Layout | None:
     hosts = hosts_of(programme)
     # One leaf per room that is no guest of another; two for a room with a second arm.
     leaves, owner = [], []

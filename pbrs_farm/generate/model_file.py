@@ -154,11 +154,12 @@ def _visible_surface(surface: Surface) -> Surface:
     seen = surface.faces[face_areas(written[surface.faces]) > 0]
     used, faces = np.unique(seen, return_inverse=True)
     return replace(
-        surface, positions=surface.positions[used],
+        surface,
+        positions=surface.positions[used],
         faces=faces.reshape(-1, 3).astype(np.int32),
         uvs=None if surface.uvs is None else surface.uvs[used],
         normals=None if surface.normals is None else surface.normals[used],
-    )  # fmt: skip
+    )
 
 
 def material_name(shape: Shape, number: int) -> str:

@@ -41,16 +41,23 @@ LEAVES: Final = ("four", "flat", "two", "six", "one", "boards", "three", "five")
 
 HANDLES: Final = ("lever", "knob", "plate", "bar")
 
+# fmt: off
 SASHES: Final = (
     "plain", "rail", "grid", "transom", "halves", "slim", "cross", "lattice", "thirds", "mullion",
     "small_top", "sash_grid",
-)  # fmt: skip
+)
+# fmt: on
 """Designs of windows: no bars across a pane, one, a grid, a light on top, two above each other, thin bars,
 a cross, a fine grid, two bars, an upright one, panes in the light on top, a grid in the upper half."""
 
 _GRIDS: Final = {
-    "rail": (2, 1), "grid": (3, 2), "cross": (2, 2), "lattice": (4, 3), "thirds": (3, 1), "mullion": (1, 2)
-}  # fmt: skip
+    "rail": (2, 1),
+    "grid": (3, 2),
+    "cross": (2, 2),
+    "lattice": (4, 3),
+    "thirds": (3, 1),
+    "mullion": (1, 2),
+}
 """Rows and columns of panes of a sash."""
 
 _Box = tuple[Triple, Triple]  # low and high corner
@@ -68,9 +75,11 @@ class OpeningDesign:
 
 
 def drawn_design(
-    rng: np.random.Generator, colour: Triple, leaves: Sequence[str] = LEAVES,
+    rng: np.random.Generator,
+    colour: Triple,
+    leaves: Sequence[str] = LEAVES,
     sashes: Sequence[str] = SASHES,
-) -> OpeningDesign:  # fmt: skip
+) -> OpeningDesign:
     """A home's design; all are equally common."""
     leaf, entrance, handle, sash = (
         choices[int(rng.integers(len(choices)))] for choices in (leaves, leaves, HANDLES, sashes)
@@ -200,9 +209,12 @@ def _handles(w: float, d: float, hinge_at_start: bool, kind: str) -> list[_Box]:
     for face, out in ((front, 1.0), (front - _LEAF_M, -1.0)):
 
         def box(
-            x: tuple[float, float], y: tuple[float, float], z: tuple[float, float],
-            face: float = face, out: float = out,
-        ) -> _Box:  # fmt: skip
+            x: tuple[float, float],
+            y: tuple[float, float],
+            z: tuple[float, float],
+            face: float = face,
+            out: float = out,
+        ) -> _Box:
             (x0, x1), (z0, z1) = sorted(x), sorted((face + out * z[0], face + out * z[1]))
             return (x0, y[0], z0), (x1, y[1], z1)
 
@@ -237,9 +249,11 @@ def _sashes(
     # Where an upper light begins, and what each of the two shows.
     kind = design.sash
     share, lower, upper = {
-        "transom": (0.7, "plain", "plain"), "halves": (0.5, "plain", "plain"),
-        "small_top": (0.72, "plain", "mullion"), "sash_grid": (0.5, "plain", "cross"),
-    }.get(kind, (1.0, kind, kind))  # fmt: skip
+        "transom": (0.7, "plain", "plain"),
+        "halves": (0.5, "plain", "plain"),
+        "small_top": (0.72, "plain", "mullion"),
+        "sash_grid": (0.5, "plain", "cross"),
+    }.get(kind, (1.0, kind, kind))
     for k in range(n):
         bars: list[_Box] = []
         panes: list[_Box] = []
@@ -261,8 +275,11 @@ def _catch(x: float, y: float, kind: str) -> list[_Box]:
     if kind == "bar":
         return [rose]
     reach = 0.11 if kind == "lever" else 0.075
-    return [rose, ((at - 0.009, y - reach, front + 0.022), (at + 0.009, y + 0.01, front + 0.036)),
-            ((at - 0.006, y - 0.006, front + 0.008), (at + 0.006, y + 0.006, front + 0.022))]  # fmt: skip
+    return [
+        rose,
+        ((at - 0.009, y - reach, front + 0.022), (at + 0.009, y + 0.01, front + 0.036)),
+        ((at - 0.006, y - 0.006, front + 0.008), (at + 0.006, y + 0.006, front + 0.022)),
+    ]
 
 
 def _sash(
@@ -286,7 +303,9 @@ def _sash(
         bars += [((x - half, a + half, -0.02), (x + half, b - half, 0.02)) for x in xs[1:-1]]
     for a, b in pairwise(ys):
         for c, d in pairwise(xs):
-            panes.append((
-                (c + half * (c > xs[0]), a + half * (a > ys[0]), -pane),
-                (d - half * (d < xs[-1]), b - half * (b < ys[-1]), pane),
-            ))  # fmt: skip
+            panes.append(
+                (
+                    (c + half * (c > xs[0]), a + half * (a > ys[0]), -pane),
+                    (d - half * (d < xs[-1]), b - half * (b < ys[-1]), pane),
+                )
+            )

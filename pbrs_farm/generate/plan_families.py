@@ -67,8 +67,15 @@ class PlanFamily(Record):
 
     # Paints.
     walls: tuple[_Colour, ...] = (
-        "F4F1EA", "EFEBE0", "E8ECEA", "F3E9DC", "E6E3DA", "DDE4E6", "F6F3EE", "EDE6DD",
-    )  # fmt: skip
+        "F4F1EA",
+        "EFEBE0",
+        "E8ECEA",
+        "F3E9DC",
+        "E6E3DA",
+        "DDE4E6",
+        "F6F3EE",
+        "EDE6DD",
+    )
     floor: _Colour = "B08A62"
     ceiling: _Colour = "FAFAF8"
     opening_paints: tuple[_Colour, ...] = ("EDEBE6", "EDEBE6", "A88054", "737578")

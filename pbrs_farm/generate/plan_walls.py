@@ -102,8 +102,10 @@ def walls_of(layout: Layout, runs: list[WallRun]) -> tuple[PlanWall, ...]:
     for run, thick in standing:
         start, end = run.point(run.low), run.point(run.high)
         continues = last is not None and (last.is_vertical, last.line, last.high) == (
-            run.is_vertical, run.line, run.low,
-        )  # fmt: skip
+            run.is_vertical,
+            run.line,
+            run.low,
+        )
         if continues and walls[-1].thickness == thick:
             start = walls.pop().start
         walls.append(PlanWall(start, end, thick, OUTSIDE in run.rooms))
@@ -211,15 +213,18 @@ def balcony(run: WallRun, low: float, high: float) -> tuple[PlanRoom, tuple[Plan
     half = PARAPET_M / 2
     # The parapet: out, along and back, its ends in the wall's face.
     ends = [
-        point(face, low + half), point(rim - outwards * half, low + half),
-        point(rim - outwards * half, high - half), point(face, high - half),
-    ]  # fmt: skip
+        point(face, low + half),
+        point(rim - outwards * half, low + half),
+        point(rim - outwards * half, high - half),
+        point(face, high - half),
+    ]
     parapet = tuple(
         PlanWall(a, b, PARAPET_M, is_outer=True, height=PARAPET_HEIGHT_M) for a, b in pairwise(ends)
     )
     xs, zs = zip(
-        point(face, low + PARAPET_M), point(rim - outwards * PARAPET_M, high - PARAPET_M),
+        point(face, low + PARAPET_M),
+        point(rim - outwards * PARAPET_M, high - PARAPET_M),
         strict=True,
-    )  # fmt: skip
+    )
     floor = box(min(xs), min(zs), max(xs), max(zs))
     return PlanRoom(RoomType.BALCONY, RoomType.BALCONY.label, corners(floor)), parapet

@@ -51,10 +51,14 @@ def programme_from_json(path: Path) -> Programme:
     wishes = _with_area(path, given.area, _complete(path, wishes))
     most_notch = 0.2 * sum(w.area for w in wishes)
     return Programme(
-        tuple(wishes), open_kitchen=given.open_kitchen, n_blind_sides=int(given.n_blind_sides),
-        notch=_number_within(path, "notch", given.notch, (0, most_notch)), l_shaped=given.l_shaped,
-        balcony=given.balcony, adjacent=_adjacent(path, given.adjacent, wishes),
-    )  # fmt: skip
+        tuple(wishes),
+        open_kitchen=given.open_kitchen,
+        n_blind_sides=int(given.n_blind_sides),
+        notch=_number_within(path, "notch", given.notch, (0, most_notch)),
+        l_shaped=given.l_shaped,
+        balcony=given.balcony,
+        adjacent=_adjacent(path, given.adjacent, wishes),
+    )
 
 
 def json_from_file(path: Path) -> Any:
@@ -107,9 +111,11 @@ def _number_within(
     if not low <= value <= high:
         nearest = min(max(value, low), high)
         raise BadInput(
-            path, place, f"has {value:g}{unit}; {low:g} to {high:g} works",
+            path,
+            place,
+            f"has {value:g}{unit}; {low:g} to {high:g} works",
             hint=f"the nearest is {nearest:g}{unit}",
-        )  # fmt: skip
+        )
     return value
 
 
@@ -148,7 +154,9 @@ def _with_area(path: Path, area: float | None, wishes: list[RoomWish]) -> list[R
     most = sum(AREA_RANGE[w.type][1] for w in wishes)
     if not least + hall <= area <= most:
         raise BadInput(
-            path, "area", f"{len(wishes)} rooms in {area:g} m2 cannot be met",
+            path,
+            "area",
+            f"{len(wishes)} rooms in {area:g} m2 cannot be met",
             hint=f"rooms of these types take {math.ceil(least + hall)} to {most:.0f} m2",
-        )  # fmt: skip
+        )
     return scaled_rooms(wishes, area)

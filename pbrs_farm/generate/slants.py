@@ -179,9 +179,7 @@ def _bay(plan: Plan, number: int, depth: float, spread: float) -> Plan | None:
         px, pz = wall.at(along)
         return round(px + side * by * nx, 4), round(pz + side * by * nz, 4)
 
-    ring = [
-        out(low, 0.0), out(low + spread, depth), out(high - spread, depth), out(high, 0.0),
-    ]  # fmt: skip
+    ring = [out(low, 0.0), out(low + spread, depth), out(high - spread, depth), out(high, 0.0)]
     ground = Polygon(ring).buffer(wall.thickness, join_style="mitre")
     elsewhere = [r for k, r in enumerate(plan.rooms) if k != opening.room]
     if any(ground.intersects(Polygon(r.polygon)) for r in elsewhere):

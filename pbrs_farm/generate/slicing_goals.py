@@ -134,9 +134,11 @@ class Rules:
         # Measure the stretches on the outline, with daylight and without.
         daylight = anywhere = 0
         for is_there, length, is_lit in (
-            (x0 == 0, z1 - z0, left), (z0 == 0, x1 - x0, top),
-            (x1 == self._width, z1 - z0, right), (z1 == self._depth, x1 - x0, bottom),
-        ):  # fmt: skip
+            (x0 == 0, z1 - z0, left),
+            (z0 == 0, x1 - x0, top),
+            (x1 == self._width, z1 - z0, right),
+            (z1 == self._depth, x1 - x0, bottom),
+        ):
             if is_there and length > anywhere:
                 anywhere = length
             if is_there and is_lit and length > daylight:

@@ -97,9 +97,11 @@ def staircase(stair: Stair, rise: float, paint: Triple) -> Shape:
     wood = Material("treads", diffuse=_WOOD, specular=(0.2, 0.2, 0.2), shininess=30.0)
     painted = Material("stairs", diffuse=paint, specular=(0.2, 0.2, 0.2), shininess=30.0)
     surfaces = (
-        boxes_surface("risers", boards, 0), boxes_surface("treads", [tread for _, tread in steps], 1),
-        boxes_surface("railing", rails, 0), quads_surface("handrail", slope, 1),
-    )  # fmt: skip
+        boxes_surface("risers", boards, 0),
+        boxes_surface("treads", [tread for _, tread in steps], 1),
+        boxes_surface("railing", rails, 0),
+        quads_surface("handrail", slope, 1),
+    )
     return Shape(surfaces, (painted, wood))
 
 

@@ -53,9 +53,7 @@ def drawn_storeys(rng: np.random.Generator, wishes: Wishes) -> tuple[tuple[Plan,
         if len(layouts) < 2:
             continue
         height = drawn_height(layouts[0], rng)
-        plans = (
-            plan_of_layout(layouts[0], height, rng), plan_of_layout(layouts[1], height, rng),
-        )  # fmt: skip
+        plans = (plan_of_layout(layouts[0], height, rng), plan_of_layout(layouts[1], height, rng))
         front = float(core.front[0]), float(core.front[1])
         foot_is_right = bool(rng.random() < 0.5)
         return plans, stair_between(*plans, front, SLAB_M, foot_is_right=foot_is_right)

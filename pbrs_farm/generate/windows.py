@@ -106,9 +106,12 @@ def _is_window_of(opening: PlanOpening, room: int) -> bool:
 
 
 def _add_row(
-    drawing: WallDrawing, run: WallRun, gap: tuple[float, float], room: int,
+    drawing: WallDrawing,
+    run: WallRun,
+    gap: tuple[float, float],
+    room: int,
     wish: tuple[int, float, float, float],
-) -> float:  # fmt: skip
+) -> float:
     """Windows of one size spread over a gap of a run; gives their glass in square metres.
 
     wish: how many, their glass, height and sill.
@@ -164,6 +167,12 @@ def _widen(drawing: WallDrawing, room: int, wanted: float) -> None:
         if glass >= wanted:
             return
         drawing.openings[i] = PlanOpening(
-            OpeningKind.FRENCH_WINDOW, old.wall, old.along, old.width,
-            drawing.family.french_height, _FRENCH_SILL_M, old.room, old.other,
-        )  # fmt: skip
+            OpeningKind.FRENCH_WINDOW,
+            old.wall,
+            old.along,
+            old.width,
+            drawing.family.french_height,
+            _FRENCH_SILL_M,
+            old.room,
+            old.other,
+        )

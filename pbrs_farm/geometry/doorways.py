@@ -136,9 +136,10 @@ def rooms_by_walls(ground: Polygon, lines: Sequence[LineString]) -> list[Polygon
     rooms = [room for piece in free for room in parted_at_doorways(piece, ways)]
     # To the middle of their walls, and no farther than the doorway.
     grown = [
-        r.buffer(HALF_M, join_style="mitre").intersection(ground)
+        r.buffer(HALF_M, join_style="mitre")
+        .intersection(ground)
         .difference(unary_union([other for other in rooms if other is not r]))
         for r in rooms
-    ]  # fmt: skip
+    ]
     whole: list[Any] = [max(shapely.get_parts(r), key=lambda p: p.area) for r in grown]
     return whole if len(whole) > 1 else []

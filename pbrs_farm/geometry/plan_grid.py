@@ -179,9 +179,14 @@ def top_heights(grid: PlanGrid, corners: F64) -> F64:
 
 
 def _heights_in_cells(
-    local: F64, doubled: F64, steepest: float,
-    triangle: NDArray[np.intp], x: F64, z: F64, half: float,
-) -> tuple[F64, F64]:  # fmt: skip
+    local: F64,
+    doubled: F64,
+    steepest: float,
+    triangle: NDArray[np.intp],
+    x: F64,
+    z: F64,
+    half: float,
+) -> tuple[F64, F64]:
     # The plane's height in the cell, no lower or higher than the triangle itself.
     flat = np.abs(doubled) > 1e-12
     safe = np.where(flat, doubled, 1.0)

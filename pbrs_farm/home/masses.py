@@ -54,6 +54,7 @@ class _Stuff(NamedTuple):
 
 
 _BOARDS: Final = _Stuff("wood oak timber board", 650, 0.018)
+# fmt: off
 _STUFFS: Final = (
     _Stuff("glass pane mirror bottle", 2_500, 0.006, nyu40=(classes.MIRROR,)),
     _Stuff("steel chrome brass iron metal enamel tin bronze copper aluminium machine", 7_850, 0.001),
@@ -70,7 +71,8 @@ _STUFFS: Final = (
             classes.BED, classes.SOFA, classes.PILLOW, classes.CLOTHES, classes.TOWEL,
             classes.CURTAIN, classes.FLOOR_MAT, classes.BAG)),
     _BOARDS,
-)  # fmt: skip
+)
+# fmt: on
 
 
 def body_kg(solids: Iterable[tuple[F64, Material]], nyu40: int) -> float:

@@ -11,18 +11,24 @@ from pbrs_farm.core.house import Item
 
 RADIATORS: Final = frozenset({"radiator", "heater", "heizkorper", "heizkoerper", "radiateur"})
 # Words of names, accents folded: English, German, French, Spanish, Italian, Dutch, Swedish.
+# fmt: off
 GLASS_WORDS: Final = frozenset(
     ("glass", "glazing", "pane", "windowpane", "windowglass", "glas", "scheibe", "verglasung",
      "fensterglas", "verre", "vitre", "vitrage", "vidrio", "cristal", "vetro", "ruit")
-)  # fmt: skip
+)
+# fmt: on
+# fmt: off
 MIRROR_WORDS: Final = frozenset(
     ("mirror", "spiegel", "spiegelglas", "miroir", "espejo", "specchio", "espelho", "lustro",
      "zrcadlo", "зеркало", "spegel")
-)  # fmt: skip
+)
+# fmt: on
+# fmt: off
 FRAME_WORDS: Final = frozenset(
     ("frame", "sill", "sash", "handle", "trim", "casing", "shutter", "blind", "curtain", "wood",
      "metal", "rahmen", "griff", "cadre", "marco", "telaio")
-)  # fmt: skip
+)
+# fmt: on
 # Words for parts of a mirror, and for opaque glass.
 _NO_MIRROR_WORDS: Final = FRAME_WORDS | {"back", "base", "lamp", "leg", "light", "stand"}
 _OPAQUE_GLASS_WORDS: Final = FRAME_WORDS | {

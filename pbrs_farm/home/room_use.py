@@ -49,10 +49,12 @@ class RoomKind(StrEnum):
 
 MIN_LIVED_IN_M2: Final = 2.0  # smaller is a cupboard or a shaft
 _LARGE_M2 = 9.0
+# fmt: off
 _COOKED_AT = frozenset({
     "cooker", "stove", "stovetop", "oven", "hob", "hood", "dishwasher", "fridge", "refrigerator",
     "herd", "gasherd", "elektroherd", "backofen",
-})  # fmt: skip
+})
+# fmt: on
 
 
 def is_cooked_in(items: Iterable[Item]) -> bool:
@@ -127,9 +129,13 @@ def with_uses(house: House) -> House:
         kind = kind_by_things(contents, outline.area)
         if kind is not None:
             kinds[room.id] = kind
-    return replace(house, rooms=tuple(
-        replace(r, types=(*r.types, kinds[r.id].value)) if r.id in kinds else r for r in house.rooms
-    ))  # fmt: skip
+    return replace(
+        house,
+        rooms=tuple(
+            replace(r, types=(*r.types, kinds[r.id].value)) if r.id in kinds else r
+            for r in house.rooms
+        ),
+    )
 
 
 def named_kind(name: str) -> RoomKind | None:

@@ -203,9 +203,13 @@ def _paint(house: House, edit: PaintItems, _fields: ReadFields) -> House:
             return material
         rough = material.roughness if edit.roughness is None else edit.roughness
         return replace(
-            material, diffuse=edit.rgb, texture_id=None, alpha_cutout=False, roughness=rough,
+            material,
+            diffuse=edit.rgb,
+            texture_id=None,
+            alpha_cutout=False,
+            roughness=rough,
             is_default=False,
-        )  # fmt: skip
+        )
 
     return _with_materials(house, edit.items, painted)
 
@@ -221,9 +225,14 @@ def _cover(house: House, edit: CoverItems, _fields: ReadFields) -> House:
         if material.kind is not MaterialKind.OPAQUE:
             return material
         return replace(
-            material, diffuse=(1.0, 1.0, 1.0), texture_id=texture.id, alpha_cutout=False,
-            normal_texture_id=None, roughness_texture_id=None, is_default=False,
-        )  # fmt: skip
+            material,
+            diffuse=(1.0, 1.0, 1.0),
+            texture_id=texture.id,
+            alpha_cutout=False,
+            normal_texture_id=None,
+            roughness_texture_id=None,
+            is_default=False,
+        )
 
     def laid_out(item: Item) -> Item:
         return replace(item, surfaces=tuple(_laid_out(s, edit.scale_m) for s in item.surfaces))
@@ -279,18 +288,28 @@ def _add_light(house: House, edit: AddLight, _fields: ReadFields) -> House:
     bulb = Material("bulb", MaterialKind.BULB, (r, g, b))
     spot: dict[str, Any] = {}
     if edit.direction is not None:
-        spot = {
-            "form": LightForm.SPOT, "direction": edit.direction, "cutoff_rad": edit.cutoff_rad,
-        }  # fmt: skip
+        spot = {"form": LightForm.SPOT, "direction": edit.direction, "cutoff_rad": edit.cutoff_rad}
     light = LightPart(
-        edit.position, edit.radius_m, edit.lm, PowerUnit.LUMEN, rgb_linear=edit.rgb_linear,
-        emitting=(0,), is_coloured=True, **spot,
-    )  # fmt: skip
+        edit.position,
+        edit.radius_m,
+        edit.lm,
+        PowerUnit.LUMEN,
+        rgb_linear=edit.rgb_linear,
+        emitting=(0,),
+        is_coloured=True,
+        **spot,
+    )
     surface = sphere("bulb", np.array(edit.position), edit.radius_m, len(house.materials))
     item = Item(
-        edit.item, "lamp", ItemKind.LAMP, "", (surface,), nyu40=NYU40_NAMES.index("lamp"), source_class="lamp",
+        edit.item,
+        "lamp",
+        ItemKind.LAMP,
+        "",
+        (surface,),
+        nyu40=NYU40_NAMES.index("lamp"),
+        source_class="lamp",
         lights=(light,),
-    )  # fmt: skip
+    )
     items = (*house.items, _at_home(house, item))
     return replace(house, items=items, materials=(*house.materials, bulb))
 

@@ -163,11 +163,15 @@ def _formats_of_plans() -> tuple[Format, ...]:
     names = [one.name for one in fields_of(DataFormat)]
     return tuple(
         Format(
-            **{name: getattr(one, name) for name in names}, kind=PLAN, read=_read_plan,
-            companions=_companions_of_plan, has_parts=True, has_box_only_items=True,
+            **{name: getattr(one, name) for name in names},
+            kind=PLAN,
+            read=_read_plan,
+            companions=_companions_of_plan,
+            has_parts=True,
+            has_box_only_items=True,
         )
         for one in plan_formats()
-    )  # fmt: skip
+    )
 
 
 def _read_plan(given: GivenFile, fields: ReadFields) -> House:

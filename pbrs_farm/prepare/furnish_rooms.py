@@ -80,13 +80,17 @@ class _Use(NamedTuple):
 
 
 _USES: Final = {
-    RoomKind.LIVING: _Use(RoomType.LIVING), RoomKind.BEDROOM: _Use(RoomType.BEDROOM),
-    RoomKind.KITCHEN: _Use(RoomType.KITCHEN), RoomKind.BATHROOM: _Use(RoomType.BATHROOM),
-    RoomKind.HALL: _Use(RoomType.HALL), RoomKind.DINING: _Use(RoomType.LIVING, "dining_room"),
+    RoomKind.LIVING: _Use(RoomType.LIVING),
+    RoomKind.BEDROOM: _Use(RoomType.BEDROOM),
+    RoomKind.KITCHEN: _Use(RoomType.KITCHEN),
+    RoomKind.BATHROOM: _Use(RoomType.BATHROOM),
+    RoomKind.HALL: _Use(RoomType.HALL),
+    RoomKind.DINING: _Use(RoomType.LIVING, "dining_room"),
     RoomKind.OFFICE: _Use(RoomType.OFFICE),
-}  # fmt: skip
+}
 
 # Groups of briefs -> NYU40 classes of furniture that a room needs once.
+# fmt: off
 _SERVED_BY: Final[dict[str, frozenset[int]]] = {
     "bed": frozenset({BED}), "lounge": frozenset({SOFA}), "dining": frozenset({TABLE}),
     "desk": frozenset({DESK}), "wardrobe": frozenset({CABINET, OTHERFURNITURE}),
@@ -95,7 +99,8 @@ _SERVED_BY: Final[dict[str, frozenset[int]]] = {
     "lamp": frozenset({LAMP}), "toilet": frozenset({TOILET}), "washbasin": frozenset({SINK}),
     "bath": frozenset({BATHTUB, SHOWER_CURTAIN}),
     "kitchen": frozenset({CABINET, COUNTER, SINK, REFRIGERATOR}),
-}  # fmt: skip
+}
+# fmt: on
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,10 +135,15 @@ def _furnished(
         if storey.wanting:
             standing = {k: _standing(storey, k, mutable) for k in storey.wanting}
             pieces = furnished(
-                storey.plan, catalogue, rng, style, rooms=storey.wanting, standing=standing,
+                storey.plan,
+                catalogue,
+                rng,
+                style,
+                rooms=storey.wanting,
+                standing=standing,
                 uses={k: u.brief for k, u in enumerate(storey.uses) if u.brief is not None},
                 present={k: _present(storey.rooms[k], mutable) for k in storey.wanting},
-            )  # fmt: skip
+            )
             _add(mutable, storey, pieces, catalogue)
     # Attribution licences (CC-BY) oblige whoever shows the pictures: name their authors.
     owed = sorted(
@@ -164,9 +174,13 @@ def _kinds_of_rooms(space: HouseSpace) -> dict[str, RoomKind]:
 
 
 def _storey(
-    house: House, space: HouseSpace, level_id: str, mutable: MutableHouse,
-    kinds: Mapping[str, RoomKind], most_covered: float,
-) -> _Storey:  # fmt: skip
+    house: House,
+    space: HouseSpace,
+    level_id: str,
+    mutable: MutableHouse,
+    kinds: Mapping[str, RoomKind],
+    most_covered: float,
+) -> _Storey:
     """The rooms of a level as a plan, and which of them are to be furnished."""
     rooms, shapes, uses = [], [], []
     for room in space.rooms:
@@ -298,9 +312,15 @@ def _add(
         z -= mz * math.cos(turn) - mx * math.sin(turn)
         at = np.array([x, room.floor_y + piece.elevation - low[1], z])
         item = mutable.placed(
-            piece.piece, shape, at, turn, item_id=f"furnished_{len(mutable.items)}",
-            room_id=room.id, level_id=room.level_id, scale=scale,
-        )  # fmt: skip
+            piece.piece,
+            shape,
+            at,
+            turn,
+            item_id=f"furnished_{len(mutable.items)}",
+            room_id=room.id,
+            level_id=room.level_id,
+            scale=scale,
+        )
         mutable.add(item, "furnish", piece.piece)
 
 

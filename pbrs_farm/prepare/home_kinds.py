@@ -87,9 +87,12 @@ def _example_source(name: str, _files: SourceFiles) -> SourceRef:
     data, file = package.home(exact)
     sha = keys.sha256(data)
     return SourceRef(
-        kind="example", location=name, house_id=keys.house_id(Path(file).stem, sha), sha256=sha,
+        kind="example",
+        location=name,
+        house_id=keys.house_id(Path(file).stem, sha),
+        sha256=sha,
         companions=package_digest(package),
-    )  # fmt: skip
+    )
 
 
 def _read_example(source: SourceRef, fields: ReadFields) -> House:
@@ -120,9 +123,12 @@ def _made_source(word: str, _files: SourceFiles) -> SourceRef:
     if package is not None and package.note:
         companions = keys.sha256(package.note.encode())
     return SourceRef(
-        kind="made", location=home.word, house_id=keys.house_id(home.name, home.digest),
-        sha256=home.digest, companions=companions,
-    )  # fmt: skip
+        kind="made",
+        location=home.word,
+        house_id=keys.house_id(home.name, home.digest),
+        sha256=home.digest,
+        companions=companions,
+    )
 
 
 def _read_made(source: SourceRef, fields: ReadFields) -> House:
@@ -208,6 +214,7 @@ def digest_of_file(path: Path, files: SourceFiles) -> str:
         raise BadHouse(path, "", fault_of(error)) from None
 
 
+# fmt: off
 HOME_KINDS: Final = (
     HomeKind(
         name="builtin", source=_builtin_source, read=_read_builtin,
@@ -230,7 +237,8 @@ HOME_KINDS: Final = (
     ),
     # A word that is neither another kind nor a path: `resolve` names it.
     HomeKind(name="example", source=_example_source, read=_read_example, is_of_package=True),
-)  # fmt: skip
+)
+# fmt: on
 
 HOME_KIND: Final = {kind.name: kind for kind in HOME_KINDS}
 

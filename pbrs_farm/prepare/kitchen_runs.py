@@ -39,9 +39,7 @@ _SINK_M: Final = 0.8
 _COUNTERS: Final = frozenset({"kitchen", "counter", "countertop", "worktop", "island"})
 _COOKERS: Final = frozenset({"stove", "cooker", "hob", "cooktop", "stovetop", "range", "oven"})
 _OTHERS: Final = frozenset({"hood", "microwave"})
-_BUILT_IN: Final = frozenset({
-    "washing", "washer", "fridge", "refrigerator", "freezer", "dryer",
-})  # fmt: skip
+_BUILT_IN: Final = frozenset({"washing", "washer", "fridge", "refrigerator", "freezer", "dryer"})
 
 
 class Unit(NamedTuple):
@@ -107,9 +105,15 @@ class _Module(NamedTuple):
 
 
 def kitchen_units(
-    items: Sequence[Item], floor_y: float, catalogue: Catalogue, house_id: str, *, is_kitchen: bool,
-    distance_to_wall: Callable[[Point], float], choose_front: Callable[[Sequence[Box]], int],
-) -> Mapping[str, list[Unit]]:  # fmt: skip
+    items: Sequence[Item],
+    floor_y: float,
+    catalogue: Catalogue,
+    house_id: str,
+    *,
+    is_kitchen: bool,
+    distance_to_wall: Callable[[Point], float],
+    choose_front: Callable[[Sequence[Box]], int],
+) -> Mapping[str, list[Unit]]:
     """Units for a room's counters, by the id of the box-only item that they replace.
 
     items: the room's box-only items. is_kitchen: cabinets are kitchen cabinets. choose_front: index of the
@@ -123,9 +127,10 @@ def kitchen_units(
     if chosen is None:
         return {}
     runs = [
-        run for item in (*counters, *hung)
+        run
+        for item in (*counters, *hung)
         for run in _runs_of(item, floor_y, distance_to_wall, choose_front, is_hung=item in hung)
-    ]  # fmt: skip
+    ]
     found: dict[str, list[Unit]] = {}
     others = [i for i in items if i not in counters and i not in hung]
     whole = [r for r in runs if not r.is_hung and "kitchen" in words_of_item(r.item)]
@@ -166,10 +171,11 @@ def _is_hung(item: Item, floor_y: float) -> bool:
     assert item.box is not None
     low, tall = float(item.box.centre[1] - item.box.half[1]) - floor_y, 2 * float(item.box.half[1])
     return bool(
-        item.nyu40 == CABINET and low >= _HUNG_M
+        item.nyu40 == CABINET
+        and low >= _HUNG_M
         and _HUNG_HEIGHTS_M[0] <= tall <= _HUNG_HEIGHTS_M[1]
         and 2 * min(item.box.half[0], item.box.half[2]) <= _HUNG_DEPTH_M
-    )  # fmt: skip
+    )
 
 
 def _set_of_kitchen(catalogue: Catalogue, counters: Sequence[Item], house_id: str) -> _Set | None:
@@ -186,15 +192,22 @@ def _set_of_kitchen(catalogue: Catalogue, counters: Sequence[Item], house_id: st
     near = [s for s, far in zip(whole, away, strict=True) if far <= min(away) + 0.021]
     chosen = near[keys.seed(house_id, "kitchen set") % len(near)]
     return _Set(
-        tuple(chosen["base_cabinet"]), chosen["sink"][0], chosen["cooker"][0],
-        tuple(chosen.get("dishwasher", ())), tuple(chosen.get("upper_cabinet", ())),
-    )  # fmt: skip
+        tuple(chosen["base_cabinet"]),
+        chosen["sink"][0],
+        chosen["cooker"][0],
+        tuple(chosen.get("dishwasher", ())),
+        tuple(chosen.get("upper_cabinet", ())),
+    )
 
 
 def _runs_of(
-    item: Item, floor_y: float, distance_to_wall: Callable[[Point], float],
-    choose_front: Callable[[Sequence[Box]], int], *, is_hung: bool,
-) -> Iterator[_Run]:  # fmt: skip
+    item: Item,
+    floor_y: float,
+    distance_to_wall: Callable[[Point], float],
+    choose_front: Callable[[Sequence[Box]], int],
+    *,
+    is_hung: bool,
+) -> Iterator[_Run]:
     """The rows of units for a box; none if it is too deep and away from all walls."""
     box = item.box
     assert box is not None
@@ -223,9 +236,10 @@ def _runs_of(
     x, z = [-w, w], [-d, d]
     sides = [(z, 1, front), (z, 0, -front), (x, 1, right), (x, 0, -right)]
     at_walls = [
-        (span, end, way) for span, end, way in sides
+        (span, end, way)
+        for span, end, way in sides
         if distance_to_wall(Point(*(middle + way * abs(span[end]))[[0, 2]])) < _AT_WALL_M
-    ]  # fmt: skip
+    ]
     if not at_walls and d <= _DEPTHS_M[1]:
         # An island: two rows, back to back.
         yield run((-w, w), (0.0, d), front)
@@ -307,8 +321,10 @@ def _with_invented(modules: list[_Module], wanted: Sequence[str]) -> list[_Modul
 def _unit_of(module: _Module, number: int, run: _Run, chosen: _Set) -> Unit | None:
     pieces = {
         "base": chosen.uppers if run.is_hung else chosen.bases,
-        "sink": (chosen.sink,), "cooker": (chosen.cooker,), "dishwasher": chosen.dishwashers,
-    }.get(module.kind)  # fmt: skip
+        "sink": (chosen.sink,),
+        "cooker": (chosen.cooker,),
+        "dishwasher": chosen.dishwashers,
+    }.get(module.kind)
     if not pieces:
         return None
     piece = pieces[number % len(pieces)]

@@ -52,9 +52,13 @@ def house_of_plan(given: GivenFile, fields: ReadFields) -> House:
         )
     its_source = Source(PLAN, path.name, digest_of_regular(path))
     return replace(
-        house, name=path.stem, source=its_source, cameras=(),
-        items=(*house.items, *items), notes=(*house.notes, *notes.all()),
-    )  # fmt: skip
+        house,
+        name=path.stem,
+        source=its_source,
+        cameras=(),
+        items=(*house.items, *items),
+        notes=(*house.notes, *notes.all()),
+    )
 
 
 def _walls_of_plan(file: PlanFile, name: str, fields: ReadFields) -> House:
@@ -76,9 +80,15 @@ def box_only_items(house: House, storeys: Sequence[PlanStorey]) -> tuple[Item, .
         for k, t in enumerate(storey.things):
             centre = (t.x, level.elevation + t.low + t.height / 2, t.z)
             item = box_only_item(
-                f"box_{number}_{k}", t.vocabulary, t.name, centre, (t.width, t.height, t.depth),
-                t.turn_rad, is_front_given=t.is_front_given, level_id=level.id,
-            )  # fmt: skip
+                f"box_{number}_{k}",
+                t.vocabulary,
+                t.name,
+                centre,
+                (t.width, t.height, t.depth),
+                t.turn_rad,
+                is_front_given=t.is_front_given,
+                level_id=level.id,
+            )
             if item is not None:
                 found.append(item)
     return tuple(found)
@@ -129,8 +139,17 @@ def _pieces_of_things(file: PlanFile, catalogue: Catalogue) -> list[list[PlacedP
             continue
         width, height, depth = (float(v) for v in 2 * item.box.half)
         low = float(item.bounds[0, 1]) - levels[level].elevation
-        found[level].append(PlacedPiece(
-            piece, float(x), float(z), max(low, 0.0), math.atan2(-float(front[0]), float(front[2])),
-            width, depth, height, room,
-        ))  # fmt: skip
+        found[level].append(
+            PlacedPiece(
+                piece,
+                float(x),
+                float(z),
+                max(low, 0.0),
+                math.atan2(-float(front[0]), float(front[2])),
+                width,
+                depth,
+                height,
+                room,
+            )
+        )
     return found

@@ -33,10 +33,12 @@ from pbrs_farm.read.common.source_files import SourceFiles
 from pbrs_farm.regular_files import naming_kind, real_path, text_given
 
 _MODEL_SUFFIXES: Final = (".obj", ".sh3f")  # what `objects` reads; a .glb may be a scene
+# fmt: off
 _UNREAD_SUFFIXES: Final = frozenset({
     ".3dm", ".3ds", ".abc", ".blend", ".dae", ".dwg", ".dxf", ".fbx", ".max", ".mb", ".mtl", ".pln",
     ".ply", ".rvt", ".sdf", ".skp", ".stl",
-})  # fmt: skip
+})
+# fmt: on
 _MOST_NAMED: Final = 3  # folders of homes that a hint names
 _LONGEST_ID: Final = 255  # bytes of a folder's name
 _DEFAULT_KIND: Final = "sweethome3d"  # of an unrecognised path: its reader explains the problem
@@ -164,10 +166,13 @@ def saved_home(source: SourceRef) -> bytes:
     """The file of a home with its edits; equal sources give equal bytes."""
     return json_bytes(
         SavedHome(
-            home=source.word, house_id=source.house_id, models=source.models,
-            dress_seed=source.dress_seed, edits=source.edits,
+            home=source.word,
+            house_id=source.house_id,
+            models=source.models,
+            dress_seed=source.dress_seed,
+            edits=source.edits,
         )
-    )  # fmt: skip
+    )
 
 
 def _of_saved_home(path: Path, files: SourceFiles | None) -> SourceRef:
@@ -244,10 +249,13 @@ def _source_of(kind: str, location: str, files: SourceFiles, models: str, part: 
     if kind == "reader":
         (mark,) = marks_in_digest("readers", [location.partition(":")[0]])
         companions = keys.sha256("\n".join(filter(None, (mark, companions))).encode())
-    return bare.model_copy(update={
-        "house_id": given.path.name if entry.main_file else house_id, "sha256": sha,
-        "companions": companions,
-    })  # fmt: skip
+    return bare.model_copy(
+        update={
+            "house_id": given.path.name if entry.main_file else house_id,
+            "sha256": sha,
+            "companions": companions,
+        }
+    )
 
 
 def suncg_list(root: Path, list_file: Path) -> list[str]:

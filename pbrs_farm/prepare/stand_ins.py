@@ -40,15 +40,19 @@ How = Literal["pieces", "boxes", "none"]
 _SCALES: Final = (0.6, 1.6)  # of a model along each of its axes
 _STRETCH: Final = 1.6  # of one axis against another
 _STRETCH_OF_BOARDS: Final = 2.2
+# fmt: off
 _BOARDS: Final = frozenset({
     "desk", "nightstand", "tv_stand", "bookcase", "shelves", "wardrobe", "dresser", "cabinet",
     "dining_table", "coffee_table", "fridge", "washer", "base_cabinet", "upper_cabinet", "rug",
     "curtain", "blinds", "picture_frame", "mirror",
-})  # fmt: skip
+})
+# fmt: on
+# fmt: off
 _FIXTURES: Final = frozenset({
     "toilet", "washbasin", "sink", "bathtub", "shower", "bidet", "cooker", "oven", "dishwasher",
     "washer", "fridge",
-})  # fmt: skip
+})
+# fmt: on
 _OWN_SCALES: Final = (0.8, 1.25)  # of a fixture whose box no piece fits
 _FAR_SCALES: Final = (0.35, 2.6)  # of such a box against the piece
 _BASINS: Final = frozenset({"sink", "washbasin"})
@@ -67,12 +71,14 @@ _MOST_IN_WALL_M: Final = 0.15  # boxes of scans reach into walls
 _IN_WALL_SHARE: Final = 0.06  # of a footprint that may stay outside its room
 _SEATS: Final = frozenset({"chair", "stool", "office_chair"})
 _TABLES: Final = frozenset({"table", "desk"})
+# fmt: off
 _COLOURS: Final = {
     "bed": (0.85, 0.83, 0.8), "sofa": (0.45, 0.47, 0.5), "chair": (0.5, 0.38, 0.27), "table": (0.6, 0.45, 0.3),
     "cabinet": (0.85, 0.84, 0.82), "counter": (0.8, 0.8, 0.78), "refrigerator": (0.9, 0.9, 0.9),
     "television": (0.05, 0.05, 0.05), "toilet": (0.95, 0.95, 0.95), "sink": (0.95, 0.95, 0.95),
     "bathtub": (0.95, 0.95, 0.95), "mirror": (0.7, 0.75, 0.78),
-}  # fmt: skip
+}
+# fmt: on
 _PLAIN: Final = (0.62, 0.58, 0.52)
 
 
@@ -147,9 +153,10 @@ class _Scene:
         self.catalogue = catalogue
         self._places = [_place(room) for room in house.rooms]
         self._tables = [
-            i.box.centre for i in house.items
+            i.box.centre
+            for i in house.items
             if i.box is not None and BOX_ONLY in i.tags and NYU40_NAMES[i.nyu40] in _TABLES
-        ]  # fmt: skip
+        ]
         self._box_only = [i for i in house.items if BOX_ONLY in i.tags]
         boxes = [i.box for i in self._box_only if i.box is not None]
         self._centres = np.array([b.centre for b in boxes]).reshape(-1, 3)
@@ -249,8 +256,9 @@ class _Scene:
         across, along = target.axes[[0, 2], 0], target.axes[[0, 2], 2]
         places = [
             target.centre[[0, 2]] + 2 * a * target.half[0] * across + 2 * b * target.half[2] * along
-            for a in spread for b in spread
-        ]  # fmt: skip
+            for a in spread
+            for b in spread
+        ]
         y = float(highest_below(np.array(places), np.concatenate(near), low + _ON_TOP_M).max())
         return y if low - y < _MOST_DROP_M else None
 
@@ -281,11 +289,14 @@ def _units_of_kitchens(box_only: list[Item], scene: _Scene) -> dict[str, list[Un
     found: dict[str, list[Unit]] = {}
     for place, items in by_room.values():
         found |= kitchen_units(
-            items, place.room.floor_y, scene.catalogue, scene.house.id,
+            items,
+            place.room.floor_y,
+            scene.catalogue,
+            scene.house.id,
             is_kitchen=scene.is_kitchen(place),
             distance_to_wall=place.outline.exterior.distance,
             choose_front=partial(_likeliest_front, place=place, scene=scene),
-        )  # fmt: skip
+        )
     return found
 
 
@@ -543,13 +554,23 @@ def _placed(
     at = target.centre + deeper * front - np.array([mx * cos + mz * sin, 0.0, mz * cos - mx * sin])
     at[1] = base - low[1]
     placed = mutable.placed(
-        fit.piece, shape, at, turn_rad, item_id=item.id, room_id=_room_id(item, place),
-        level_id=_level_id(item, place), scale=scale,
-    )  # fmt: skip
+        fit.piece,
+        shape,
+        at,
+        turn_rad,
+        item_id=item.id,
+        room_id=_room_id(item, place),
+        level_id=_level_id(item, place),
+        scale=scale,
+    )
     return replace(
-        placed, name=item.name, nyu40=item.nyu40 or placed.nyu40, source_class=item.source_class,
-        box=target, tags=(*_kept(item), STAND_IN, f"piece:{fit.piece.id}"),
-    )  # fmt: skip
+        placed,
+        name=item.name,
+        nyu40=item.nyu40 or placed.nyu40,
+        source_class=item.source_class,
+        box=target,
+        tags=(*_kept(item), STAND_IN, f"piece:{fit.piece.id}"),
+    )
 
 
 def _stands(piece: Piece) -> bool:
@@ -578,9 +599,13 @@ def _plain_box(mutable: MutableHouse, item: Item, target: Box, place: _Place | N
     centre = target.centre + np.array([0.0, 0.001, 0.0])
     surface = box("box", centre, half, material, axes=_right_handed(target.axes))
     return replace(
-        item, surfaces=(surface,), box=target, room_id=_room_id(item, place),
-        level_id=_level_id(item, place), tags=(*_kept(item), STAND_IN, "piece:box"),
-    )  # fmt: skip
+        item,
+        surfaces=(surface,),
+        box=target,
+        room_id=_room_id(item, place),
+        level_id=_level_id(item, place),
+        tags=(*_kept(item), STAND_IN, "piece:box"),
+    )
 
 
 def _right_handed(axes: F64) -> F64:

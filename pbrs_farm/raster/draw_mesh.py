@@ -62,9 +62,14 @@ def mesh_from_house(house: House) -> DrawMesh:
     return DrawMesh(
         np.concatenate([np.zeros((0, 8), np.float32), *vertices]),
         np.concatenate([np.zeros((0, 3), np.uint32), *indices]),
-        table[:, 0], table[:, 1], table[:, 2], table[:, 3], box[:, 0], box[:, 1],
+        table[:, 0],
+        table[:, 1],
+        table[:, 2],
+        table[:, 3],
+        box[:, 0],
+        box[:, 1],
         np.array(item_first),
-    )  # fmt: skip
+    )
 
 
 def move_item(mesh: DrawMesh, instance: int, item: Item) -> slice:

@@ -47,11 +47,15 @@ def _row_of_light(part: LightPart) -> list[float]:
     size = math.hypot(*part.direction)
     direction = [c / size for c in part.direction] if size > 0 else [0.0, -1.0, 0.0]
     return [
-        *part.position, _FORM_NUMBER[form],
-        *intensity, part.dropoff,
-        *direction, math.cos(min(part.cutoff_rad, math.pi)),
-        *end, length,
-    ]  # fmt: skip
+        *part.position,
+        _FORM_NUMBER[form],
+        *intensity,
+        part.dropoff,
+        *direction,
+        math.cos(min(part.cutoff_rad, math.pi)),
+        *end,
+        length,
+    ]
 
 
 def best_lights(lights: F32, low: F64, high: F64, n_best: int) -> I64:

@@ -31,11 +31,17 @@ def _material_block(material: Material) -> list[float]:
     exponent = material.shininess if specular.any() else 0.0
     is_pane = material.kind is MaterialKind.PANE
     return [
-        *diffuse, material.opacity,
-        *specular, exponent,
-        *emission, 0.0,
-        float(is_pane), material.alpha_cutoff if material.alpha_cutout else 0.0, 0.0, 0.0,
-    ]  # fmt: skip
+        *diffuse,
+        material.opacity,
+        *specular,
+        exponent,
+        *emission,
+        0.0,
+        float(is_pane),
+        material.alpha_cutoff if material.alpha_cutout else 0.0,
+        0.0,
+        0.0,
+    ]
 
 
 def light_blocks(house: House, n_best: int) -> F32:

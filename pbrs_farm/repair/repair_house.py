@@ -206,5 +206,7 @@ STEPS: Final = (
     RepairStep("boxes", lambda work: work.after(with_boxes_of_meshes(work.house))),
     RepairStep("enclosure", _with_enclosure),
     RepairStep("leaks", _leaks_measured),
-    RepairStep("furniture", lambda work: work.after(work.house, furniture=furniture_audit(work.house))),
-)  # fmt: skip
+    RepairStep(
+        "furniture", lambda work: work.after(work.house, furniture=furniture_audit(work.house))
+    ),
+)

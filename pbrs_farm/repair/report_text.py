@@ -57,7 +57,7 @@ def _lines_of_structure(report: RepairReport) -> Iterator[str]:
     if s.n_joints_closed:
         yield f"{_n(s.n_joints_closed, 'place')} where walls missed each other closed."
     if s.n_stairwells_closed:
-        yield f"{_n(s.n_stairwells_closed, 'floor or ceiling', 'floors or ceilings')} carried on over stairwells without a room."  # fmt: skip
+        yield f"{_n(s.n_stairwells_closed, 'floor or ceiling', 'floors or ceilings')} carried on over stairwells without a room."
     if report.added_ceilings:
         yield f"{_n(len(report.added_ceilings), 'room')} had walls and no ceiling and got one at the walls' height: {_some(report.added_ceilings)}."
     if s.n_openings:
@@ -86,11 +86,11 @@ def _lines_of_lamps(report: RepairReport) -> Iterator[str]:
         yield f"{_n(len(added), 'lamp')} had no part that shines and got a bulb{more}."
     shaded = sorted({s.item_id for s in report.sources if s.shades})
     if shaded:
-        yield f"{_n(len(shaded), 'lamp')} kept their light in; what encloses it is a shade now: {_some(shaded)}."  # fmt: skip
+        yield f"{_n(len(shaded), 'lamp')} kept their light in; what encloses it is a shade now: {_some(shaded)}."
     if report.fallback_lights:
-        yield f"{_n(len(report.fallback_lights), 'room')} had neither lamp nor window and got a ceiling light: {_some(report.fallback_lights)}."  # fmt: skip
+        yield f"{_n(len(report.fallback_lights), 'room')} had neither lamp nor window and got a ceiling light: {_some(report.fallback_lights)}."
     if report.added_lamps:
-        yield f"{_n(len(report.added_lamps), 'room')} where people live had no lamp, or too weak ones; a ceiling light was added for the evening: {_some(report.added_lamps)}."  # fmt: skip
+        yield f"{_n(len(report.added_lamps), 'room')} where people live had no lamp, or too weak ones; a ceiling light was added for the evening: {_some(report.added_lamps)}."
 
 
 def _lines_of_rooms(report: RepairReport) -> Iterator[str]:
@@ -118,7 +118,7 @@ def _lines_of_leaks(report: RepairReport) -> Iterator[str]:
         if space.n_sky:
             # Name one place per space where light leaks in.
             x, y, z = space.leaks[0].origin
-            yield f"{space.n_sky} of them from {_some(space.rooms)}, one near ({x:.2f}, {y:.2f}, {z:.2f})."  # fmt: skip
+            yield f"{space.n_sky} of them from {_some(space.rooms)}, one near ({x:.2f}, {y:.2f}, {z:.2f})."
 
 
 def _lines_of_furniture(report: RepairReport) -> Iterator[str]:
@@ -134,7 +134,7 @@ def _lines_of_furniture(report: RepairReport) -> Iterator[str]:
             f"{worst.b} ({1000 * worst.volume_m3:.1f} litres)."
         )
     if f.floating:
-        yield f"{_n(len(f.floating), 'piece')} touch nothing: {_some([p.item_id for p in f.floating])}."  # fmt: skip
+        yield f"{_n(len(f.floating), 'piece')} touch nothing: {_some([p.item_id for p in f.floating])}."
     if f.duplicates:
         pairs = [f"{a} and {b}" for a, b in f.duplicates]
         yield f"{_n(len(pairs), 'piece')} stand twice in one place: {_some(pairs)}."

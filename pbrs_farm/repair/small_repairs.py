@@ -68,7 +68,9 @@ def with_white_walls(house: House, rgb: tuple[float, float, float]) -> tuple[Hou
                 continue
             if s.material not in white:
                 white[s.material] = len(materials)
-                materials.append(replace(material, name=f"{material.name}_wall", diffuse=rgb, texture_id=None))  # fmt: skip
+                materials.append(
+                    replace(material, name=f"{material.name}_wall", diffuse=rgb, texture_id=None)
+                )
             surfaces.append(replace(s, material=white[s.material]))
         # Count walls, not surfaces; a baseboard is part of its wall.
         is_board = BASEBOARD in item.tags

@@ -46,8 +46,10 @@ from pbrs_farm.transport.diffuse_images import (
 )
 
 _GROUPS_OF_ENDING: Final = {
-    "": (Group.OUTDOOR, Group.INDOOR), "_outdoor": (Group.OUTDOOR,), "_indoor": (Group.INDOOR,),
-}  # fmt: skip
+    "": (Group.OUTDOOR, Group.INDOOR),
+    "_outdoor": (Group.OUTDOOR,),
+    "_indoor": (Group.INDOOR,),
+}
 
 _LAGS: Final = 4.0  # of what came earlier than so many lags less than 2 % is left
 _GLANCE_PX: Final = (32, 24)  # of the small pictures that tell how bright earlier frames are
@@ -168,10 +170,13 @@ def _glance(work: Work, house: CachedHouse, view: View) -> LinearAovs:
     """A small picture of a frame, the same whether its own light is rendered yet or not."""
     fields = work.recipe.light.model_copy(
         update={
-            "integrator": "path", "spp": _GLANCE_SPP, "noise": 0.0, "time_budget_s": 0.0,
+            "integrator": "path",
+            "spp": _GLANCE_SPP,
+            "noise": 0.0,
+            "time_budget_s": 0.0,
             "groups": "two",
         }
-    )  # fmt: skip
+    )
     seed = view.shot.seed(work.house_id, "glance", work.recipe.seed, per="view")
     camera = view.camera.with_size(*_GLANCE_PX)
     light = house.light_scene.render(camera, view.room_id, fields, seed)

@@ -52,14 +52,11 @@ STEPS: Final = {
         Step("opengl_il", 3, ("house", "cameras")),
         Step("illuminance", 10, ("house",), per_view=False),
         # Whatever changes illuminance changes light's digest, too: it need not stand in `after`.
-        Step(
-            "light", 27, ("house", "cameras"),
-            needs=("illuminance",),
-        ),
+        Step("light", 27, ("house", "cameras"), needs=("illuminance",)),
         Step("develop", 8, ("light",), needs=("light",)),
         Step("view", 3, _VIEW_READS, needs=("truth",)),
     )
-}  # fmt: skip
+}
 
 
 OPENGL_STEPS: Final = ("opengl_dl", "opengl_il")

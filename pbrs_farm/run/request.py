@@ -26,35 +26,46 @@ class LibraryOptions(Record):
     """Libraries for dressing beside the furniture package."""
 
     catalogue: tuple[str, ...] = option(
-        (), "your own library, repeatable: .sh3f (models), .sh3t (textures), a folder of OBJ or GLB, of"
+        (),
+        "your own library, repeatable: .sh3f (models), .sh3t (textures), a folder of OBJ or GLB, of"
         " 3D-FUTURE, hssd-models or objathor; `generated` leaves out the furniture package",
-        group="dressing", metavar="LIBRARY",
-    )  # fmt: skip
+        group="dressing",
+        metavar="LIBRARY",
+    )
     pictures: tuple[str, ...] = option(
-        (), "your own photographs as pictures on walls, repeatable: a folder of JPEG or PNG",
-        group="dressing", metavar="DIR", into="catalogue",
-    )  # fmt: skip
+        (),
+        "your own photographs as pictures on walls, repeatable: a folder of JPEG or PNG",
+        group="dressing",
+        metavar="DIR",
+        into="catalogue",
+    )
 
 
 class DressOptions(Record):
     """By which seeds each home is dressed, and with what."""
 
     dress: str | None = option(
-        None, "dress each home once by each seed, as a house of its own: 3, 1..20 or 1,4,7",
-        group="dressing", metavar="SEEDS",
-    )  # fmt: skip
+        None,
+        "dress each home once by each seed, as a house of its own: 3, 1..20 or 1,4,7",
+        group="dressing",
+        metavar="SEEDS",
+    )
     furnish: Literal["none", "empty", "sparse"] | None = option(
-        None, "furnish rooms that have nothing (empty) or little (sparse) in them before the home is dressed (docs/homes.md)",
-        group="dressing", sets="dress.furnish",
-    )  # fmt: skip
+        None,
+        "furnish rooms that have nothing (empty) or little (sparse) in them before the home is dressed (docs/homes.md)",
+        group="dressing",
+        sets="dress.furnish",
+    )
 
 
 class RecipeOptions(Record):
     """The recipe by name, and what overrides its fields."""
 
     recipe: str = option(
-        "fast", f"{', '.join(RECIPE_NAMES)}, or your own FILE.toml (default {{default}})", group="recipe"
-    )  # fmt: skip
+        "fast",
+        f"{', '.join(RECIPE_NAMES)}, or your own FILE.toml (default {{default}})",
+        group="recipe",
+    )
     set: tuple[str, ...] = option(
         (), "override a field", group="recipe", metavar="GROUP.FIELD=VALUE"
     )
@@ -72,61 +83,88 @@ class LightOptions(Record):
     """Duration of light and its stored groups: short forms of the recipe's fields."""
 
     noise: str | None = option(
-        None, "end a view's light at this estimated relative error, e.g. 0.05 (light.noise):"
+        None,
+        "end a view's light at this estimated relative error, e.g. 0.05 (light.noise):"
         " path adds samples, metropolis leaves out mutations",
-        group="light", metavar="E", sets="light.noise",
-    )  # fmt: skip
+        group="light",
+        metavar="E",
+        sets="light.noise",
+    )
     time_budget: str | None = option(
-        None, "seconds of light a view, instead of samples or mutations (light.time_budget_s)",
-        group="light", metavar="S", sets="light.time_budget_s",
-    )  # fmt: skip
+        None,
+        "seconds of light a view, instead of samples or mutations (light.time_budget_s)",
+        group="light",
+        metavar="S",
+        sets="light.time_budget_s",
+    )
     groups: Literal["two", "lamps"] | None = option(
-        None, "lamps: store the light of each lamp, too, for `relight VIEW --lamp` (light.groups;"
+        None,
+        "lamps: store the light of each lamp, too, for `relight VIEW --lamp` (light.groups;"
         " path only; default two: outdoor and indoor)",
-        group="light", sets="light.groups",
-    )  # fmt: skip
+        group="light",
+        sets="light.groups",
+    )
 
 
 class CameraOptions(Record):
     """Where viewpoints come from."""
 
     cameras: str | None = option(
-        None, f"where viewpoints come from: {', '.join(CAMERA_SOURCES.names())} (docs/cameras.md)",
-        group="viewpoints", metavar="SOURCE", sets="cameras.source",
-    )  # fmt: skip
+        None,
+        f"where viewpoints come from: {', '.join(CAMERA_SOURCES.names())} (docs/cameras.md)",
+        group="viewpoints",
+        metavar="SOURCE",
+        sets="cameras.source",
+    )
     trajectory: Path | None = option(
-        None, "your own walk, as TUM rows t x y z qx qy qz qw (docs/motion.md)",
-        group="viewpoints", metavar="FILE",
-    )  # fmt: skip
+        None,
+        "your own walk, as TUM rows t x y z qx qy qz qw (docs/motion.md)",
+        group="viewpoints",
+        metavar="FILE",
+    )
     frames: int | None = option(
-        None, "frames of a walk (default 150)",
-        group="viewpoints", metavar="N", sets="cameras.walk_frames",
-    )  # fmt: skip
+        None,
+        "frames of a walk (default 150)",
+        group="viewpoints",
+        metavar="N",
+        sets="cameras.walk_frames",
+    )
     fps: float | None = option(
-        None, "frames a second of a walk (default 30)",
-        group="viewpoints", metavar="F", sets="cameras.walk_fps",
-    )  # fmt: skip
+        None,
+        "frames a second of a walk (default 30)",
+        group="viewpoints",
+        metavar="F",
+        sets="cameras.walk_fps",
+    )
     doors: Literal["drawn", "open"] | None = option(
-        None, "open: doors between rooms stand open, where their model has a hinge (read.doors)",
-        group="viewpoints", sets="read.doors",
-    )  # fmt: skip
+        None,
+        "open: doors between rooms stand open, where their model has a hinge (read.doors)",
+        group="viewpoints",
+        sets="read.doors",
+    )
     stereo: float | None = option(
-        None, "a second view B metres to the right of each, e.g. 0.065",
-        group="viewpoints", metavar="B", sets="cameras.stereo_m",
-    )  # fmt: skip
+        None,
+        "a second view B metres to the right of each, e.g. 0.065",
+        group="viewpoints",
+        metavar="B",
+        sets="cameras.stereo_m",
+    )
     rig: Path | None = option(
-        None, "several cameras at the same instants, by a file rig.toml (docs/motion/rigs.md)",
-        group="viewpoints", metavar="FILE",
-    )  # fmt: skip
+        None,
+        "several cameras at the same instants, by a file rig.toml (docs/motion/rigs.md)",
+        group="viewpoints",
+        metavar="FILE",
+    )
 
 
 class ModelsOption(Record):
     """Where the models lie that a home's file names."""
 
     models: str = option(
-        "", "folder of the models that a scene of HSSD, 3D-FRONT or Holodeck names (docs/houses/data_sets.md)",
+        "",
+        "folder of the models that a scene of HSSD, 3D-FRONT or Holodeck names (docs/houses/data_sets.md)",
         metavar="DIR",
-    )  # fmt: skip
+    )
 
 
 def _modes(given: object) -> object:
@@ -152,25 +190,39 @@ class Wanted(Record):
     """
 
     modes: Annotated[tuple[Mode, ...], BeforeValidator(_modes)] = option(
-        ALL_MODES, "opengl_dl opengl_il mlt_ol mlt_il_ol (default all)",
-        group="what is made", metavar="MODE", many_words=True,
-    )  # fmt: skip
+        ALL_MODES,
+        "opengl_dl opengl_il mlt_ol mlt_il_ol (default all)",
+        group="what is made",
+        metavar="MODE",
+        many_words=True,
+    )
     layers: tuple[str, ...] = option(
-        (), "optional layers to write besides the usual ones; `layers` lists them",
-        group="what is made", metavar="LAYER", many_words=True,
-    )  # fmt: skip
+        (),
+        "optional layers to write besides the usual ones; `layers` lists them",
+        group="what is made",
+        metavar="LAYER",
+        many_words=True,
+    )
     n_views: int = option(
-        0, "at most N views a house (default: all)", ge=0,
-        name="views", group="what is made", metavar="N", least=1, hint="leave it out for all views",
-    )  # fmt: skip
+        0,
+        "at most N views a house (default: all)",
+        ge=0,
+        name="views",
+        group="what is made",
+        metavar="N",
+        least=1,
+        hint="leave it out for all views",
+    )
     pairs: bool = option(
-        False, "pairs.parquet: what each two views of a room have in common (docs/motion.md)",
+        False,
+        "pairs.parquet: what each two views of a room have in common (docs/motion.md)",
         group="what is made",
-    )  # fmt: skip
+    )
     tracks: bool = option(
-        False, "tracks.npz: surface points followed through the frames of a walk (docs/motion.md)",
+        False,
+        "tracks.npz: surface points followed through the frames of a walk (docs/motion.md)",
         group="what is made",
-    )  # fmt: skip
+    )
 
 
 def wanted_of(request: Wanted) -> Wanted:
@@ -194,20 +246,29 @@ class ProcessLimitOptions(Record):
     """Number and limits of the processes of a run on this machine."""
 
     jobs: int = option(
-        1, "processes (default 1, with a second one beside it for most steps but light); each view uses all cores",
-        group="the run", metavar="N", least=1,
-    )  # fmt: skip
+        1,
+        "processes (default 1, with a second one beside it for most steps but light); each view uses all cores",
+        group="the run",
+        metavar="N",
+        least=1,
+    )
     step_timeout: float = option(
         3600.0, "seconds a step may take (default 3600)", group="the run", metavar="S"
     )
     silence: float = option(
-        0.0, "seconds a process may be silent (default: as --step-timeout)",
-        group="the run", metavar="S", least=0,
-    )  # fmt: skip
+        0.0,
+        "seconds a process may be silent (default: as --step-timeout)",
+        group="the run",
+        metavar="S",
+        least=0,
+    )
     memory: float = option(
-        0.0, "memory a process may hold (default: its share of the machine)",
-        group="the run", metavar="MB", least=0,
-    )  # fmt: skip
+        0.0,
+        "memory a process may hold (default: its share of the machine)",
+        group="the run",
+        metavar="MB",
+        least=0,
+    )
 
 
 class ProcessOptions(ProcessLimitOptions):

@@ -33,16 +33,26 @@ _DRJIT_STEPS = ("house", "cameras", "pairs", "tracks", "truth", "illuminance", "
 
 
 _OF_LIGHT = (
-    "pbrs_farm.run.steps", "pbrs_farm.formats.house_bundle", "pbrs_farm.transport.light_scene",
-    "pbrs_farm.transport.illuminance", "pbrs_farm.transport.lampshade_exitance",
-    "pbrs_farm.transport.pilot", "pbrs_farm.transport.sample_passes",
+    "pbrs_farm.run.steps",
+    "pbrs_farm.formats.house_bundle",
+    "pbrs_farm.transport.light_scene",
+    "pbrs_farm.transport.illuminance",
+    "pbrs_farm.transport.lampshade_exitance",
+    "pbrs_farm.transport.pilot",
+    "pbrs_farm.transport.sample_passes",
     "pbrs_farm.transport.kernels.outside",
-    "pbrs_farm.run.house_cache", "pbrs_farm.run.chosen_cameras", "pbrs_farm.run.chosen_cameras",
-)  # fmt: skip
+    "pbrs_farm.run.house_cache",
+    "pbrs_farm.run.chosen_cameras",
+    "pbrs_farm.run.chosen_cameras",
+)
 _OF_FINISHING = (
-    "pbrs_farm.run.steps", "pbrs_farm.read.sweethome3d", "pbrs_farm.dress.dressing",
-    "pbrs_farm.repair", "pbrs_farm.formats.house_bundle", "pbrs_farm.run.chosen_cameras",
-)  # fmt: skip
+    "pbrs_farm.run.steps",
+    "pbrs_farm.read.sweethome3d",
+    "pbrs_farm.dress.dressing",
+    "pbrs_farm.repair",
+    "pbrs_farm.formats.house_bundle",
+    "pbrs_farm.run.chosen_cameras",
+)
 
 
 def make_handler(send: Send) -> Handler:

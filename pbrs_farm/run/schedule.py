@@ -48,9 +48,14 @@ class Schedule:
     """
 
     def __init__(
-        self, run: Run, sources: list[SourceRef], summary: Summary,
-        observe: Callable[[Event], None], *, is_apart: bool,
-    ) -> None:  # fmt: skip
+        self,
+        run: Run,
+        sources: list[SourceRef],
+        summary: Summary,
+        observe: Callable[[Event], None],
+        *,
+        is_apart: bool,
+    ) -> None:
         self._run = run
         self._summary = summary
         self._observe = observe

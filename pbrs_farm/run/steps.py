@@ -143,9 +143,11 @@ def _tracks(work: Work) -> StepOutput:
 
     def frame(setup: ViewSetup) -> TrackFrame:
         return TrackFrame(
-            setup.camera, setup.view.time_s or 0.0, lambda: setup.now.caster.hit_record(setup.camera),
+            setup.camera,
+            setup.view.time_s or 0.0,
+            lambda: setup.now.caster.hit_record(setup.camera),
             lambda: setup.now.caster.first_hit,
-        )  # fmt: skip
+        )
 
     moving, seed = cached.moving, keys.seed(work.house_id, "tracks", work.recipe.seed)
     frames = [frame(setup) for setup in film]
@@ -180,10 +182,18 @@ def _truth(work: Work) -> StepOutput:
         seed = view.shot.seed(work.house_id, "truth", work.recipe.seed, per="view")
         partners, times = _partners(setup, layers, table)
         inputs = truth.LabelInputs(
-            hit, house, now.geometry, camera,
-            lambda skip: caster.hit_record(camera, skip_faces=skip), setup.house.textures, seed,
-            partners, caster.first_hit, times, max_albedo(work.recipe),
-        )  # fmt: skip
+            hit,
+            house,
+            now.geometry,
+            camera,
+            lambda skip: caster.hit_record(camera, skip_faces=skip),
+            setup.house.textures,
+            seed,
+            partners,
+            caster.first_hit,
+            times,
+            max_albedo(work.recipe),
+        )
         arrays |= truth.optional_layers(layers, inputs)
         table |= truth.optional_tables(layers, house)
     credit = house.source.attribution
@@ -252,10 +262,16 @@ def _light(work: Work) -> StepOutput:
     layers = work.layers_of("light")
     # The seed depends on everything that changes the picture and on nothing else.
     result = setup.house.light_scene_at(view.time_s).render(
-        replace(setup.camera, blur=setup.blur), view.room_id, work.recipe.light,
-        setup.light_seed(view), checkpoint, pilot=setup.pilot, anchors=setup.anchors,
-        splits_diffuse=bool(layers), shutter_s=work.recipe.blur.shutter_s,
-    )  # fmt: skip
+        replace(setup.camera, blur=setup.blur),
+        view.room_id,
+        work.recipe.light,
+        setup.light_seed(view),
+        checkpoint,
+        pilot=setup.pilot,
+        anchors=setup.anchors,
+        splits_diffuse=bool(layers),
+        shutter_s=work.recipe.blur.shutter_s,
+    )
     # Name the images as the file does.
     images = {name: getattr(result, name) for name in ("outdoor", "indoor", "albedo", "normal")}
     images |= {layer_name(number): image for number, image in result.lamps.items()}
@@ -341,8 +357,11 @@ def _view(work: Work) -> StepOutput:
     if rendered:
         name = setup.room.name if setup.room is not None else ""
         place: ViewPlace = {
-            "house": work.house_id, "view": view.id, "room": view.room_id, "room_type": name,
-        }  # fmt: skip
+            "house": work.house_id,
+            "view": view.id,
+            "room": view.room_id,
+            "room_type": name,
+        }
         files["histogram.json"] = view_histogram(
             work.store, place, rendered, description, setup.house.house.notes, work.recipe.histogram
         )

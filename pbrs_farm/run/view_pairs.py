@@ -43,9 +43,12 @@ def pairs(bare: House, dressed: House, recipe: Recipe, n_views: int) -> Iterator
 
     caster = Caster.of_house(dressed)
     views = sample_cameras(
-        dressed, recipe.judged_cameras, camera_seed(dressed.id, recipe), caster.item_counts,
+        dressed,
+        recipe.judged_cameras,
+        camera_seed(dressed.id, recipe),
+        caster.item_counts,
         caster.depth_pictures,
-    ).views  # fmt: skip
+    ).views
     rows = [(v.id, v.room_id, v.score) for v in views]
     chosen = set(plan.spread(rows, n_views))
     # Take one sky for both houses, so that only the dressing differs.

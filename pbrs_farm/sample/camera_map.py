@@ -118,9 +118,13 @@ class _Panel:
 
 
 def _level_marks(
-    house: House, views: Sequence[View], traces: Sequence[RoomTrace], level_id: str, panel: _Panel,
+    house: House,
+    views: Sequence[View],
+    traces: Sequence[RoomTrace],
+    level_id: str,
+    panel: _Panel,
     is_plan: bool,
-) -> list[Mark]:  # fmt: skip
+) -> list[Mark]:
     rooms = {room.id: room for room in house.rooms if room.level_id == level_id}
     marks = [
         Mark("polygon", tuple(panel(x, z) for x, z in room.polygon), _ROOM, title=shown(room.name))

@@ -46,9 +46,14 @@ class Sampling:
         """Views that no rule rejected. notes: of the report, shown if there are no views."""
         chosen = tuple(views)
         report = CameraReport(
-            preset=fields.preset, source=fields.source, n_views=len(chosen),
-            n_candidates=len(chosen), refused={}, rooms=(), notes=notes,
-        )  # fmt: skip
+            preset=fields.preset,
+            source=fields.source,
+            n_views=len(chosen),
+            n_candidates=len(chosen),
+            refused={},
+            rooms=(),
+            notes=notes,
+        )
         return cls(chosen, report)
 
 

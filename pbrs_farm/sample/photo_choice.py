@@ -24,11 +24,13 @@ from pbrs_farm.sample.camera_report import Verdict
 from pbrs_farm.sample.candidates import Candidates
 from pbrs_farm.sample.view_overlap import DepthOf, overlap
 
+# fmt: off
 NYUV2_SHARES: Final[Mapping[str, float]] = {
     "wall": 0.235, "furniture": 0.139, "objects": 0.121, "floor": 0.098, "window": 0.051,
     "bed": 0.041, "table": 0.035, "chair": 0.033, "sofa": 0.031, "picture": 0.022,
     "ceiling": 0.013, "books": 0.007,
-}  # fmt: skip
+}
+# fmt: on
 """Shares of pixels over NYUv2's 1,449 labelled frames, unlabelled pixels counted."""
 
 _PHOTOGRAPHS: Final[F64] = np.array([NYUV2_SHARES.get(name, 0.0) for name in NYU13_NAMES])

@@ -52,10 +52,14 @@ def cameras_around(
 
 
 def _one(
-    house: House, items: Sequence[Item], distance_m: tuple[float, float],
-    elevation_deg: tuple[float, float], min_visible: float, intrinsics: Intrinsics,
+    house: House,
+    items: Sequence[Item],
+    distance_m: tuple[float, float],
+    elevation_deg: tuple[float, float],
+    min_visible: float,
+    intrinsics: Intrinsics,
     rng: np.random.Generator,
-) -> Camera | None:  # fmt: skip
+) -> Camera | None:
     for _ in range(_TRIES):
         item = items[int(rng.integers(len(items)))]
         target = item.bounds.mean(0)

@@ -188,11 +188,15 @@ class Home:
         names = {item.id: item.name for item in self.house.items}
         rows = [
             {
-                "item": m.item, "name": names[m.item], "part": m.part, "from_s": m.times_s[0],
-                "until_s": m.times_s[-1], "keys": len(m.times_s),
+                "item": m.item,
+                "name": names[m.item],
+                "part": m.part,
+                "from_s": m.times_s[0],
+                "until_s": m.times_s[-1],
+                "keys": len(m.times_s),
             }
             for m in self.house.motions
-        ]  # fmt: skip
+        ]
         return Table(("item", "name", "part", "from_s", "until_s", "keys"), rows)
 
     def __repr__(self) -> str:
@@ -505,9 +509,13 @@ class Home:
 
         house, ids = self.house, self._ids(items)
         bodies = recorded_falls(
-            house, ids, seconds=seconds, from_s=float(from_s), push=np.asarray(push, np.float64),
+            house,
+            ids,
+            seconds=seconds,
+            from_s=float(from_s),
+            push=np.asarray(push, np.float64),
             spin=np.asarray(spin, np.float64),
-        )  # fmt: skip
+        )
         return self._edited(RecordBodies(bodies=bodies))
 
     @checked_call
@@ -533,9 +541,11 @@ class Home:
         except OSError as error:
             raise BadInput(path, "", fault_of(error)) from None
         edit = CoverItems(
-            items=self._ids(items), path=str(path.resolve()), sha256=keys.sha256(data),
+            items=self._ids(items),
+            path=str(path.resolve()),
+            sha256=keys.sha256(data),
             scale_m=scale_m,
-        )  # fmt: skip
+        )
         return self._edited(edit)
 
     @checked_call
@@ -576,11 +586,13 @@ class Home:
             raise BadInput("add_light", "towards", "is where the light itself is")
         rgb = _rgb_of_light("add_light", kelvin, colour) or _rgb_of_kelvin(_WARM_WHITE_K)
         edit = AddLight(
-            item=name or self._free_name("light", ()), position=triple(np.asarray(at, np.float64)),
-            lm=float(lm), rgb_linear=rgb,
+            item=name or self._free_name("light", ()),
+            position=triple(np.asarray(at, np.float64)),
+            lm=float(lm),
+            rgb_linear=rgb,
             direction=None if aim is None else triple(aim / np.linalg.norm(aim)),
             cutoff_rad=math.radians(angle_deg) / 2,
-        )  # fmt: skip
+        )
         return self._edited(edit)
 
     def _edited(self, *edits: Edit) -> Home:
@@ -741,10 +753,16 @@ class Home:
         house, intrinsics = self.house, intrinsics_from_k(size, K, hfov_deg)
         cameras = self.renderer.call(
             lambda: cameras_around(
-                house, found, n, distance_m=distance_m, elevation_deg=elevation_deg,
-                min_visible=min_visible, intrinsics=intrinsics, seed=seed,
+                house,
+                found,
+                n,
+                distance_m=distance_m,
+                elevation_deg=elevation_deg,
+                min_visible=min_visible,
+                intrinsics=intrinsics,
+                seed=seed,
             )
-        )  # fmt: skip
+        )
         return Viewpoints([self.viewpoint(camera) for camera in cameras], home=self)
 
     @checked_call
@@ -770,12 +788,15 @@ class Rooms(Table):
         self._house = house
         rows = [
             {
-                "id": room.id, "name": room.name, "area": round(_area(room), 2),
-                "height": round(room.ceiling_y - room.floor_y, 2), "enclosure": str(room.enclosure),
+                "id": room.id,
+                "name": room.name,
+                "area": round(_area(room), 2),
+                "height": round(room.ceiling_y - room.floor_y, 2),
+                "enclosure": str(room.enclosure),
                 "items": sum(item.room_id == room.id for item in house.items),
             }
             for room in house.rooms
-        ]  # fmt: skip
+        ]
         super().__init__(("id", "name", "area", "height", "enclosure", "items"), rows)
 
     def __getitem__(self, at: Any) -> Any:
@@ -810,15 +831,23 @@ class Joints(Table):
         """house: finished."""
         rows = [
             {
-                "instance": k, "item": item.id, "name": item.name, "part": joint.part,
-                "kind": str(joint.kind), "value": joint.value, "lower": joint.lower,
-                "upper": joint.upper, "open": round(joint.share, 4),
-                "mass_kg": round(joint.mass_kg, 3), "axis": joint.axis, "point": joint.point,
+                "instance": k,
+                "item": item.id,
+                "name": item.name,
+                "part": joint.part,
+                "kind": str(joint.kind),
+                "value": joint.value,
+                "lower": joint.lower,
+                "upper": joint.upper,
+                "open": round(joint.share, 4),
+                "mass_kg": round(joint.mass_kg, 3),
+                "axis": joint.axis,
+                "point": joint.point,
             }
             for k, item in enumerate(house.items, 1)
             if not item.is_outside
             for joint in item.joints
-        ]  # fmt: skip
+        ]
         super().__init__(
             ("item", "name", "part", "kind", "value", "upper", "open", "mass_kg"), rows
         )
@@ -913,13 +942,17 @@ def _words(item: Item) -> tuple[str, ...]:
 def _row(item: Item, instance: int, room_names: Mapping[str, str]) -> dict[str, Any]:
     low, high = item.bounds
     return {
-        "instance": instance, "id": item.id, "name": item.name, "class": NYU40_NAMES[item.nyu40],
-        "kind": str(item.kind), "room": room_names.get(item.room_id or "", ""),
+        "instance": instance,
+        "id": item.id,
+        "name": item.name,
+        "class": NYU40_NAMES[item.nyu40],
+        "kind": str(item.kind),
+        "room": room_names.get(item.room_id or "", ""),
         "size": [round(float(v), 3) for v in high - low],
         "middle": [round(float(v), 3) for v in (low + high) / 2],
         "model": item.pose.model if item.pose else "",
         "world_from_model": item.pose.world_from_model if item.pose else None,
-    }  # fmt: skip
+    }
 
 
 def _area(room: Room) -> float:

@@ -132,10 +132,15 @@ def model(
         raise BadInput(path, "", fault_of(error)) from None
     label = nyu40_of("", category) or nyu40_of("", path.stem) or OTHERPROP
     known = ModelRef(
-        path=str(path.resolve()), sha256=keys.sha256(data),
-        companions=companions_digest(path.resolve()), id=name or keys.slug(path.stem),
-        category=category or path.stem, nyu40=label, scale=UNITS[unit], credit=credit,
-    )  # fmt: skip
+        path=str(path.resolve()),
+        sha256=keys.sha256(data),
+        companions=companions_digest(path.resolve()),
+        id=name or keys.slug(path.stem),
+        category=category or path.stem,
+        nyu40=label,
+        scale=UNITS[unit],
+        credit=credit,
+    )
     if size_m is not None:
         known = known.model_copy(update={"scale": 1e-3})  # so that any unit is small enough to read
         extent = float(np.ptp(model_shape(known, ReadFields()).bounds, axis=0).max())

@@ -162,9 +162,12 @@ def _prisms(triangles: F64) -> list[F64]:
 
 
 def _lift(
-    house: House, things: Sequence[_Body], waiting: Sequence[_Body],
-    surfaces: Sequence[TargetTops], rng: np.random.Generator,
-) -> None:  # fmt: skip
+    house: House,
+    things: Sequence[_Body],
+    waiting: Sequence[_Body],
+    surfaces: Sequence[TargetTops],
+    rng: np.random.Generator,
+) -> None:
     """Put those that wait above their targets, turned at random, apart from each other."""
     balls = [_ball(t.model, t.pose) for t in things if t not in waiting]
     for thing in waiting:
@@ -182,9 +185,12 @@ def _lift(
 
 
 def _spot_above_any(
-    onto: TargetTops | None, surfaces: Sequence[TargetTops], radius: float,
-    balls: Sequence[tuple[F64, float]], rng: np.random.Generator,
-) -> tuple[TargetTops, F64] | None:  # fmt: skip
+    onto: TargetTops | None,
+    surfaces: Sequence[TargetTops],
+    radius: float,
+    balls: Sequence[tuple[F64, float]],
+    rng: np.random.Generator,
+) -> tuple[TargetTops, F64] | None:
     """A target and a place (3,) above it for a ball: where it was dropped before, else by free area."""
     areas = np.array([one.area_m2 for one in surfaces])
     left = list(range(len(surfaces)))
@@ -202,9 +208,11 @@ def _spot_above_any(
 
 
 def _spot_above(
-    tops: Sequence[Worktop], radius: float, balls: Sequence[tuple[F64, float]],
+    tops: Sequence[Worktop],
+    radius: float,
+    balls: Sequence[tuple[F64, float]],
     rng: np.random.Generator,
-) -> F64 | None:  # fmt: skip
+) -> F64 | None:
     """The lowest of some open places (3,) of a ball above a target's tops and above other balls."""
     areas = np.array([top.support.area for top in tops])
     best: F64 | None = None

@@ -44,16 +44,26 @@ _ALWAYS: Final = ("depth", "normal", "valid", "semantic", "class40", "instance",
 
 @overload
 def render(
-    home: Home, cameras: AnyCamera, *, modes: Words = ..., layers: Words = ...,
-    size: Size | None = ..., observe: Callable[[str], None] | None = ...,
+    home: Home,
+    cameras: AnyCamera,
+    *,
+    modes: Words = ...,
+    layers: Words = ...,
+    size: Size | None = ...,
+    observe: Callable[[str], None] | None = ...,
     progress: bool = ...,
-) -> Frame: ...  # fmt: skip
+) -> Frame: ...
 @overload
 def render(
-    home: Home, cameras: Sequence[AnyCamera], *, modes: Words = ...,
-    layers: Words = ..., size: Size | None = ...,
-    observe: Callable[[str], None] | None = ..., progress: bool = ...,
-) -> Views: ...  # fmt: skip
+    home: Home,
+    cameras: Sequence[AnyCamera],
+    *,
+    modes: Words = ...,
+    layers: Words = ...,
+    size: Size | None = ...,
+    observe: Callable[[str], None] | None = ...,
+    progress: bool = ...,
+) -> Views: ...
 @checked_call
 def render(
     home: Home,
@@ -257,9 +267,13 @@ def render_homes(
             text = "another recipe than the first home's: one place holds one recipe"
             raise BadInput(home.id, "recipe", text)
     run = Run(
-        homes=(), store_url=str(out), recipe=made_with[0], sources=[home.source for home in every],
-        want=_wanted_of_words(modes, layers, views, options), n_jobs=jobs,
-    )  # fmt: skip
+        homes=(),
+        store_url=str(out),
+        recipe=made_with[0],
+        sources=[home.source for home in every],
+        want=_wanted_of_words(modes, layers, views, options),
+        n_jobs=jobs,
+    )
     heard: list[Callable[[Event], None]] = [observe] if observe is not None else []
 
     def tell(event: Event) -> None:

@@ -29,11 +29,13 @@ from pbrs_farm.scene.models import Model
 Target = Item | Room
 """What a caller names to put things on: furniture, or a room for its floor."""
 
+# fmt: off
 _FURNITURE: Final = frozenset(
     NYU40_NAMES.index(name)
     for name in ("table", "desk", "counter", "cabinet", "shelves", "bookshelf", "dresser",
                  "night stand", "chair")
-)  # fmt: skip
+)
+# fmt: on
 _EYE_LEVEL_M: Final = 1.4  # above the floor: higher tops are used only where there is no lower one
 _GIVEN_UP: Final = 40  # things in a row that find no place in the air
 _HEIGHT_M: Final = 3.0  # of the space over furniture that is in no room
@@ -115,9 +117,12 @@ def floating_poses(
     """
     rng = np.random.default_rng([seed, 3])
     rooms = [one for one in targets if isinstance(one, Room) and not is_outdoors(one)]
-    volumes = np.array([
-        shapely.Polygon(room.polygon).area * max(room.ceiling_y - room.floor_y, 0) for room in rooms
-    ])  # fmt: skip
+    volumes = np.array(
+        [
+            shapely.Polygon(room.polygon).area * max(room.ceiling_y - room.floor_y, 0)
+            for room in rooms
+        ]
+    )
     air, placed, n_failed = FreeAir(house.items), list[tuple[Model, F64]](), 0
     while len(placed) < n and n_failed < _GIVEN_UP and volumes.any():
         model = models[int(rng.integers(len(models)))]

@@ -89,9 +89,13 @@ class Renderer:
         return self.call(lambda: self._cameras(source, recipe))
 
     def frames(
-        self, source: SourceRef, recipe: Recipe, viewpoints: Sequence[Viewpoint], want: Wanted,
+        self,
+        source: SourceRef,
+        recipe: Recipe,
+        viewpoints: Sequence[Viewpoint],
+        want: Wanted,
         observe: Callable[[str], None] = lambda _view: None,
-    ) -> Views:  # fmt: skip
+    ) -> Views:
         """The viewpoints' frames: the steps of `want` for each, in a store of their own.
 
         Blocks until all are done. Ctrl-C lets the step under way end and begins no other.
@@ -217,9 +221,13 @@ class Renderer:
         return [rasterizer.render_dl(camera) for camera in cameras]
 
     def _frames(
-        self, source: SourceRef, recipe: Recipe, viewpoints: Sequence[Viewpoint],
-        want: Wanted, observe: Callable[[str], None],
-    ) -> Views:  # fmt: skip
+        self,
+        source: SourceRef,
+        recipe: Recipe,
+        viewpoints: Sequence[Viewpoint],
+        want: Wanted,
+        observe: Callable[[str], None],
+    ) -> Views:
         work = replace(self._with_house(source, recipe), layers=want.layers)
         if recipe.cameras.source == "given":
             self._give_cameras(work, viewpoints)

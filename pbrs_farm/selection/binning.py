@@ -35,9 +35,13 @@ class Binning(Record):
 BINNINGS: Final = tuple(
     Binning(colour=colour, depth=depth)
     for colour, depth in (
-        ((2, 2, 2), 8), ((4, 4, 2), 16), ((4, 4, 4), 32), ((8, 8, 4), 64), ((8, 8, 8), 128),
+        ((2, 2, 2), 8),
+        ((4, 4, 2), 16),
+        ((4, 4, 4), 32),
+        ((8, 8, 4), 64),
+        ((8, 8, 8), 128),
     )
-)  # fmt: skip
+)
 
 
 class BinningRow(Record):

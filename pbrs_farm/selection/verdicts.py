@@ -20,16 +20,20 @@ from pbrs_farm.selection.class_balance import balance_classes, class_shares
 from pbrs_farm.selection.histogram_pack import BLACK
 
 # Why a view is rejected, in the order in which the first is named.
+# fmt: off
 REASONS: Final = (
     "failed", "unscored", "black", "too-dark", "blown", "one-surface", "inside-object", "too-few-objects",
     "too-noisy", "missing-textures", "unlike-colour", "unlike-depth", "room-cap",
     "class-balance",
-)  # fmt: skip
+)
+# fmt: on
 _LIGHT_MODES: Final = {str(mode) for mode in Mode if mode.groups}
+# fmt: off
 _NUMBERS: Final = (
     "brightness", "blown", "surface", "near", "n_objects", "noise", "missing_textures",
     "colour_score", "depth_score",
-)  # fmt: skip
+)
+# fmt: on
 
 
 def verdicts(scores: Any, fields: SelectionFields) -> Any:

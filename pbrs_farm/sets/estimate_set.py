@@ -177,9 +177,13 @@ def _bill_line(what: str, amount: float, price: Price | None, per: int) -> BillL
     if price is None:
         return BillLine(what=what, amount=amount, usd_each=None, usd=None, of="", read_on="")
     return BillLine(
-        what=what, amount=amount, usd_each=price.usd / per, usd=round(amount * price.usd / per, 2),
-        of=price.of, read_on=price.date.isoformat(),
-    )  # fmt: skip
+        what=what,
+        amount=amount,
+        usd_each=price.usd / per,
+        usd=round(amount * price.usd / per, 2),
+        of=price.of,
+        read_on=price.date.isoformat(),
+    )
 
 
 def clouds_of(names: Sequence[str]) -> list[str]:

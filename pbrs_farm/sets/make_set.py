@@ -243,9 +243,13 @@ def _write_form(data_set: DataSet, form: SetForm, made: MadePart, out: Path, ste
         folder.parent.mkdir(parents=True, exist_ok=True)
         if form.packing is None:
             export(
-                made.root, folder, form.to, selection=data_set.name, choice=form.choice,
+                made.root,
+                folder,
+                form.to,
+                selection=data_set.name,
+                choice=form.choice,
                 shares=data_set.shares,
-            )  # fmt: skip
+            )
         else:
             views = open_views(str(made.root)).only(selection=data_set.name)
             modes = form.packing.modes or tuple(map(str, made.part.want.modes))
@@ -257,9 +261,13 @@ def _write_form(data_set: DataSet, form: SetForm, made: MadePart, out: Path, ste
     verdicts = [[v.house, v.view, v.reason] for v in made.verdicts]
     choice = repr(form.packing or form.choice)
     digest = keys.digest(
-        form.to, choice, repr(data_set.shares), verdicts, _manifest_digest(made.root),
+        form.to,
+        choice,
+        repr(data_set.shares),
+        verdicts,
+        _manifest_digest(made.root),
         pbrs_farm.__version__,
-    )  # fmt: skip
+    )
     steps.unless_done(f"{form.name}.{made.part.name}", digest, write, files)
 
 

@@ -22,8 +22,13 @@ TEMPORARY: Final = ".incomplete"  # folder of unfinished files
 # What an OSError's number says of the store.
 _FULL: Final = {errno.ENOSPC, errno.EDQUOT}
 _UNAVAILABLE: Final = {
-    errno.EIO, errno.ESTALE, errno.ETIMEDOUT, errno.EAGAIN, errno.EINTR, errno.ENETDOWN,
-}  # fmt: skip
+    errno.EIO,
+    errno.ESTALE,
+    errno.ETIMEDOUT,
+    errno.EAGAIN,
+    errno.EINTR,
+    errno.ENETDOWN,
+}
 _FORBIDDEN: Final = {errno.EACCES, errno.EPERM, errno.EROFS}
 
 

@@ -84,5 +84,9 @@ class RetryingStore:
     def _call(self, act: Callable[[], T]) -> T:
         # Never pause for less than half: many renderers wait for the same store.
         return retry(
-            lambda _n: act(), self._timeout_s, jitter=(0.5, 1.0), max_pause_s=10.0, on_wait=self._on_wait
-        )  # fmt: skip
+            lambda _n: act(),
+            self._timeout_s,
+            jitter=(0.5, 1.0),
+            max_pause_s=10.0,
+            on_wait=self._on_wait,
+        )

@@ -102,12 +102,17 @@ def lamp_table(
     for number, lamp in enumerate(lamps, start=1):
         layer = layers.get(number)
         mean = 0.0 if layer is None else float((layer @ LUMINANCE).mean(dtype=np.float64))
-        rows.append({
-            "number": number, "item": lamp.name, "instance": lamp.item + 1, "room": lamp.room_id,
-            "lm": round(lamp.flux_lm, 1),
-            "share": round(mean / whole, 6) if whole > 0 else 0.0,
-            "layer": None if layer is None else layer_name(number),
-        })  # fmt: skip
+        rows.append(
+            {
+                "number": number,
+                "item": lamp.name,
+                "instance": lamp.item + 1,
+                "room": lamp.room_id,
+                "lm": round(lamp.flux_lm, 1),
+                "share": round(mean / whole, 6) if whole > 0 else 0.0,
+                "layer": None if layer is None else layer_name(number),
+            }
+        )
     return rows
 
 

@@ -186,9 +186,16 @@ class _MirroredPath:
 
 def _no_mirrored_path(path: PathState) -> _MirroredPath:
     return _MirroredPath(
-        mi.Point3f(path.o), mi.Vector3f(path.d), mi.Color3f(0), mi.UInt32(0), mi.UInt32(0),
-        mi.Float(0), mi.Float(1), mi.Bool(False), mi.Bool(False),
-    )  # fmt: skip
+        mi.Point3f(path.o),
+        mi.Vector3f(path.d),
+        mi.Color3f(0),
+        mi.UInt32(0),
+        mi.UInt32(0),
+        mi.Float(0),
+        mi.Float(1),
+        mi.Bool(False),
+        mi.Bool(False),
+    )
 
 
 @dataclass
@@ -240,9 +247,14 @@ class _DiffuseSums:
 
 def _no_diffuse_sums() -> _DiffuseSums:
     return _DiffuseSums(
-        mi.Color3f(0), mi.Color3f(0), mi.Color3f(0), mi.Color3f(0), mi.Color3f(0), mi.Color3f(0),
+        mi.Color3f(0),
+        mi.Color3f(0),
+        mi.Color3f(0),
+        mi.Color3f(0),
+        mi.Color3f(0),
+        mi.Color3f(0),
         mi.Bool(True),
-    )  # fmt: skip
+    )
 
 
 class _Beside(NamedTuple):
@@ -397,9 +409,14 @@ def _trace(
     beside: _Beside,
 ) -> tuple[_LaneSums, _DiffuseSums | None]:
     sums = _LaneSums(
-        mi.Color3f(0), mi.Color3f(0), mi.Color3f(0), mi.Color3f(0), mi.Color3f(0), mi.Vector3f(0),
+        mi.Color3f(0),
+        mi.Color3f(0),
+        mi.Color3f(0),
+        mi.Color3f(0),
+        mi.Color3f(0),
+        mi.Vector3f(0),
         mi.UInt32(0),
-    )  # fmt: skip
+    )
     l_out, l_in = mi.Color3f(0), mi.Color3f(0)  # light of the path under way
     s = mi.UInt32(first)  # its sample
     seen = mi.Bool(False)  # whether it has met a rough surface

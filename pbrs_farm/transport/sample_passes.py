@@ -114,9 +114,15 @@ def _traced(
     total: SampleSums | None = None
     for start, count, camera in _parts_of_shutter(view, first, n):
         lanes = Lanes(
-            i.width_px, i.height_px, start, count, view.seed, n_lamps=n_lamps, streams=view.streams,
+            i.width_px,
+            i.height_px,
+            start,
+            count,
+            view.seed,
+            n_lamps=n_lamps,
+            streams=view.streams,
             splits_diffuse=view.splits_diffuse,
-        )  # fmt: skip
+        )
         sums = trace(view.scene, view.emitters, camera, lanes, view.fields, max_depth=max_depth)
         total = _plus(total, sums)
     assert total is not None, "at least one sample is traced"

@@ -57,15 +57,23 @@ def articulation_table(parts: NDArray[np.uint16], house: House, camera: Camera) 
         if number >= len(counts) or not counts[number]:
             continue
         ys, xs = boxes[number - 1]
-        rows.append({
-            "id": number, "instance": instance, "item": item.id, "part": joint.part,
-            "kind": str(joint.kind), "value": joint.value, "lower": joint.lower,
-            "upper": joint.upper, "mass_kg": joint.mass_kg,
-            "axis_opencv": (turn.T @ np.array(joint.axis)).tolist(),
-            "point_opencv": (turn.T @ (np.array(joint.point) - eye)).tolist(),
-            "pixels": int(counts[number]),
-            "box2d": [int(xs.start), int(ys.start), int(xs.stop), int(ys.stop)],
-        })  # fmt: skip
+        rows.append(
+            {
+                "id": number,
+                "instance": instance,
+                "item": item.id,
+                "part": joint.part,
+                "kind": str(joint.kind),
+                "value": joint.value,
+                "lower": joint.lower,
+                "upper": joint.upper,
+                "mass_kg": joint.mass_kg,
+                "axis_opencv": (turn.T @ np.array(joint.axis)).tolist(),
+                "point_opencv": (turn.T @ (np.array(joint.point) - eye)).tolist(),
+                "pixels": int(counts[number]),
+                "box2d": [int(xs.start), int(ys.start), int(xs.stop), int(ys.stop)],
+            }
+        )
     return {"parts": rows}
 
 

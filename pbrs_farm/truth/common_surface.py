@@ -75,6 +75,12 @@ def _pair_row(room: str, views: Sequence[View], a: int, b: int, shares: F64) -> 
     cosine = float(np.clip(first.towards @ second.towards, -1, 1))
     a_in_b, b_in_a = float(shares[a, b]), float(shares[b, a])
     return ViewPairRow(
-        room, views[a].id, views[b].id, a_in_b, b_in_a, (a_in_b + b_in_a) / 2,
-        float(np.linalg.norm(first.eye - second.eye)), float(np.degrees(np.arccos(cosine))),
-    )  # fmt: skip
+        room,
+        views[a].id,
+        views[b].id,
+        a_in_b,
+        b_in_a,
+        (a_in_b + b_in_a) / 2,
+        float(np.linalg.norm(first.eye - second.eye)),
+        float(np.degrees(np.arccos(cosine))),
+    )

@@ -65,10 +65,16 @@ LIDARS: Final[Mapping[str, LidarSensor]] = {
     "rplidar_a1": LidarSensor("Slamtec RPLIDAR A1", (0.0,), 1.0, 0.15, 12.0, 0.0, 0.005),
     "rplidar_a3": LidarSensor("Slamtec RPLIDAR A3", (0.0,), 0.225, 0.2, 25.0, 0.0, 0.005),
     "vlp16": LidarSensor("Velodyne VLP-16, 10 Hz", _spread(-15, 15, 16), 0.2, 0.5, 100.0, 0.015),
-    "hdl32": LidarSensor("Velodyne HDL-32E, 10 Hz", _spread(-30.67, 10.67, 32), 0.16, 1.0, 100.0, 0.01),
-    "hdl64": LidarSensor("Velodyne HDL-64E, 10 Hz", _spread(-24.8, 2.0, 64), 0.18, 0.9, 120.0, 0.01),
-    "os1_64": LidarSensor("Ouster OS1-64, 1024 x 10", _spread(-22.5, 22.5, 64), 0.3515625, 0.3, 120.0, 0.015),
-}  # fmt: skip
+    "hdl32": LidarSensor(
+        "Velodyne HDL-32E, 10 Hz", _spread(-30.67, 10.67, 32), 0.16, 1.0, 100.0, 0.01
+    ),
+    "hdl64": LidarSensor(
+        "Velodyne HDL-64E, 10 Hz", _spread(-24.8, 2.0, 64), 0.18, 0.9, 120.0, 0.01
+    ),
+    "os1_64": LidarSensor(
+        "Ouster OS1-64, 1024 x 10", _spread(-22.5, 22.5, 64), 0.3515625, 0.3, 120.0, 0.015
+    ),
+}
 """Scanners by name. Accuracies given as +-2 s are stored as s."""
 
 
@@ -130,9 +136,15 @@ def lidar_scan(
     turn, directions = world_from_scanner[:3, :3], sensor.directions()
     n = len(directions)
     beams = _Beams(
-        np.tile(world_from_scanner[:3, 3], (n, 1)), directions @ turn.T, np.tile(np.eye(3), (n, 1, 1)),
-        np.zeros(n), np.ones(n), np.zeros(n, np.uint8), np.zeros(n, np.uint8), np.zeros(n, np.uint16),
-    )  # fmt: skip
+        np.tile(world_from_scanner[:3, 3], (n, 1)),
+        directions @ turn.T,
+        np.tile(np.eye(3), (n, 1, 1)),
+        np.zeros(n),
+        np.ones(n),
+        np.zeros(n, np.uint8),
+        np.zeros(n, np.uint8),
+        np.zeros(n, np.uint16),
+    )
     face = _followed(beams, caster, house, sensor.farthest_m)
     back = np.flatnonzero((face >= 0) & (beams.path_m >= sensor.nearest_m))
     face = face[back]
@@ -147,11 +159,18 @@ def lidar_scan(
     seeming = np.einsum("nij,nj->ni", beams.unfold[back], normal)
     n_azimuths = n // len(sensor.elevations_deg)
     return LidarScan(
-        directions[back] * measured[:, None], measured, true,
-        albedo * cosine * beams.left[back] ** 2, (back // n_azimuths).astype(np.uint16), instance,
-        nyu40_of_instance(house)[instance].astype(np.uint16), seeming @ turn,
-        beams.through[back], beams.mirrored[back], beams.via[back],
-    )  # fmt: skip
+        directions[back] * measured[:, None],
+        measured,
+        true,
+        albedo * cosine * beams.left[back] ** 2,
+        (back // n_azimuths).astype(np.uint16),
+        instance,
+        nyu40_of_instance(house)[instance].astype(np.uint16),
+        seeming @ turn,
+        beams.through[back],
+        beams.mirrored[back],
+        beams.via[back],
+    )
 
 
 def _followed(beams: _Beams, caster: FirstHits, house: House, farthest_m: float) -> I32:

@@ -48,9 +48,13 @@ def mirror_faces(geometry: Geometry, house: House) -> Bools:
 
 
 def mirrored_hits(
-    hit: HitRecord, camera: Camera, geometry: Geometry, house: House, first_hit: FirstHit,
+    hit: HitRecord,
+    camera: Camera,
+    geometry: Geometry,
+    house: House,
+    first_hit: FirstHit,
     textures: Mapping[str, NDArray[np.uint8]],
-) -> HitRecord:  # fmt: skip
+) -> HitRecord:
     """Replace hits on mirrors by those of their reflections; other pixels keep hit.
 
     Depth and normal are those of the virtual image; item and face those of the real one. Without a hit in
@@ -103,9 +107,12 @@ def _met(rays: _Rays, geometry: Geometry) -> tuple[F64, F64]:
 
 
 def _reflected(
-    rays: _Rays, geometry: Geometry, house: House, first_hit: FirstHit,
+    rays: _Rays,
+    geometry: Geometry,
+    house: House,
+    first_hit: FirstHit,
     textures: Mapping[str, NDArray[np.uint8]],
-) -> tuple[_Rays, F64]:  # fmt: skip
+) -> tuple[_Rays, F64]:
     """(the rays behind the mirrors that they meet, the normals (N, 3) that they were reflected about)."""
     way, flat = _met(rays, geometry)
     point = rays.origin + (way - rays.way)[:, None] * rays.direction
@@ -126,9 +133,13 @@ def _reflected(
 
 
 def _shading_normals(
-    face: I32, point: F64, flat: F64, geometry: Geometry, house: House,
+    face: I32,
+    point: F64,
+    flat: F64,
+    geometry: Geometry,
+    house: House,
     textures: Mapping[str, NDArray[np.uint8]],
-) -> F64:  # fmt: skip
+) -> F64:
     """(N, 3) unit normals that light reflects about, on the side of the flat ones (N, 3)."""
     corner = geometry.faces[face]
     a, b, c = np.moveaxis(triangle_corners(geometry.positions, corner), 1, 0)

@@ -48,9 +48,12 @@ class OtherTime:
 
 
 def correspondence(
-    hit: HitRecord, camera: Camera, other: Camera, first_hit: FirstHit,
+    hit: HitRecord,
+    camera: Camera,
+    other: Camera,
+    first_hit: FirstHit,
     then: OtherTime | None = None,
-) -> Correspondence:  # fmt: skip
+) -> Correspondence:
     """The surface points of a hit record, looked for in another camera's picture.
 
     The hit record is camera's own. then: the home when the other camera looks; None where nothing

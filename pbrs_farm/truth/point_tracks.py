@@ -63,10 +63,12 @@ def point_tracks(
     px, depth, hidden = [], [], []
     faces = np.concatenate([face for _points, face, _instance in groups])
     for frame in frames:
-        now = np.concatenate([
-            _taken(start, face, face_motions(frames[q].time_s, frame.time_s))
-            for q, (start, face, _instance) in zip(chosen.tolist(), groups, strict=True)
-        ])  # fmt: skip
+        now = np.concatenate(
+            [
+                _taken(start, face, face_motions(frames[q].time_s, frame.time_s))
+                for q, (start, face, _instance) in zip(chosen.tolist(), groups, strict=True)
+            ]
+        )
         at, z = project_points(now, frame.camera)
         inside = np.flatnonzero(inside_picture(at, z, frame.camera))
         seen = np.zeros(len(now), bool)

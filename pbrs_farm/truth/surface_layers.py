@@ -28,9 +28,12 @@ _ASSUMED_FLOOR_CM = -130.0  # the floor's height from the eye when none is in vi
 
 
 def albedo_label(
-    hit: HitRecord, house: House, geometry: Geometry, textures: Mapping[str, NDArray[np.uint8]],
+    hit: HitRecord,
+    house: House,
+    geometry: Geometry,
+    textures: Mapping[str, NDArray[np.uint8]],
     most: float = 1.0,
-) -> NDArray[np.uint8]:  # fmt: skip
+) -> NDArray[np.uint8]:
     """(H, W, 3) uint8 sRGB: diffuse colour times texture, multiplied in linear light; 0 = nothing.
 
     most: upper limit of the product in each channel, as in the traced light. textures: id -> (H, W, 3 or 4) uint8 sRGB,
@@ -152,9 +155,13 @@ def shading_normals(
 
 
 def bent_by_maps(
-    normals: UnitVectors, face: I32, uv: F32, house: House, geometry: Geometry,
+    normals: UnitVectors,
+    face: I32,
+    uv: F32,
+    house: House,
+    geometry: Geometry,
     textures: Mapping[str, NDArray[np.uint8]],
-) -> UnitVectors:  # fmt: skip
+) -> UnitVectors:
     """(N, 3) float32 interpolated normals at uv (N, 2) on faces (N,), with normal maps; on the same side."""
     normals = normals.copy()
     # Bend material by material: each map is looked up once, for all its points.

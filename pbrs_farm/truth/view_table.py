@@ -39,9 +39,13 @@ def camera_table(camera: Camera) -> dict[str, Any]:
 
 
 def view_table(
-    item_buffer: ItemBuffer, house: House, camera: Camera, *, with_visible_fraction: bool = True,
+    item_buffer: ItemBuffer,
+    house: House,
+    camera: Camera,
+    *,
+    with_visible_fraction: bool = True,
     cut_outs: CutOuts | None = None,
-) -> dict[str, Any]:  # fmt: skip
+) -> dict[str, Any]:
     """The part of view.json that labels need: the camera's table and "instances".
 
     cut_outs: holes of the house's materials, of the caster; items do not cover pixels through their holes.

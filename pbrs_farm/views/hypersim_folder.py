@@ -36,10 +36,16 @@ _MODE: Final = "mlt_il_ol"  # of its pictures: all light
 _DEPTH_MAX_MM: Final = 65535
 _TILTED: Final = "a tilted projection, which no K describes"
 _LAYER_FILES: Final = {
-    "depth": "depth_meters", "depth_z": "depth_meters", "position": "position",
-    "normal": "normal_cam", "valid": "normal_cam", "normal_shading": "normal_bump_cam",
-    "semantic": "semantic", "instance": "semantic_instance", "albedo": "diffuse_reflectance",
-}  # fmt: skip
+    "depth": "depth_meters",
+    "depth_z": "depth_meters",
+    "position": "position",
+    "normal": "normal_cam",
+    "valid": "normal_cam",
+    "normal_shading": "normal_bump_cam",
+    "semantic": "semantic",
+    "instance": "semantic_instance",
+    "albedo": "diffuse_reflectance",
+}
 """Layer of core/layers.py -> which file of a frame it is made of."""
 
 
@@ -122,14 +128,15 @@ class HypersimFolder:
         instance = self.layer(ref, "instance") if "instance" in has else empty
         class40 = self.layer(ref, "semantic") if "semantic" in has else np.zeros_like(instance)
         return {
-            "house": ref.house, "view": ref.view, "width_px": facts.size[0],
-            "height_px": facts.size[1], "K": [list(row) for row in facts.K],
+            "house": ref.house,
+            "view": ref.view,
+            "width_px": facts.size[0],
+            "height_px": facts.size[1],
+            "K": [list(row) for row in facts.K],
             "world_from_camera_opencv": pose.tolist(),
             "world_from_camera_opengl": (pose @ OPENCV_FROM_OPENGL).tolist(),
-            "instances": [
-                _row(int(n), instance == n, class40) for n in np.unique(instance) if n
-            ],
-        }  # fmt: skip
+            "instances": [_row(int(n), instance == n, class40) for n in np.unique(instance) if n],
+        }
 
     def read(self, ref: ViewRef, request: SampleRequest) -> Sample:
         facts, arrays = self.facts(ref), {}
@@ -239,11 +246,18 @@ def _row(number: int, mask: NDArray[np.bool_], class40: NDArray[Any]) -> dict[st
     y, x = np.nonzero(mask.any(1))[0], np.nonzero(mask.any(0))[0]
     pixels = int(mask.sum())
     return {
-        "id": number, "item": str(number), "name": NYU40_NAMES[nyu40], "kind": "object",
-        "nyu40": nyu40, "class": NYU40_NAMES[nyu40], "pixels": pixels,
-        "fraction": pixels / mask.size, "visible_fraction": None, "truncated": None,
+        "id": number,
+        "item": str(number),
+        "name": NYU40_NAMES[nyu40],
+        "kind": "object",
+        "nyu40": nyu40,
+        "class": NYU40_NAMES[nyu40],
+        "pixels": pixels,
+        "fraction": pixels / mask.size,
+        "visible_fraction": None,
+        "truncated": None,
         "box2d": [int(x[0]), int(y[0]), int(x[-1]) + 1, int(y[-1]) + 1],
-    }  # fmt: skip
+    }
 
 
 def _intrinsics(row: Mapping[str, str]) -> Intrinsics | None:
@@ -318,10 +332,16 @@ def _albedo(stored: NDArray[Any], _i: Intrinsics, _metres: float) -> NDArray[np.
 
 _LayerOf = Callable[[NDArray[Any], Intrinsics, float], NDArray[Any]]
 _LAYER_OF: Final[Mapping[str, _LayerOf]] = {
-    "depth": _millimetres, "depth_z": _planar, "position": _position, "normal": _normal,
-    "normal_shading": _normal, "valid": _valid, "semantic": _class40, "instance": _instance,
+    "depth": _millimetres,
+    "depth_z": _planar,
+    "position": _position,
+    "normal": _normal,
+    "normal_shading": _normal,
+    "valid": _valid,
+    "semantic": _class40,
+    "instance": _instance,
     "albedo": _albedo,
-}  # fmt: skip
+}
 
 
 def is_hypersim(folder: Path) -> bool:

@@ -363,10 +363,16 @@ class Farm:
         for task, fault in self.ledger.faults(job):
             kind = kinds.setdefault(
                 fault.fingerprint,
-                {"fingerprint": fault.fingerprint, "class": fault.fault, "n": 0,
-                 "example": fault.message, "log": fault.log, "tasks": [],
-                 "command": rerun_command(job, task)},
-            )  # fmt: skip
+                {
+                    "fingerprint": fault.fingerprint,
+                    "class": fault.fault,
+                    "n": 0,
+                    "example": fault.message,
+                    "log": fault.log,
+                    "tasks": [],
+                    "command": rerun_command(job, task),
+                },
+            )
             kind["n"] += 1
             kind["tasks"] = sorted([*kind["tasks"], task])[:20]
         return sorted(kinds.values(), key=lambda k: (-k["n"], k["fingerprint"]))

@@ -267,9 +267,12 @@ def celery_sender(app: Any) -> Send:
             with pool.acquire(block=True, timeout=10) as producer, producer.batch():
                 for queue, job, task, recipe in messages:
                     app.send_task(
-                        "pbrs.run", args=(job, task, recipe), queue=queue, producer=producer,
+                        "pbrs.run",
+                        args=(job, task, recipe),
+                        queue=queue,
+                        producer=producer,
                         **_MESSAGE_OPTIONS,
-                    )  # fmt: skip
+                    )
         except away as error:
             # What was not sent stays "q" in the ledger, and is sent again when it is old.
             why = error.__cause__ if isinstance(error, BatchPublishError) else error

@@ -101,11 +101,19 @@ def _stage_view(view: JobView, stage: str, n_slots: int) -> StageView:
     is_over = left == 0 and (total > 0 or view.state == "done")
     eta = 0.0 if is_over else _eta_s(left, rate, p50, n_slots)
     return StageView(
-        stage=stage, done=done, running=running, queued=queued,
-        waiting=max(0, left - running - queued), failed=failed, total=total, per_s=rate,
+        stage=stage,
+        done=done,
+        running=running,
+        queued=queued,
+        waiting=max(0, left - running - queued),
+        failed=failed,
+        total=total,
+        per_s=rate,
         mean_s=c.get(f"seconds:{stage}", 0.0) / max(1, sum(counts.values())),
-        p50_s=p50, p90_s=p90, eta_s=eta,
-    )  # fmt: skip
+        p50_s=p50,
+        p90_s=p90,
+        eta_s=eta,
+    )
 
 
 def _eta_s(left: int, rate: float, p50_s: float, n_slots: int) -> float | None:

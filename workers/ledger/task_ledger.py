@@ -17,14 +17,18 @@ from workers.ids import DEFAULT_PRIORITY, MOST_IN_GROUP, STAGES
 if TYPE_CHECKING:
     from workers.job import HouseEntry, JobSpec
 
+# fmt: off
 ClaimAnswer = Literal[
     "run", "done", "failed", "leased", "early", "cancelled", "paused", "held", "version", "recipe",
     "store", "blocked", "draining", "cooling", "elsewhere", "alone", "unknown",
-]  # fmt: skip
+]
+# fmt: on
+# fmt: off
 FaultClass = Literal[
     "data", "bug", "crash", "resource", "machine", "timeout", "silent", "lost",
     "storage", "preempted", "drained", "version", "cancelled",
-]  # fmt: skip
+]
+# fmt: on
 
 TOGETHER_S: Final = 30.0  # of work that a slot claims at once: long beside a claim, short to lose
 MOST_TOGETHER: Final = MOST_IN_GROUP  # tasks of one house that a slot claims at once

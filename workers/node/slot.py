@@ -284,9 +284,15 @@ class Slot:
     def _rejected(self, job: str, task: TaskId, claim: Claim, *, waits: bool) -> None:
         """Say why a task is not run. waits: so that another worker comes first, where it may."""
         _log.log(
-            logging.DEBUG if claim.verdict in ("done", "early", "alone", "blocked") else logging.INFO,
-            "%s/%s not run: %s %s", job, task, claim.verdict, claim.detail,
-        )  # fmt: skip
+            logging.DEBUG
+            if claim.verdict in ("done", "early", "alone", "blocked")
+            else logging.INFO,
+            "%s/%s not run: %s %s",
+            job,
+            task,
+            claim.verdict,
+            claim.detail,
+        )
         # A message came twice, or its holder died with the Celery child that took it.
         if claim.verdict == "leased":
             self._release_dead_sibling(job, task, claim.detail)

@@ -66,11 +66,24 @@ def command(config: FarmConfig) -> list[str]:
     concurrency is the number of slots.
     """
     return [
-        sys.executable, "-m", "celery", "--app", "workers.queue.celery_app", "worker",
-        "--concurrency", str(config.slots), "--queues", ",".join(config.queues or QUEUES),
-        "--hostname", f"pbrs@{config.worker}", "--loglevel", "INFO",
-        "--without-gossip", "--without-mingle", "--without-heartbeat",
-    ]  # fmt: skip
+        sys.executable,
+        "-m",
+        "celery",
+        "--app",
+        "workers.queue.celery_app",
+        "worker",
+        "--concurrency",
+        str(config.slots),
+        "--queues",
+        ",".join(config.queues or QUEUES),
+        "--hostname",
+        f"pbrs@{config.worker}",
+        "--loglevel",
+        "INFO",
+        "--without-gossip",
+        "--without-mingle",
+        "--without-heartbeat",
+    ]
 
 
 def check_machine(config: FarmConfig) -> None:

@@ -41,9 +41,7 @@ class Ground:
     grown_m: float
 
     @staticmethod
-    def of(
-        grid: PlanGrid, corners: F64, floor_y: float, below_y: float, edge_m: float
-    ) -> Ground:  # fmt: skip
+    def of(grid: PlanGrid, corners: F64, floor_y: float, below_y: float, edge_m: float) -> Ground:
         """The heights of triangles (F, 3, 3) of the world in the grid's cells, the floor's elsewhere.
 
         below_y: what begins higher hangs over the cloth and holds nothing. edge_m: how long a net's

@@ -32,10 +32,12 @@ from pbrs_farm.dress.supports import Support
 from pbrs_farm.home.names import words_of_item
 from pbrs_farm.home.room_use import RoomKind
 
+# fmt: off
 _HOLDERS = frozenset({
     CABINET, TABLE, BOOKSHELF, COUNTER, DESK, SHELVES, DRESSER, REFRIGERATOR, TELEVISION, NIGHT_STAND,
     TOILET, SINK, OTHERFURNITURE, OTHERPROP,
-})  # fmt: skip
+})
+# fmt: on
 
 
 class Row(Record):

@@ -43,10 +43,13 @@ def blocked_fronts(_space: HouseSpace, bodies: Sequence[Body]) -> tuple[int, lis
                 for i in (range(len(bodies)) if is_added else new)
                 if i != k
                 and bodies[i].item.nyu40 != CHAIR
-                and bodies[i].low[0] < x1 and bodies[i].high[0] > x0
-                and bodies[i].low[1] < swept.high_y and bodies[i].high[1] > swept.low_y
-                and bodies[i].low[2] < z1 and bodies[i].high[2] > z0
-            ]  # fmt: skip
+                and bodies[i].low[0] < x1
+                and bodies[i].high[0] > x0
+                and bodies[i].low[1] < swept.high_y
+                and bodies[i].high[1] > swept.low_y
+                and bodies[i].low[2] < z1
+                and bodies[i].high[2] > z0
+            ]
             if not near:
                 continue
             n += 1

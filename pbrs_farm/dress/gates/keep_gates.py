@@ -31,8 +31,11 @@ _ROUNDS: Final = 12
 _LARGE_M: Final = 0.35  # smaller added items off the floor block no way, metres
 _ON_FLOOR_M: Final = 0.1
 _WAYS: Final = {
-    "doors": blocked_doors, "windows": covered_windows, "path": closed_ways, "fronts": blocked_fronts,
-}  # fmt: skip
+    "doors": blocked_doors,
+    "windows": covered_windows,
+    "path": closed_ways,
+    "fronts": blocked_fronts,
+}
 _NAMES: Final = ("must_haves", "penetration", "support", "doors", "windows", "path", "fronts")
 CONTACT: Final = ("penetration", "support")
 """The gates of what touches what: doors, windows and ways are where they were."""

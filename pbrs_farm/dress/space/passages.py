@@ -129,8 +129,15 @@ def _from_opening(
         off = sum(span) / 2 - float(middle @ normal)
         quad = quad + normal * (off if abs(off) > _OFF_M else 0.0)
     return _passage(
-        opening.id, opening.item_id, opening.level_id, opening.is_window, quad, normal, rooms, walls_at
-    )  # fmt: skip
+        opening.id,
+        opening.item_id,
+        opening.level_id,
+        opening.is_window,
+        quad,
+        normal,
+        rooms,
+        walls_at,
+    )
 
 
 def _depth_of_walls(
@@ -221,9 +228,9 @@ def _doorway(corners: F64, normal: F64, walls: BaseGeometry) -> F64 | None:
         return None
     s0, s1, t0, t1 = hole
     t = (t0 + t1) / 2
-    return np.array([
-        [*(s * along + t * across), y] for s, y in ((s0, low), (s1, low), (s1, high), (s0, high))
-    ])[:, [0, 2, 1]]  # fmt: skip
+    return np.array(
+        [[*(s * along + t * across), y] for s, y in ((s0, low), (s1, low), (s1, high), (s0, high))]
+    )[:, [0, 2, 1]]
 
 
 def _hole_between(
@@ -253,9 +260,15 @@ def _hole_between(
 
 
 def _passage(
-    name: str, item_id: str | None, level_id: str, is_window: bool, points: F64, normal: F64,
-    rooms: Sequence[tuple[Room, BaseGeometry]], walls_at: WallsAt,
-) -> Passage | None:  # fmt: skip
+    name: str,
+    item_id: str | None,
+    level_id: str,
+    is_window: bool,
+    points: F64,
+    normal: F64,
+    rooms: Sequence[tuple[Room, BaseGeometry]],
+    walls_at: WallsAt,
+) -> Passage | None:
     normal = normal * [1, 0, 1]
     normal = normal / np.linalg.norm(normal)
     along = np.array([normal[2], 0.0, -normal[0]])
@@ -273,9 +286,19 @@ def _passage(
     walls = walls_at(float(centre[1]))
     half = [_half_wall(centre, out, along, width, walls) for out in (normal, -normal)]
     return Passage(
-        name, item_id, level_id, is_window, centre, along, normal, width,
-        float(y.min()), float(y.max()), (sides[0], sides[1]), (half[0], half[1]),
-    )  # fmt: skip
+        name,
+        item_id,
+        level_id,
+        is_window,
+        centre,
+        along,
+        normal,
+        width,
+        float(y.min()),
+        float(y.max()),
+        (sides[0], sides[1]),
+        (half[0], half[1]),
+    )
 
 
 def _room_at(

@@ -72,9 +72,15 @@ def room_faces(
                 origin = plane.point + plane.along * first + [0.0, low_y, 0.0]
                 clear = np.where(covered, np.float32(FAR_M), np.float32(0))
                 face = WallFace(
-                    plane.wall_id, room.id, room.level_id, origin, plane.along, plane.normal, clear,
+                    plane.wall_id,
+                    room.id,
+                    room.level_id,
+                    origin,
+                    plane.along,
+                    plane.normal,
+                    clear,
                     plane.recess(first, end - start),
-                )  # fmt: skip
+                )
                 found.setdefault(k, []).append(face)
     return found
 
@@ -142,8 +148,12 @@ def reach_of(face: WallFace) -> F64:
 
     Metres, world; an item whose box is outside does not limit the face.
     """
-    ends = [face.point(s, y, out) for s in (0.0, face.length) for y in (face.low_y, face.high_y)
-            for out in (-0.03, FAR_M)]  # fmt: skip
+    ends = [
+        face.point(s, y, out)
+        for s in (0.0, face.length)
+        for y in (face.low_y, face.high_y)
+        for out in (-0.03, FAR_M)
+    ]
     return np.array([np.min(ends, 0), np.max(ends, 0)])
 
 

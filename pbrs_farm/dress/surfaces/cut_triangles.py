@@ -42,7 +42,9 @@ def _cut(triangle: F64, side: NDArray[np.int_], d: F64) -> list[F64]:
     pieces = []
     for keep in (1, -1):
         corners = [p for p, s in ring if s in (keep, 0)]
-        pieces += [np.stack([corners[0], corners[k], corners[k + 1]]) for k in range(1, len(corners) - 1)]  # fmt: skip
+        pieces += [
+            np.stack([corners[0], corners[k], corners[k + 1]]) for k in range(1, len(corners) - 1)
+        ]
     return pieces
 
 

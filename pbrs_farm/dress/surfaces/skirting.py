@@ -44,9 +44,13 @@ def wall_plans(house: House) -> tuple[tuple[BaseGeometry, float, float], ...]:
 
 
 def skirting_board(
-    house: House, room: Room, area: BaseGeometry,
-    walls: Sequence[tuple[BaseGeometry, float, float]], height_m: float, material: int,
-) -> Item | None:  # fmt: skip
+    house: House,
+    room: Room,
+    area: BaseGeometry,
+    walls: Sequence[tuple[BaseGeometry, float, float]],
+    height_m: float,
+    material: int,
+) -> Item | None:
     """The room's board along its walls, with gaps at doors; None if no part remains."""
     reach = area.buffer(_OVER_OUTLINE_M, join_style="mitre")
     near = [
@@ -69,10 +73,15 @@ def skirting_board(
     if not surfaces:
         return None
     return Item(
-        id=f"dress-skirting-{room.id}", name=f"Skirting board of {room.name or room.id}",
-        kind=ItemKind.WALL, level_id=room.level_id, surfaces=tuple(surfaces), nyu40=WALL,
-        source_class=BASEBOARD, tags=(BASEBOARD, "dressed:generated#skirting board"),
-    )  # fmt: skip
+        id=f"dress-skirting-{room.id}",
+        name=f"Skirting board of {room.name or room.id}",
+        kind=ItemKind.WALL,
+        level_id=room.level_id,
+        surfaces=tuple(surfaces),
+        nyu40=WALL,
+        source_class=BASEBOARD,
+        tags=(BASEBOARD, "dressed:generated#skirting board"),
+    )
 
 
 def _doors(house: House, room: Room, height_m: float) -> BaseGeometry:
@@ -121,9 +130,12 @@ def _prism(polygon: shapely.Polygon, low_y: float, high_y: float, material: int)
 def _level_surface(name: str, points: F64, faces: np.ndarray, y: float, material: int) -> Surface:
     positions = np.column_stack([points[:, 0], np.full(len(points), y), points[:, 1]])
     return Surface(
-        name, positions.astype(np.float32), np.ascontiguousarray(faces, np.int32), material,
+        name,
+        positions.astype(np.float32),
+        np.ascontiguousarray(faces, np.int32),
+        material,
         points.astype(np.float32),
-    )  # fmt: skip
+    )
 
 
 def _band(ring: F64, low_y: float, high_y: float, material: int, *, is_hole: bool) -> Surface:
@@ -143,6 +155,9 @@ def _band(ring: F64, low_y: float, high_y: float, material: int, *, is_hole: boo
     quads = 4 * np.arange(len(ring))[:, None]
     faces = (quads[:, None] + np.array([[0, 1, 2], [0, 2, 3]])).reshape(-1, 3)
     return Surface(
-        "side", np.array(corners, np.float32), faces.astype(np.int32), material,
+        "side",
+        np.array(corners, np.float32),
+        faces.astype(np.int32),
+        material,
         np.array(uvs, np.float32),
-    )  # fmt: skip
+    )

@@ -82,9 +82,16 @@ class Hanging:
         return self.room.room.floor_y
 
     def hang(
-        self, piece: Piece, shape: Shape, face: int, s: float, low_y: float, *,
-        tags: tuple[str, ...] = (), margin_m: float = 0.05,
-    ) -> Item:  # fmt: skip
+        self,
+        piece: Piece,
+        shape: Shape,
+        face: int,
+        s: float,
+        low_y: float,
+        *,
+        tags: tuple[str, ...] = (),
+        margin_m: float = 0.05,
+    ) -> Item:
         """Hang a piece on faces[face] and take its place; the item.
 
         s: metres along the face, of the middle of its lower edge. low_y: world y of that edge. margin_m:
@@ -94,15 +101,22 @@ class Hanging:
         low, high = shape.bounds
         out = GAP_M - wall.recess_m(s + float(low[0]), s + float(high[0]))
         item = self.house.placed(
-            piece, shape, wall.point(s, low_y, out), wall.turn_rad,
-            item_id=next_id(self.house, self.part), room_id=self.room.room.id,
-            level_id=self.room.room.level_id, tags=tags,
-        )  # fmt: skip
+            piece,
+            shape,
+            wall.point(s, low_y, out),
+            wall.turn_rad,
+            item_id=next_id(self.house, self.part),
+            room_id=self.room.room.id,
+            level_id=self.room.room.level_id,
+            tags=tags,
+        )
         self.house.add(item, self.part, piece)
         self.faces[face] = wall.taken(
-            s + float(low[0]) - margin_m, s + float(high[0]) + margin_m,
-            low_y + float(low[1]) - margin_m, low_y + float(high[1]) + margin_m,
-        )  # fmt: skip
+            s + float(low[0]) - margin_m,
+            s + float(high[0]) + margin_m,
+            low_y + float(low[1]) - margin_m,
+            low_y + float(high[1]) + margin_m,
+        )
         if float(high[2]) > _DEEP_M:
             self._stand_before_others(item, face)
         return item
@@ -118,9 +132,12 @@ class Hanging:
             is_near = -_DEEP_M < out.min() < FAR_M and s.max() > 0 and s.min() < other.length
             if k != face and is_near:
                 self.faces[k] = other.limited(
-                    float(s.min()), float(s.max()), float(low[1]), float(high[1]),
+                    float(s.min()),
+                    float(s.max()),
+                    float(low[1]),
+                    float(high[1]),
                     max(float(out.min()), 0.0),
-                )  # fmt: skip
+                )
 
 
 def _clear_of_doors(face: WallFace, doors: Sequence[tuple[BaseGeometry, float]]) -> WallFace:

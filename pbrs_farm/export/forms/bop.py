@@ -113,10 +113,11 @@ def _write_models(folder: Path, meshes: dict[str, _ModelMesh], numbers: dict[str
         (folder / f"obj_{number:06d}.ply").write_bytes(_ply(mesh))
         low, size = mesh.points.min(0), np.ptp(mesh.points, axis=0)
         info[str(number)] = {
-            "diameter": _diameter(mesh.points), "name": model,
+            "diameter": _diameter(mesh.points),
+            "name": model,
             **{f"min_{axis}": float(v) for axis, v in zip("xyz", low)},
             **{f"size_{axis}": float(v) for axis, v in zip("xyz", size)},
-        }  # fmt: skip
+        }
     _write_json(folder / "models_info.json", info)
 
 
@@ -153,9 +154,10 @@ def _write_scene(
     poses: dict[str, Any] = {}
     info: dict[str, Any] = {}
     coco: dict[str, list[Any]] = {
-        "images": [], "annotations": [],
+        "images": [],
+        "annotations": [],
         "categories": [{"id": n, "name": m, "supercategory": "bop"} for m, n in numbers.items()],
-    }  # fmt: skip
+    }
     for image, view in enumerate(views):
         if view.picture is not None:
             (folder / "rgb" / f"{image:06d}.png").write_bytes(view.data(view.picture))
@@ -174,12 +176,20 @@ def _write_scene(
                 (folder / name / f"{image:06d}_{k:06d}.png").write_bytes(png)
             facts = _mask_facts(alone, seen, view.array("depth") > 0)
             info[str(image)].append(facts)
-            coco["annotations"].append({
-                "id": len(coco["annotations"]) + 1, "image_id": image,
-                "category_id": numbers[row["model"]], "iscrowd": 0, "ignore": False,
-                "area": facts["px_count_visib"], "bbox": facts["bbox_visib"],
-                "segmentation": compressed_runs(seen), "width": size[0], "height": size[1],
-            })  # fmt: skip
+            coco["annotations"].append(
+                {
+                    "id": len(coco["annotations"]) + 1,
+                    "image_id": image,
+                    "category_id": numbers[row["model"]],
+                    "iscrowd": 0,
+                    "ignore": False,
+                    "area": facts["px_count_visib"],
+                    "bbox": facts["bbox_visib"],
+                    "segmentation": compressed_runs(seen),
+                    "width": size[0],
+                    "height": size[1],
+                }
+            )
     files = {
         "scene_camera": camera,
         "scene_gt": poses,
@@ -205,10 +215,13 @@ def _masks(
 def _mask_facts(alone: NDArray[Any], seen: NDArray[Any], valid: NDArray[Any]) -> dict[str, Any]:
     n_all, n_seen = int(alone.sum()), int(seen.sum())
     return {
-        "bbox_obj": _box(alone), "bbox_visib": _box(seen), "px_count_all": n_all,
-        "px_count_valid": int((alone & valid).sum()), "px_count_visib": n_seen,
+        "bbox_obj": _box(alone),
+        "bbox_visib": _box(seen),
+        "px_count_all": n_all,
+        "px_count_valid": int((alone & valid).sum()),
+        "px_count_visib": n_seen,
         "visib_fract": n_seen / n_all if n_all else 0.0,
-    }  # fmt: skip
+    }
 
 
 def _box(mask: NDArray[Any]) -> list[int]:
@@ -243,9 +256,14 @@ def _camera_json(view: ChosenView) -> dict[str, Any]:
     (fx, _skew, cx), (_zero, fy, cy), _last = k_of_whole_centres(view.facts["K"])
     width, height = view.facts["width_px"], view.facts["height_px"]
     return {
-        "fx": fx, "fy": fy, "cx": cx, "cy": cy, "width": width, "height": height,
+        "fx": fx,
+        "fy": fy,
+        "cx": cx,
+        "cy": cy,
+        "width": width,
+        "height": height,
         "depth_scale": 1.0,
-    }  # fmt: skip
+    }
 
 
 def _write_json(path: Path, document: Any) -> None:

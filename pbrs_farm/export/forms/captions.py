@@ -40,10 +40,16 @@ _BEFORE_M: Final = 0.1  # a surface, where it is asked which room is seen
 _POINTS: Final = 20_000  # of a view, about, that tell its room
 _SLACK_M: Final = 0.02  # by which things that stand apart may overlap
 _ROOMS: Final = {
-    RoomKind.LIVING: "living room", RoomKind.BEDROOM: "bedroom", RoomKind.KITCHEN: "kitchen",
-    RoomKind.DINING: "dining room", RoomKind.BATHROOM: "bathroom", RoomKind.OFFICE: "study",
-    RoomKind.HALL: "hall", RoomKind.OUTDOOR: "place outdoors", RoomKind.STORE: "storeroom",
-}  # fmt: skip
+    RoomKind.LIVING: "living room",
+    RoomKind.BEDROOM: "bedroom",
+    RoomKind.KITCHEN: "kitchen",
+    RoomKind.DINING: "dining room",
+    RoomKind.BATHROOM: "bathroom",
+    RoomKind.OFFICE: "study",
+    RoomKind.HALL: "hall",
+    RoomKind.OUTDOOR: "place outdoors",
+    RoomKind.STORE: "storeroom",
+}
 
 
 @dataclass(frozen=True, slots=True, eq=False)

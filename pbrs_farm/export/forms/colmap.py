@@ -96,8 +96,9 @@ def _camera_line(view: ChosenView) -> str:
     i = intrinsics_of(view.facts)
     # FULL_OPENCV has k1 k2 p1 p2 k3 and three more, which are 0.
     model, more = {
-        "radtan": ("FULL_OPENCV", (0.0, 0.0, 0.0)), "fisheye": ("OPENCV_FISHEYE", ()),
-    }.get(i.lens.model, ("PINHOLE", ()))  # fmt: skip
+        "radtan": ("FULL_OPENCV", (0.0, 0.0, 0.0)),
+        "fisheye": ("OPENCV_FISHEYE", ()),
+    }.get(i.lens.model, ("PINHOLE", ()))
     numbers = (i.fx, i.fy, i.cx, i.cy, *i.lens.coefficients, *more)
     return f"{model} {i.width_px} {i.height_px} " + " ".join(f"{v:.9g}" for v in numbers)
 

@@ -45,9 +45,13 @@ _INT16: Final = 32767
 _INDEX: Final = "index.csv"  # ours: which view each frame is
 _CREDITS: Final = "ATTRIBUTION.txt"
 _SPLIT_FIELDS: Final = (
-    "scene_name", "camera_name", "frame_id", "included_in_public_release", "exclude_reason",
+    "scene_name",
+    "camera_name",
+    "frame_id",
+    "included_in_public_release",
+    "exclude_reason",
     "split_partition_name",
-)  # fmt: skip
+)
 
 
 def write_hypersim(views: list[ChosenView], out: Path, choice: Choice) -> None:
@@ -163,11 +167,13 @@ def _boxes(views: Iterable[ChosenView]) -> dict[str, NDArray[Any]]:
 def _parameters(scene: str, view: ChosenView) -> dict[str, Any]:
     i = intrinsics_of(view.facts)
     row: dict[str, Any] = {
-        "scene_name": scene, "settings_output_img_height": i.height_px,
-        "settings_output_img_width": i.width_px, "settings_units_info_meters_scale": 1.0,
+        "scene_name": scene,
+        "settings_output_img_height": i.height_px,
+        "settings_output_img_width": i.width_px,
+        "settings_units_info_meters_scale": 1.0,
         "use_camera_physical": False,
         "settings_camera_fov": float(2 * np.arctan(i.width_px / 2 / i.fx)),
-    }  # fmt: skip
+    }
     for name, matrix in (
         ("M_cam_from_uv", hypersim.cam_from_uv(i)),
         ("M_proj", hypersim.projection(i)),
@@ -333,8 +339,9 @@ def _card(out: Path) -> str:
     if not has_parts:
         light = (
             "`color` is radiance; there is no `diffuse_illumination` and no `residual`"
-            if has_light else "there is no `color`: the views have no light of their own"
-        )  # fmt: skip
+            if has_light
+            else "there is no `color`: the views have no light of their own"
+        )
     return f"""# Views of pbrs_farm in the layout of Hypersim
 
 Frames: {frames}. Scenes: {len(rows)}. `index.csv` says which view each is, `{_CREDITS}` whom to name.

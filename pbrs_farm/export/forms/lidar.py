@@ -29,13 +29,15 @@ from pbrs_farm.run.house_cache import decoded_textures
 from pbrs_farm.truth.lidar import LIDARS, LidarScan, LidarSensor, lidar_scan
 
 # fields of a return: name in PLY, name in PCD, type
+# fmt: off
 _FIELDS: Final = (
     ("x", "x", "<f4"), ("y", "y", "<f4"), ("z", "z", "<f4"), ("intensity", "intensity", "<f4"),
     ("range", "range", "<f4"), ("range_true", "range_true", "<f4"),
     ("nx", "normal_x", "<f4"), ("ny", "normal_y", "<f4"), ("nz", "normal_z", "<f4"),
     ("ring", "ring", "<u2"), ("label", "label", "<u2"), ("instance", "instance", "<u2"),
     ("via", "via", "<u2"), ("through", "through", "u1"), ("mirrored", "mirrored", "u1"),
-)  # fmt: skip
+)
+# fmt: on
 _PLY_TYPES: Final = {"<f4": "float", "<u2": "ushort", "u1": "uchar"}
 _PCD_TYPES: Final = {"<f4": ("4", "F"), "<u2": ("2", "U"), "u1": ("1", "U")}
 
@@ -101,12 +103,18 @@ def scanner_pose(view: ChosenView) -> F64:
 def _records(scan: LidarScan) -> NDArray[Any]:
     """(N,) records of the returns, by PLY's names."""
     columns: dict[str, NDArray[Any]] = {
-        **dict(zip("xyz", scan.points.T, strict=True)), "intensity": scan.intensity,
-        "range": scan.range_m, "range_true": scan.true_range_m,
-        **dict(zip(("nx", "ny", "nz"), scan.normals.T, strict=True)), "ring": scan.ring,
-        "label": scan.label, "instance": scan.instance, "via": scan.via, "through": scan.through,
+        **dict(zip("xyz", scan.points.T, strict=True)),
+        "intensity": scan.intensity,
+        "range": scan.range_m,
+        "range_true": scan.true_range_m,
+        **dict(zip(("nx", "ny", "nz"), scan.normals.T, strict=True)),
+        "ring": scan.ring,
+        "label": scan.label,
+        "instance": scan.instance,
+        "via": scan.via,
+        "through": scan.through,
         "mirrored": scan.mirrored,
-    }  # fmt: skip
+    }
     records = np.empty(len(scan.ring), [(name, kind) for name, _pcd, kind in _FIELDS])
     for name, values in columns.items():
         records[name] = values
@@ -115,13 +123,15 @@ def _records(scan: LidarScan) -> NDArray[Any]:
 
 def _ply(records: NDArray[Any], view: ChosenView, sensor: LidarSensor) -> bytes:
     lines = [
-        "ply", "format binary_little_endian 1.0",
+        "ply",
+        "format binary_little_endian 1.0",
         f"comment {view.house.id}/{view.id}, {sensor.title}: {len(records)} of {sensor.n_beams} beams",
         "comment metres, x forward, y left, z up",
         *([f"comment {view.house.attribution}"] if view.house.attribution else []),
         f"element vertex {len(records)}",
-        *(f"property {_PLY_TYPES[kind]} {name}" for name, _pcd, kind in _FIELDS), "end_header",
-    ]  # fmt: skip
+        *(f"property {_PLY_TYPES[kind]} {name}" for name, _pcd, kind in _FIELDS),
+        "end_header",
+    ]
     return "".join(f"{line}\n" for line in lines).encode("utf-8") + records.tobytes()
 
 
@@ -129,12 +139,18 @@ def _pcd(records: NDArray[Any], words: Iterable[str]) -> bytes:
     x, y, z, qx, qy, qz, qw = words
     sizes, kinds = zip(*(_PCD_TYPES[kind] for _name, _pcd, kind in _FIELDS), strict=True)
     lines = [
-        "# .PCD v0.7 - Point Cloud Data file format", "VERSION 0.7",
-        f"FIELDS {' '.join(name for _ply, name, _kind in _FIELDS)}", f"SIZE {' '.join(sizes)}",
-        f"TYPE {' '.join(kinds)}", f"COUNT {' '.join('1' for _ in _FIELDS)}",
-        f"WIDTH {len(records)}", "HEIGHT 1", f"VIEWPOINT {x} {y} {z} {qw} {qx} {qy} {qz}",
-        f"POINTS {len(records)}", "DATA binary",
-    ]  # fmt: skip
+        "# .PCD v0.7 - Point Cloud Data file format",
+        "VERSION 0.7",
+        f"FIELDS {' '.join(name for _ply, name, _kind in _FIELDS)}",
+        f"SIZE {' '.join(sizes)}",
+        f"TYPE {' '.join(kinds)}",
+        f"COUNT {' '.join('1' for _ in _FIELDS)}",
+        f"WIDTH {len(records)}",
+        "HEIGHT 1",
+        f"VIEWPOINT {x} {y} {z} {qw} {qx} {qy} {qz}",
+        f"POINTS {len(records)}",
+        "DATA binary",
+    ]
     return "".join(f"{line}\n" for line in lines).encode() + records.tobytes()
 
 

@@ -31,9 +31,11 @@ from pbrs_farm.export.intrinsic_parts import intrinsic_parts
 from pbrs_farm.images import exr_from_layers, png_from_array
 
 _LISTS: Final = {
-    "depth": "filename_list", "normal": "filename_list_normals",
-    "lighting": "filename_list_iid_lighting", "appearance": "filename_list_iid_appearance",
-}  # fmt: skip
+    "depth": "filename_list",
+    "normal": "filename_list_normals",
+    "lighting": "filename_list_iid_lighting",
+    "appearance": "filename_list_iid_appearance",
+}
 
 
 def write_marigold(views: list[ChosenView], out: Path, _choice: Choice) -> None:

@@ -22,9 +22,11 @@ Z_UP_FROM_Y_UP: Final[F64] = np.array(
 
 
 _MODELS: Final = {
-    "pinhole": "PINHOLE", "radtan": "OPENCV", "fisheye": "OPENCV_FISHEYE",
+    "pinhole": "PINHOLE",
+    "radtan": "OPENCV",
+    "fisheye": "OPENCV_FISHEYE",
     "equirect": "EQUIRECTANGULAR",
-}  # fmt: skip
+}
 """What nerfstudio calls each lens model; a transforms.json has one."""
 
 
@@ -62,9 +64,13 @@ def _frame(view: ChosenView, folder: Path) -> dict[str, Any]:
     row: dict[str, Any] = {
         "file_path": f"images/{view.id}.png",
         "transform_matrix": pose.tolist(),
-        "w": facts["width_px"], "h": facts["height_px"],
-        "fl_x": k[0, 0], "fl_y": k[1, 1], "cx": k[0, 2], "cy": k[1, 2],
-    }  # fmt: skip
+        "w": facts["width_px"],
+        "h": facts["height_px"],
+        "fl_x": k[0, 0],
+        "fl_y": k[1, 1],
+        "cx": k[0, 2],
+        "cy": k[1, 2],
+    }
     # Coefficients go by OpenCV's names.
     lens = intrinsics_of(facts).lens
     row |= dict(zip(COEFFICIENTS[lens.model], lens.coefficients, strict=True))

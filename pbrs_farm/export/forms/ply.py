@@ -64,14 +64,15 @@ def _header(view: ChosenView, choice: Choice, vertices: NDArray[np.void]) -> byt
     dtype = vertices.dtype
     seen = np.unique(vertices["label"]) if "label" in (dtype.names or ()) else ()
     lines = [
-        "ply", "format binary_little_endian 1.0",
+        "ply",
+        "format binary_little_endian 1.0",
         f"comment {view.house.id}/{view.id}, metres, y up",
         *([f"comment {view.house.attribution}"] if view.house.attribution else []),
         *(f"comment label {k} {choice.class_names[int(k)]}" for k in seen if k),
         f"element vertex {len(vertices)}",
         *(f"property {_TYPES[dtype[name].name]} {name}" for name in dtype.names or ()),
         "end_header",
-    ]  # fmt: skip
+    ]
     return ("\n".join(lines) + "\n").encode("utf-8")
 
 

@@ -28,11 +28,17 @@ from pbrs_farm.export.sequences import required_picture
 from pbrs_farm.formats.film_mp4 import film, film_pace
 from pbrs_farm.formats.layer_file import layer_from_bytes
 
-_SCHEMA: Final = pa.schema([
-    ("id", pa.int64()), ("dataset", pa.string()), ("scene_name", pa.string()),
-    ("question_type", pa.string()), ("question", pa.string()), ("ground_truth", pa.string()),
-    ("options", pa.list_(pa.string())),
-])  # fmt: skip
+_SCHEMA: Final = pa.schema(
+    [
+        ("id", pa.int64()),
+        ("dataset", pa.string()),
+        ("scene_name", pa.string()),
+        ("question_type", pa.string()),
+        ("question", pa.string()),
+        ("ground_truth", pa.string()),
+        ("options", pa.list_(pa.string())),
+    ]
+)
 
 
 def write_questions(views: list[ChosenView], out: Path, choice: Choice) -> None:
@@ -102,13 +108,15 @@ def _conversation(number: int, question: Question, medium: str) -> dict[str, Any
         answer = f"{question.ground_truth}. {question.answer}"
     what = "video" if medium.endswith(".mp4") else "image"
     return {
-        "id": f"{DATASET}__{number}", "type": "mc" if question.options else "oe",
-        "data_source": DATASET, what: medium,
+        "id": f"{DATASET}__{number}",
+        "type": "mc" if question.options else "oe",
+        "data_source": DATASET,
+        what: medium,
         "conversations": [
             {"from": "human", "value": f"<{what}>\n{text}", "task": question.kind},
             {"from": "gpt", "value": answer},
         ],
-    }  # fmt: skip
+    }
 
 
 def _write_references(
@@ -145,11 +153,17 @@ def _write_references(
                 for k, phrase in enumerate(phrases)
             ]
             n_sentences += len(phrases)
-            refs.append({
-                "ref_id": len(refs), "ann_id": row["id"], "image_id": number,
-                "category_id": row["category_id"], "file_name": media[clip.name],
-                "sent_ids": [s["sent_id"] for s in sentences], "sentences": sentences,
-            })  # fmt: skip
+            refs.append(
+                {
+                    "ref_id": len(refs),
+                    "ann_id": row["id"],
+                    "image_id": number,
+                    "category_id": row["category_id"],
+                    "file_name": media[clip.name],
+                    "sent_ids": [s["sent_id"] for s in sentences],
+                    "sentences": sentences,
+                }
+            )
     document = {"images": images, "annotations": annotations, "categories": categories_of(choice)}
     (out / "instances.json").write_text(json.dumps(document, separators=(",", ":")) + "\n", "utf-8")
     (out / "refs.json").write_text(json.dumps(refs, ensure_ascii=False) + "\n", "utf-8")

@@ -42,10 +42,14 @@ class Question:
     def row(self, number: int) -> dict[str, Any]:
         """The columns of VSI-Bench."""
         return {
-            "id": number, "dataset": DATASET, "scene_name": self.clip, "question_type": self.kind,
-            "question": self.text, "ground_truth": self.ground_truth,
+            "id": number,
+            "dataset": DATASET,
+            "scene_name": self.clip,
+            "question_type": self.kind,
+            "question": self.text,
+            "ground_truth": self.ground_truth,
             "options": list(self.options) or None,
-        }  # fmt: skip
+        }
 
 
 class Asker:
@@ -96,9 +100,7 @@ class Asker:
         count[draft.answer] += 1
         return draft
 
-    def _worded(
-        self, clip: Clip, kind: QuestionKind, draft: Draft, rng: random.Random
-    ) -> Question:  # fmt: skip
+    def _worded(self, clip: Clip, kind: QuestionKind, draft: Draft, rng: random.Random) -> Question:
         here = "in the video" if clip.is_walk else "in the image"
         style = rng.choice(kind.styles)
         truth, options = draft.answer, list(draft.options)

@@ -126,9 +126,10 @@ class Clip:
         for thing in self.things:
             groups[thing.noun].append(thing)
         return {
-            noun: own for noun, own in sorted(groups.items())
+            noun: own
+            for noun, own in sorted(groups.items())
             if is_countable(noun) and all(t.first_seen is not None for t in own)
-        }  # fmt: skip
+        }
 
     @cached_property
     def single(self) -> list[Thing]:
@@ -159,13 +160,14 @@ class Clip:
         """The rooms in which the camera stands in some frame, in the house's order."""
         eyes = np.array([pose_opencv(view)[:3, 3] for view in self.views])
         return [
-            room for room in self.house.rooms
+            room
+            for room in self.house.rooms
             if any(
                 room.floor_y <= y <= room.ceiling_y
                 and shapely.Polygon(room.polygon).contains(shapely.Point(x, z))
                 for x, y, z in eyes
             )
-        ]  # fmt: skip
+        ]
 
     def stands_on_floor(self, thing: Thing) -> bool:
         """It stands on the floor of its room, large enough to be a place to go to."""

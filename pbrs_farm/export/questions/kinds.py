@@ -30,10 +30,12 @@ _MARGIN_DEG: Final = 15.0  # that a direction keeps from the border to the next 
 _LATER_FRAMES: Final = 5  # a thing that comes later is not even noticed so many frames before
 # Nouns that some would count together.
 _LOOK_ALIKE: Final = (
-    frozenset({"bookshelf", "set of shelves"}), frozenset({"table", "desk", "counter"}),
-    frozenset({"cabinet", "dresser", "nightstand"}), frozenset({"chair", "stool", "bench"}),
+    frozenset({"bookshelf", "set of shelves"}),
+    frozenset({"table", "desk", "counter"}),
+    frozenset({"cabinet", "dresser", "nightstand"}),
+    frozenset({"chair", "stool", "bench"}),
     frozenset({"bag", "basket", "box"}),
-)  # fmt: skip
+)
 # Nouns of which one means the whole, another a part: a sink's bowl or its cabinet, one curtain or both.
 _UNMEASURED: Final = frozenset({"sink", "curtain", "set of curtains"})
 _SIDES: Final = ("left", "right")
@@ -127,9 +129,11 @@ def _nearest(clip: Clip, rng: random.Random) -> Iterator[Draft]:
         nearest, second = gaps[0][0], gaps[1][0]
         if second >= max(_CLEARLY * nearest, nearest + _CLEARLY_M):
             yield Draft(
-                {"a": target.noun}, gaps[0][1], tuple(other.noun for other in others),
+                {"a": target.noun},
+                gaps[0][1],
+                tuple(other.noun for other in others),
                 (target.instance, *(other.instance for other in others)),
-            )  # fmt: skip
+            )
 
 
 def bearing_deg(stand: F64, face: F64, to: F64) -> float:
@@ -210,7 +214,7 @@ def _routes(clip: Clip, rng: random.Random) -> Iterator[Draft]:
             taken = [_turn(*stops[k : k + 3]) for k in range(n - 2)]
             if not all(taken) or not all(
                 clip.is_way_free(stops[k], stops[k + 1]) for k in range(n - 1)
-            ):  # fmt: skip
+            ):
                 continue
             answer = ", ".join(taken)
             options = list(turns) if n == 3 else _four_of(rng, answer, turns)
@@ -219,8 +223,11 @@ def _routes(clip: Clip, rng: random.Random) -> Iterator[Draft]:
                 steps.append(f"{2 * k + 2}. [please fill in]")
                 steps.append(f"{2 * k + 3}. Go forward until the {stop.noun}.")
             words = {
-                "a": stops[0].noun, "b": stops[1].noun, "c": stops[-1].noun, "steps": " ".join(steps),
-            }  # fmt: skip
+                "a": stops[0].noun,
+                "b": stops[1].noun,
+                "c": stops[-1].noun,
+                "steps": " ".join(steps),
+            }
             yield Draft(words, answer, tuple(options), tuple(t.instance for t in stops))
 
 
@@ -241,14 +248,16 @@ def _orders(clip: Clip, rng: random.Random) -> Iterator[Draft]:
             continue
         right = ", ".join(t.noun for t in by_time)
         wrong = [
-            ", ".join(t.noun for t in order) for order in permutations(by_time)
+            ", ".join(t.noun for t in order)
+            for order in permutations(by_time)
             if list(order) != by_time
-        ]  # fmt: skip
+        ]
         options = (right, *rng.sample(wrong, 3))
         words = {"things": ", ".join(t.noun for t in chosen)}
         yield Draft(words, right, options, tuple(t.instance for t in chosen))
 
 
+# fmt: off
 KINDS: Final = (
     QuestionKind(
         "object_counting", _counts,
@@ -338,5 +347,6 @@ KINDS: Final = (
         ),
         of_walks_only=True,
     ),
-)  # fmt: skip
+)
+# fmt: on
 """All kinds. A kind is added by a row: nothing else lists them."""

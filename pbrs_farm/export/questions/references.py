@@ -101,9 +101,12 @@ class _Picture:
         """Much of its surface is metal, mirror or glass, whose albedo is not what one sees."""
         materials = self.clip.house.materials
         areas = [
-            (float(face_areas(triangle_corners(s.positions, s.faces)).sum()), _is_colourless(materials[s.material]))
+            (
+                float(face_areas(triangle_corners(s.positions, s.faces)).sum()),
+                _is_colourless(materials[s.material]),
+            )
             for s in thing.item.surfaces
-        ]  # fmt: skip
+        ]
         return sum(a for a, is_own in areas if is_own) >= _OF_NO_COLOUR * sum(a for a, _is in areas)
 
 
@@ -113,9 +116,11 @@ def _is_colourless(material: Material) -> bool:
     return material.kind in clear or (coat is not None and coat.is_metal)
 
 
+# fmt: off
 _COLOURS: Final = (
     "black", "grey", "white", "red", "brown", "orange", "yellow", "beige", "green", "blue", "purple", "pink",
-)  # fmt: skip
+)
+# fmt: on
 
 
 def _colour_words(rgb: NDArray[Any]) -> NDArray[Any]:
@@ -195,9 +200,7 @@ def _by_side(picture: _Picture, noun: str, own: Sequence[Thing]) -> Iterator[tup
         yield f"the {_ORDINALS[k]} {noun} from the left", thing
 
 
-def _by_distance(
-    picture: _Picture, noun: str, own: Sequence[Thing]
-) -> Iterator[tuple[str, Thing]]:  # fmt: skip
+def _by_distance(picture: _Picture, noun: str, own: Sequence[Thing]) -> Iterator[tuple[str, Thing]]:
     away = [picture.distance_m(t) for t in own]
     if not np.isfinite(away).all():
         return

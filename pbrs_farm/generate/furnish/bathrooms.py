@@ -32,10 +32,13 @@ def _cornered(piece: Piece, rank: float, length: float | None = None) -> Templat
         w = length
     front = d + _GAP
     return Template(
-        piece.group, (backed(piece, gap=_GAP, size=(w, d, h)),),
-        ((-w / 2, front, w / 2, front + 0.55),), ((-w / 2, front + 0.1, w / 2, front + 0.7),),
-        Stand.CORNER, rank=rank,
-    )  # fmt: skip
+        piece.group,
+        (backed(piece, gap=_GAP, size=(w, d, h)),),
+        ((-w / 2, front, w / 2, front + 0.55),),
+        ((-w / 2, front + 0.1, w / 2, front + 0.7),),
+        Stand.CORNER,
+        rank=rank,
+    )
 
 
 def toilets(shelf: Shelf, *, beside: float = _BESIDE_TOILET_M) -> tuple[Template, ...]:
@@ -64,12 +67,15 @@ def basins(shelf: Shelf, *, small: bool = False, before: float = 0.6) -> tuple[T
         front = d + _GAP
         found.append(
             Template(
-                "washbasin", (slot,), ((-w / 2, front, w / 2, front + before),),
+                "washbasin",
+                (slot,),
+                ((-w / 2, front, w / 2, front + before),),
                 ((-w / 2 - 0.1, front + 0.05, w / 2 + 0.1, front + 0.65),),
-                rank=0.3 - 0.05 * k if not small else -0.1 * k, liking=Liking(corner=0.0),
+                rank=0.3 - 0.05 * k if not small else -0.1 * k,
+                liking=Liking(corner=0.0),
                 stands_off_floor=hangs,
             )
-        )  # fmt: skip
+        )
     return tuple(found)
 
 

@@ -33,14 +33,18 @@ def _double(bed: Piece, shelf: Shelf, n_stands: int) -> Template:
         slots += [backed(stands[0], u) for u in (-at, at)[:n_stands]]
     end = _HEAD_GAP + length
     sides = (
-        (-width / 2 - _SIDE_M, 0.0, -width / 2, end), (width / 2, 0.0, width / 2 + _SIDE_M, end),
-    )  # fmt: skip
+        (-width / 2 - _SIDE_M, 0.0, -width / 2, end),
+        (width / 2, 0.0, width / 2 + _SIDE_M, end),
+    )
     foot = (-width / 2, end, width / 2, end + _SIDE_M)
     return Template(
-        f"{n_stands} nightstands", tuple(slots), (*sides, foot),
+        f"{n_stands} nightstands",
+        tuple(slots),
+        (*sides, foot),
         tuple((u0, 0.7, u1, end) for u0, _, u1, _ in sides),
-        rank=0.5 * n_stands + 0.4 * (width - 1.4), liking=_BED_LIKES,
-    )  # fmt: skip
+        rank=0.5 * n_stands + 0.4 * (width - 1.4),
+        liking=_BED_LIKES,
+    )
 
 
 def single_beds(shelf: Shelf, *, child: bool = False) -> tuple[Template, ...]:
@@ -48,9 +52,11 @@ def single_beds(shelf: Shelf, *, child: bool = False) -> tuple[Template, ...]:
     beds = _beds(shelf, (0.7, 1.16))
     if child:
         liked = [
-            b for b in beds
-            if {"child", "junior", "bunk", "captain"} & _words_of_piece(b) and shelf.likes(b, _CHILDS_SHARE)
-        ]  # fmt: skip
+            b
+            for b in beds
+            if {"child", "junior", "bunk", "captain"} & _words_of_piece(b)
+            and shelf.likes(b, _CHILDS_SHARE)
+        ]
         beds = liked + [b for b in beds if b not in liked]
     stands = shelf.of("nightstand", width=(0.3, 0.55))
     found = []
@@ -121,10 +127,13 @@ def _row_of_wardrobes(piece: Piece, n: int, rank: float, before: float) -> Templ
     slots = tuple(backed(piece, (k - (n - 1) / 2) * (w + 0.005)) for k in range(n))
     half, front = n * w / 2, d + 0.02
     return Template(
-        f"row of {n}", slots, ((-half, front, half, front + before),),
+        f"row of {n}",
+        slots,
+        ((-half, front, half, front + before),),
         ((-half + 0.1, front + 0.2, half - 0.1, front + before),),
-        rank=rank, liking=Liking(corner=0.5),
-    )  # fmt: skip
+        rank=rank,
+        liking=Liking(corner=0.5),
+    )
 
 
 def desks(shelf: Shelf, *, widest: float = 1.65) -> tuple[Template, ...]:
@@ -143,10 +152,14 @@ def desks(shelf: Shelf, *, widest: float = 1.65) -> tuple[Template, ...]:
         room = (-0.4, 0.02 + d, 0.4, 0.02 + d + 0.85)
         found.append(
             Template(
-                "desk", tuple(slots), (room,), ((-0.5, d + 0.5, 0.5, d + 1.2),),
-                rank=0.3 * (1.2 - abs(w - 1.3)), liking=Liking(corner=0.2, daylight=0.3),
+                "desk",
+                tuple(slots),
+                (room,),
+                ((-0.5, d + 0.5, 0.5, d + 1.2),),
+                rank=0.3 * (1.2 - abs(w - 1.3)),
+                liking=Liking(corner=0.2, daylight=0.3),
             )
-        )  # fmt: skip
+        )
     return tuple(found)
 
 
@@ -160,8 +173,9 @@ def toys(shelf: Shelf) -> tuple[Template, ...]:
         w, d, _ = tables[0].size
         seat = stools[0].size[1]
         slots = (
-            backed(tables[0]), slot(stools[0], -w / 2 - seat / 2 + 0.08, 0.02 + d / 2, turns=-1),
+            backed(tables[0]),
+            slot(stools[0], -w / 2 - seat / 2 + 0.08, 0.02 + d / 2, turns=-1),
             slot(stools[0], w / 2 + seat / 2 - 0.08, 0.02 + d / 2, turns=1),
-        )  # fmt: skip
+        )
         found.append(Template("child's table", slots, rank=0.4))
     return tuple(found)

@@ -169,9 +169,11 @@ def _facts_of_room(plan: Plan, space: FurnishSpace, type_: RoomType) -> set[_Fac
 def _measures(space: FurnishSpace, type_: RoomType, rng: np.random.Generator) -> dict[str, Any]:
     x0, z0, x1, z1 = space.bounds
     found: dict[str, Any] = {
-        "bounds": space.bounds, "area": space.area, "row": max(x1 - x0, z1 - z0) - 0.2,
+        "bounds": space.bounds,
+        "area": space.area,
+        "row": max(x1 - x0, z1 - z0) - 0.2,
         "stretches": free_stretches(space, _LEAST_STRETCH_M),
-    }  # fmt: skip
+    }
     if type_ in (RoomType.LIVING, RoomType.STUDIO):  # dining rooms too
         # Large rooms have tables for eight, small ones for four.
         most = 8 if space.area > _FOR_EIGHT_M2 else 6 if space.area > _FOR_SIX_M2 else 4
@@ -184,9 +186,12 @@ def _is_for(some: _ForSome, space: FurnishSpace) -> bool:
 
 
 def _templates(
-    some: Iterable[_Templates], space: FurnishSpace, shelf: Shelf, measures: Mapping[str, Any],
+    some: Iterable[_Templates],
+    space: FurnishSpace,
+    shelf: Shelf,
+    measures: Mapping[str, Any],
     rng: np.random.Generator,
-) -> tuple[Template, ...]:  # fmt: skip
+) -> tuple[Template, ...]:
     found: list[Template] = []
     for one in some:
         if _is_for(one, space) and (one.chance == 1.0 or rng.random() < one.chance):

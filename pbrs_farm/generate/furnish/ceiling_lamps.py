@@ -75,9 +75,16 @@ def _hung(
             free = not any(ground.intersects(t) for t in tall)
             if free and space.polygon.contains(ground):
                 return PlacedPiece(
-                    piece, round(x + dx, 4), round(z + dz, 4), round(low, 4), 0.0, round(w, 4),
-                    round(d, 4), round(h, 4), space.number,
-                )  # fmt: skip
+                    piece,
+                    round(x + dx, 4),
+                    round(z + dz, 4),
+                    round(low, 4),
+                    0.0,
+                    round(w, 4),
+                    round(d, 4),
+                    round(h, 4),
+                    space.number,
+                )
     return None
 
 

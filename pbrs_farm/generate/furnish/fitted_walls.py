@@ -34,9 +34,14 @@ def fitted_show_cases(shelf: Shelf, stretches: Sequence[float]) -> tuple[Templat
 
 
 def _fitted(
-    shelf: Shelf, group: str, stretches: Sequence[float], deepest: float, *, before: float = 0.7,
+    shelf: Shelf,
+    group: str,
+    stretches: Sequence[float],
+    deepest: float,
+    *,
+    before: float = 0.7,
     longest: float = _LONGEST_M,
-) -> tuple[Template, ...]:  # fmt: skip
+) -> tuple[Template, ...]:
     """One piece of a group as long as each stretch of wall (metres, of free_stretches), and as high as the room.
 
     before: free in front of it. Rank grows with length: the longest wall that leaves a way is filled.

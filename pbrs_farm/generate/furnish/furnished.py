@@ -26,11 +26,16 @@ _ON_FLOOR_M: Final = 0.05
 
 
 def furnished(
-    plan: Plan, catalogue: Catalogue, rng: np.random.Generator, style: str = "", *,
-    rooms: Collection[int] | None = None, standing: Mapping[int, Sequence[Rect]] | None = None,
+    plan: Plan,
+    catalogue: Catalogue,
+    rng: np.random.Generator,
+    style: str = "",
+    *,
+    rooms: Collection[int] | None = None,
+    standing: Mapping[int, Sequence[Rect]] | None = None,
     uses: Mapping[int, UseWithoutType] | None = None,
     present: Mapping[int, Collection[str]] | None = None,
-) -> tuple[PlacedPiece, ...]:  # fmt: skip
+) -> tuple[PlacedPiece, ...]:
     """Furnish all rooms of a plan, or some of them, by seed.
 
     rooms: indices to furnish, None = all. standing: room -> rectangles of existing furniture, which
@@ -55,8 +60,9 @@ def furnished(
         # A low ceiling makes tall pieces lower.
         pieces = [
             replace(p, height=min(p.height, round(plan.height - p.elevation - 0.02, 4)))
-            for s in placed.standing for p in s.pieces(number)
-        ]  # fmt: skip
+            for s in placed.standing
+            for p in s.pieces(number)
+        ]
         pieces += ceiling_lamps(space, plan.rooms[number].type, pieces, shelf)
         found[number] = pieces
     return tuple(p for number in sorted(found) for p in found[number])

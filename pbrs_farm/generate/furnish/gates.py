@@ -28,10 +28,14 @@ MUST_HAVES: Final[dict[RoomType, tuple[tuple[str, ...], ...]]] = {
 _MAY_OVERLAP: Final = {
     frozenset(pair)
     for pair in (
-        ("chair", "dining_table"), ("chair", "desk"), ("office_chair", "desk"), ("chair", "coffee_table"),
-        ("stool", "piano"), ("armchair", "dining_table"),
+        ("chair", "dining_table"),
+        ("chair", "desk"),
+        ("office_chair", "desk"),
+        ("chair", "coffee_table"),
+        ("stool", "piano"),
+        ("armchair", "dining_table"),
     )
-}  # fmt: skip
+}
 _ON_FLOOR_M: Final = 0.05
 _DEEP_M: Final = 0.01
 

@@ -85,10 +85,16 @@ def units_of(shelf: Shelf) -> Units | None:
         # Most who buy a set build the oven into it.
         built_in = [p for p in cookers if p.of_set and shelf.likes(p, _BUILT_IN)]
         return Units(
-            fridges[0], sink, (built_in or [p for p in cookers if not p.of_set] or cookers)[0], tuple(bases[:3]), bases[0].size[2],
-            hoods[0] if hoods else None, tuple(own or uppers)[:2], washers[0] if washers else None,
+            fridges[0],
+            sink,
+            (built_in or [p for p in cookers if not p.of_set] or cookers)[0],
+            tuple(bases[:3]),
+            bases[0].size[2],
+            hoods[0] if hoods else None,
+            tuple(own or uppers)[:2],
+            washers[0] if washers else None,
             blinds[0] if blinds else None,
-        )  # fmt: skip
+        )
     return None
 
 
@@ -180,9 +186,16 @@ def _orders(
 
 
 def _arm_rows(
-    k: int, arm: Arm, movable: list[str], widths: dict[str, float], bases: tuple[int, float],
-    units: Units, has_fridge: bool, fridge_high: bool, blind: float,
-) -> Iterator[list[_Module]]:  # fmt: skip
+    k: int,
+    arm: Arm,
+    movable: list[str],
+    widths: dict[str, float],
+    bases: tuple[int, float],
+    units: Units,
+    has_fridge: bool,
+    fridge_high: bool,
+    blind: float,
+) -> Iterator[list[_Module]]:
     n, width = bases
     total = n + len(movable)
     fridge = units.fridge.size[0] + _STRIP
@@ -303,10 +316,11 @@ def _hung(
     reach = UPPER_DEPTH_M + CORNER_M + PULL_M
     is_cooked_there = any(m.kind == "cooker" and m.arm == 1 and m.low < reach for m, _ in found)
     kept = [
-        (m, s) for m, s in found
+        (m, s)
+        for m, s in found
         if not (m.kind == "corner" and is_cooked_there)
         and not (m.kind != "cooker" and m.arm == 1 and m.low < reach and not is_cooked_there)
-    ]  # fmt: skip
+    ]
     return [_place_unit(slot, module, arms, _HUNG_GAP) for module, slot in kept]
 
 

@@ -77,9 +77,13 @@ def _lounge(
     front = (-0.5, depth + 0.1, 0.5, near - 0.05)
     clear: tuple[Rect, ...] = ((-half, depth, half, depth + distance),)
     return Template(
-        f"lounge with {len(chairs)} armchairs", tuple(slots), clear, (front,),
-        rank=1.0 + 0.6 * len(chairs) + 0.3 * (w - 1.8), liking=Liking(corner=0.0, back=0.9),
-    )  # fmt: skip
+        f"lounge with {len(chairs)} armchairs",
+        tuple(slots),
+        clear,
+        (front,),
+        rank=1.0 + 0.6 * len(chairs) + 0.3 * (w - 1.8),
+        liking=Liking(corner=0.0, back=0.9),
+    )
 
 
 def dining(shelf: Shelf, seats: int, *, at_wall: bool = False) -> tuple[Template, ...]:
@@ -137,9 +141,11 @@ def _free(
             _out(shelf, table, chair, 0.0, turns, most) for turns in (0, 2, -1, 1)
         )
         slots += [
-            slot(chair, 0.0, -d / 2 - before), slot(chair, 0.0, d / 2 + behind, turns=2),
-            slot(chair, -w / 2 - left, 0.0, turns=-1), slot(chair, w / 2 + right, 0.0, turns=1),
-        ]  # fmt: skip
+            slot(chair, 0.0, -d / 2 - before),
+            slot(chair, 0.0, d / 2 + behind, turns=2),
+            slot(chair, -w / 2 - left, 0.0, turns=-1),
+            slot(chair, w / 2 + right, 0.0, turns=1),
+        ]
         around = (-w / 2 - 0.6, -d / 2 - 0.6, w / 2 + 0.6, d / 2 + 0.6)
         clear = [around]
     else:
@@ -163,9 +169,14 @@ def _free(
         clear = [(-end, -far, end, far)]
     front = (-w / 2 - 0.6, -d / 2 - 0.8, w / 2 + 0.6, d / 2 + 0.8)
     return Template(
-        f"table for {n + 2 * heads}", tuple(slots), tuple(clear), (front,), Stand.FREE, rank=rank,
+        f"table for {n + 2 * heads}",
+        tuple(slots),
+        tuple(clear),
+        (front,),
+        Stand.FREE,
+        rank=rank,
         liking=Liking(middle=0.1, daylight=0.15),
-    )  # fmt: skip
+    )
 
 
 def _out(
@@ -199,9 +210,13 @@ def _at_wall(shelf: Shelf, table: Piece, chair: Piece, rank: float) -> Template:
         clear = (-w / 2, d, w / 2, d + _BEHIND_CHAIR_M)
     front = (-w / 2 - 0.5, 0.3, w / 2 + 0.5, d + 0.9)
     return Template(
-        f"table for {n} at a wall", tuple(slots), (clear,), (front,), rank=rank,
+        f"table for {n} at a wall",
+        tuple(slots),
+        (clear,),
+        (front,),
+        rank=rank,
         liking=Liking(corner=0.1, daylight=0.15),
-    )  # fmt: skip
+    )
 
 
 def _chair_offsets(width: float, n: int) -> list[float]:
@@ -219,10 +234,14 @@ def shelves(shelf: Shelf, *, widest: float = 1.8) -> tuple[Template, ...]:
             depth = piece.size[1] + 0.02
             found.append(
                 Template(
-                    "two bookcases", pair, ((-w, depth, w, depth + 0.5),),
-                    ((-w, depth + 0.1, w, depth + 0.6),), rank=0.5, liking=Liking(corner=0.4),
+                    "two bookcases",
+                    pair,
+                    ((-w, depth, w, depth + 0.5),),
+                    ((-w, depth + 0.1, w, depth + 0.6),),
+                    rank=0.5,
+                    liking=Liking(corner=0.4),
                 )
-            )  # fmt: skip
+            )
     return tuple(found)
 
 

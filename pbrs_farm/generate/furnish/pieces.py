@@ -71,10 +71,13 @@ class Shelf:
         self._tops: dict[str, float] = {}
 
     def of(
-        self, *groups: str, width: tuple[float, float] = (0.0, 9.0),
-        depth: tuple[float, float] = (0.0, 9.0), height: tuple[float, float] = (0.0, 9.0),
+        self,
+        *groups: str,
+        width: tuple[float, float] = (0.0, 9.0),
+        depth: tuple[float, float] = (0.0, 9.0),
+        height: tuple[float, float] = (0.0, 9.0),
         without: str = "",
-    ) -> list[Piece]:  # fmt: skip
+    ) -> list[Piece]:
         """Pieces of the catalogue of some groups and sizes, the preferred one first.
 
         groups: of the catalogue, `bed`, `wardrobe`. width, depth, height: (least, most) metres, both
@@ -134,9 +137,14 @@ class Shelf:
 
 
 def slot(
-    piece: Piece, u: float, v: float, *, turns: int = 0, elevation: float = 0.0,
+    piece: Piece,
+    u: float,
+    v: float,
+    *,
+    turns: int = 0,
+    elevation: float = 0.0,
     size: tuple[float, float, float] | None = None,
-) -> PieceSlot:  # fmt: skip
+) -> PieceSlot:
     """A piece in the frame of a template, with the middle of its ground at (u, v).
 
     u: along the wall to the right, v: away from it, metres; turns: quarter turns of the piece to the
@@ -147,9 +155,13 @@ def slot(
 
 
 def backed(
-    piece: Piece, u: float = 0.0, *, gap: float = 0.02, elevation: float = 0.0,
+    piece: Piece,
+    u: float = 0.0,
+    *,
+    gap: float = 0.02,
+    elevation: float = 0.0,
     size: tuple[float, float, float] | None = None,
-) -> PieceSlot:  # fmt: skip
+) -> PieceSlot:
     """A piece with its back at the wall of a template.
 
     u: of its middle along the wall; gap: between its back and the wall, metres; the rest as in slot.
@@ -159,10 +171,17 @@ def backed(
 
 
 def single(
-    piece: Piece, *, before: float = 0.6, corner: float = 0.3, rank: float = 0.0,
-    daylight: float = 0.0, size: tuple[float, float, float] | None = None, gap: float = 0.02,
-    elevation: float = 0.0, beside: float = 0.0,
-) -> Template:  # fmt: skip
+    piece: Piece,
+    *,
+    before: float = 0.6,
+    corner: float = 0.3,
+    rank: float = 0.0,
+    daylight: float = 0.0,
+    size: tuple[float, float, float] | None = None,
+    gap: float = 0.02,
+    elevation: float = 0.0,
+    beside: float = 0.0,
+) -> Template:
     """A template of one piece with its back at a wall and `before` metres free in front.
 
     before: 0 = nothing need be free; from 0.4 on somebody must be able to walk there. corner, daylight:
@@ -174,6 +193,10 @@ def single(
     clear = ((-half, gap if beside else front, half, front + before),) if before else ()
     reach = ((-w / 2, front + 0.05, w / 2, front + max(before, 0.6)),) if before >= 0.4 else ()
     return Template(
-        piece.group, (backed(piece, gap=gap, elevation=elevation, size=size),), clear, reach,
-        rank=rank, liking=Liking(corner=corner, daylight=daylight),
-    )  # fmt: skip
+        piece.group,
+        (backed(piece, gap=gap, elevation=elevation, size=size),),
+        clear,
+        reach,
+        rank=rank,
+        liking=Liking(corner=corner, daylight=daylight),
+    )

@@ -50,9 +50,14 @@ class _Search:
     limit: int = 0
 
     def descend(
-        self, level: int, alive: list[Bools], free: Bools, standing: tuple[Standing, ...],
-        missing: tuple[str, ...], score: float,
-    ) -> bool:  # fmt: skip
+        self,
+        level: int,
+        alive: list[Bools],
+        free: Bools,
+        standing: tuple[Standing, ...],
+        missing: tuple[str, ...],
+        score: float,
+    ) -> bool:
         """Place the groups from a level on; True if all of them are placed."""
         if level == len(self.groups):
             if score > self.best.score:
@@ -98,10 +103,15 @@ class _Search:
 
 
 def arranged(
-    groups: Sequence[PieceGroup], places: Sequence[Places], walk: WalkMap, *,
-    start: Arrangement | None = None, roots: int = _ROOTS, nodes: int = _NODES_A_ROOT,
+    groups: Sequence[PieceGroup],
+    places: Sequence[Places],
+    walk: WalkMap,
+    *,
+    start: Arrangement | None = None,
+    roots: int = _ROOTS,
+    nodes: int = _NODES_A_ROOT,
     least_share: float = 0.0,
-) -> Arrangement:  # fmt: skip
+) -> Arrangement:
     """Find the best arrangement of groups, in this order, added to the existing furniture.
 
     Depth first: each group tries its best places that overlap nothing and keep all required areas

@@ -103,9 +103,11 @@ def overlap(rects: F64, others: F64) -> Bools:
         return np.zeros(rects.shape[:2], bool)
     a, b, e = rects[:, :, None, :], others[None, None], _TOUCH_M
     hit = (
-        (a[..., 0] < b[..., 2] - e) & (a[..., 2] > b[..., 0] + e)
-        & (a[..., 1] < b[..., 3] - e) & (a[..., 3] > b[..., 1] + e)
-    )  # fmt: skip
+        (a[..., 0] < b[..., 2] - e)
+        & (a[..., 2] > b[..., 0] + e)
+        & (a[..., 1] < b[..., 3] - e)
+        & (a[..., 3] > b[..., 1] + e)
+    )
     return np.asarray(hit.any(2))
 
 
@@ -125,9 +127,11 @@ def places_of(group: PieceGroup, space: FurnishSpace, rng: np.random.Generator) 
         scores.append(_scores(template, here[ok], walls[ok], space) + noise[ok])
         template_of.append(np.full(int(ok.sum()), number))
     return _sorted_places(
-        versions, np.concatenate([np.zeros(0, int), *template_of]),
-        np.concatenate([np.zeros((0, 4)), *frames]), np.concatenate([np.zeros(0), *scores]),
-    )  # fmt: skip
+        versions,
+        np.concatenate([np.zeros(0, int), *template_of]),
+        np.concatenate([np.zeros((0, 4)), *frames]),
+        np.concatenate([np.zeros(0), *scores]),
+    )
 
 
 def fixed_places(found: Sequence[Standing]) -> Places:

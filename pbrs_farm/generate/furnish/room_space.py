@@ -114,10 +114,16 @@ def room_space(plan: Plan, number: int) -> FurnishSpace:
             ways.append(way)
             doors.append(free)
     return FurnishSpace(
-        number, polygon, unary_union([polygon, *(n.buffer(_EPSILON) for n in floors)]),
-        walls, outside_of(polygon), np.array(doors).reshape(-1, 4), tuple(ways), tuple(windows),
+        number,
+        polygon,
+        unary_union([polygon, *(n.buffer(_EPSILON) for n in floors)]),
+        walls,
+        outside_of(polygon),
+        np.array(doors).reshape(-1, 4),
+        tuple(ways),
+        tuple(windows),
         plan.height,
-    )  # fmt: skip
+    )
 
 
 def with_bodies(space: FurnishSpace, bodies: Sequence[Rect]) -> FurnishSpace:
@@ -159,9 +165,11 @@ def outside_of(polygon: Polygon) -> F64:
     x0, z0, x1, z1 = polygon.bounds
     far = 3.0
     rects = [
-        (x0 - far, z0 - far, x0, z1 + far), (x1, z0 - far, x1 + far, z1 + far),
-        (x0 - far, z0 - far, x1 + far, z0), (x0 - far, z1, x1 + far, z1 + far),
-    ]  # fmt: skip
+        (x0 - far, z0 - far, x0, z1 + far),
+        (x1, z0 - far, x1 + far, z1 + far),
+        (x0 - far, z0 - far, x1 + far, z0),
+        (x0 - far, z1, x1 + far, z1 + far),
+    ]
     # Cut the bounds at every corner; keep cells whose centre is outside.
     points = list(polygon.exterior.coords)
     xs, zs = sorted({p[0] for p in points}), sorted({p[1] for p in points})

@@ -53,9 +53,11 @@ def outdoor_sets(shelf: Shelf) -> tuple[Template, ...]:
             seats = (slot(chair, -left, v, turns=-1), slot(chair, right, v, turns=1))
             found.append(
                 Template(
-                    "table and two chairs", (slot(table, 0.0, v), *seats), rank=0.5,
+                    "table and two chairs",
+                    (slot(table, 0.0, v), *seats),
+                    rank=0.5,
                     liking=Liking(corner=0.4),
                 )
-            )  # fmt: skip
+            )
     found += [Template("chair", (backed(c, gap=0.06),)) for c in chairs[:2]]
     return tuple(found)

@@ -88,9 +88,16 @@ class PieceSlot:
         x, z = frame.point(self.u, self.v)
         angle = (frame.angle_rad + self.turns * math.pi / 2) % (2 * math.pi)
         return PlacedPiece(
-            self.piece, round(x, 4), round(z, 4), round(self.elevation, 4), round(angle, 6),
-            round(self.width, 4), round(self.depth, 4), round(self.height, 4), room,
-        )  # fmt: skip
+            self.piece,
+            round(x, 4),
+            round(z, 4),
+            round(self.elevation, 4),
+            round(angle, 6),
+            round(self.width, 4),
+            round(self.depth, 4),
+            round(self.height, 4),
+            room,
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,9 +136,11 @@ class Template:
         """The rectangle around its bodies."""
         rects = [slot.rect for slot in self.bodies]
         return (
-            min(r[0] for r in rects), min(r[1] for r in rects),
-            max(r[2] for r in rects), max(r[3] for r in rects),
-        )  # fmt: skip
+            min(r[0] for r in rects),
+            min(r[1] for r in rects),
+            max(r[2] for r in rects),
+            max(r[3] for r in rects),
+        )
 
     def mirrored(self) -> Template:
         """Left and right exchanged; the pieces themselves are not."""
@@ -140,9 +149,12 @@ class Template:
             return tuple((-u1, v0, -u0, v1) for u0, v0, u1, v1 in rects)
 
         return replace(
-            self, slots=tuple(slot.mirrored() for slot in self.slots),
-            clear=turned(self.clear), fronts=turned(self.fronts), end=-self.end,
-        )  # fmt: skip
+            self,
+            slots=tuple(slot.mirrored() for slot in self.slots),
+            clear=turned(self.clear),
+            fronts=turned(self.fronts),
+            end=-self.end,
+        )
 
 
 @dataclass(frozen=True, slots=True)

@@ -148,9 +148,13 @@ def _then(matrix: _Matrix, text: str) -> _Matrix:
         a, b, c, d, e, f = matrix
         g, h, i, j, k, m = own
         matrix = (
-            a * g + c * h, b * g + d * h, a * i + c * j, b * i + d * j,
-            a * k + c * m + e, b * k + d * m + f,
-        )  # fmt: skip
+            a * g + c * h,
+            b * g + d * h,
+            a * i + c * j,
+            b * i + d * j,
+            a * k + c * m + e,
+            b * k + d * m + f,
+        )
     return matrix
 
 
@@ -195,7 +199,7 @@ def _storey_of_drawing(floor: _Floor, scale: float, left_out: LeftOut) -> Parsed
         row["width"] = max(row["width"], 0.3)
     things = [
         t for words, s in floor.of("FixedFurniture") for t in _things_of_shape(words, metres(s))
-    ]  # fmt: skip
+    ]
     areas = []
     for words, s in floor.of("Space"):
         shape = largest_part(shapely.make_valid(metres(s)).difference(walls))
@@ -213,8 +217,9 @@ def _things_of_shape(words: Sequence[str], shape: Polygon) -> list[Thing]:
     low = 1.4 if name.startswith("WallCabinet") else 0.0
     return [
         Thing("cubicasa-icon", name, b.x, b.z, low, b.width, b.depth, height, b.turn_rad)
-        for b in footprints(shape) if min(b.width, b.depth) > 0.02
-    ]  # fmt: skip
+        for b in footprints(shape)
+        if min(b.width, b.depth) > 0.02
+    ]
 
 
 def _opened(rooms: list[dict[str, Any]], left_out: LeftOut) -> list[dict[str, Any]]:
@@ -243,8 +248,14 @@ def _opened(rooms: list[dict[str, Any]], left_out: LeftOut) -> list[dict[str, An
 
 
 FORMAT = PlanFormat(
-    title="CubiCasa5k", files="model.svg", order=150, brings="rooms, doors, windows, fixtures",
-    where="zenodo.org/records/2613548", licence="CC BY-NC-SA 4.0", suffixes=(".svg",),
-    shared_suffixes=frozenset({".svg"}), contains=re.compile(rb"class=[\"']Space\b"),
+    title="CubiCasa5k",
+    files="model.svg",
+    order=150,
+    brings="rooms, doors, windows, fixtures",
+    where="zenodo.org/records/2613548",
+    licence="CC BY-NC-SA 4.0",
+    suffixes=(".svg",),
+    shared_suffixes=frozenset({".svg"}),
+    contains=re.compile(rb"class=[\"']Space\b"),
     read=lambda path, _value, _part: plan_of_svg(path),
-)  # fmt: skip
+)

@@ -42,13 +42,15 @@ from pbrs_farm.regular_files import MAX_DIGEST_BYTES, fault_of, open_regular
 _NEEDED: Final = ("entity_type", "entity_subtype", "geometry", "apartment_id", "floor_id")
 _MORE: Final = ("elevation", "height")
 _OPENINGS: Final = {"DOOR": "door", "ENTRANCE_DOOR": "entrance", "WINDOW": "window"}
+# fmt: off
 _DRAWN: Final = {
     "opening": tuple(_OPENINGS), "separator": ("RAILING", "COLUMN"),
     "feature": (
         "KITCHEN", "SINK", "TOILET", "BATHTUB", "SHOWER", "WASHING_MACHINE", "BUILT_IN_FURNITURE",
         "STAIRS",
     ),
-}  # fmt: skip
+}
+# fmt: on
 _NO_ID: Final = ("", "nan", "None")
 _NEAR_M: Final = 0.6  # from an apartment's rooms to its openings
 _BESIDE_M: Final = 0.1  # from them to its fixtures
@@ -60,9 +62,14 @@ _MOST_NESTED: Final = 3  # brackets of a multipolygon
 _FRENCH_M: Final = 0.3  # a window that begins below is a door of glass
 # Default heights of fixtures; 1 m for others.
 _HEIGHTS: Final = {
-    "KITCHEN": 0.9, "SINK": 0.85, "TOILET": 0.8, "BATHTUB": 0.6, "SHOWER": 2.0,
-    "WASHING_MACHINE": 0.85, "BUILT_IN_FURNITURE": 2.2,
-}  # fmt: skip
+    "KITCHEN": 0.9,
+    "SINK": 0.85,
+    "TOILET": 0.8,
+    "BATHTUB": 0.6,
+    "SHOWER": 2.0,
+    "WASHING_MACHINE": 0.85,
+    "BUILT_IN_FURNITURE": 2.2,
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,9 +96,11 @@ def plan_of_rows(path: Path, apartment: str = "") -> ParsedPlan:
         what = f"has no apartment {apartment!r}" if apartment else f"has {len(floors)} apartments"
         first = next(iter(floors))
         raise BadInput(
-            path, "apartment_id", f"{what}: {some}",
+            path,
+            "apartment_id",
+            f"{what}: {some}",
             hint=f"--apartment {first}, or the word {path.name}#apartment={first} of run",
-        )  # fmt: skip
+        )
     left_out = LeftOut()
     rows = _of_apartment(path, floors[apartment])
     storeys = []
@@ -186,9 +195,11 @@ def _parse_row(path: Path, line: int, row: dict[str, str], kind: str) -> _Row:
 def _bracket_depth(text: str) -> int:
     """How deep the brackets of the text's beginning are nested."""
     head = text[:200]
-    return len(head) - len(head.replace("(", "")) if ")" not in head else max(
-        head[:k].count("(") - head[:k].count(")") for k in range(1, len(head) + 1)
-    )  # fmt: skip
+    return (
+        len(head) - len(head.replace("(", ""))
+        if ")" not in head
+        else max(head[:k].count("(") - head[:k].count(")") for k in range(1, len(head) + 1))
+    )
 
 
 def _parse_number(text: str | None) -> float | None:
@@ -205,19 +216,24 @@ def _storey_of_rows(
     grounds = [shapely.make_valid(a.shape) for a in areas]
     ground = unary_union(grounds)
     near = [
-        r for r in rows
+        r
+        for r in rows
         if r.kind != "area:own"
-        and ground.distance(r.shape) < (_NEAR_M if r.kind == "opening" else _BESIDE_M + _NEAR_M * (r.kind == "separator"))
-    ]  # fmt: skip
+        and ground.distance(r.shape)
+        < (_NEAR_M if r.kind == "opening" else _BESIDE_M + _NEAR_M * (r.kind == "separator"))
+    ]
     height = statistics.median(
         [a.height for a in areas if a.height and 2 <= a.height <= 6] or [2.5]
     )
     floor = min((a.elevation for a in areas if a.elevation is not None), default=None)
     openings = [_opening_of_row(r, height, floor) for r in near if r.kind == "opening"]
     things = [
-        t for r in near if r.kind == "feature"
-        for t in _things_of_row(r, height, floor, left_out) if ground.distance(shapely.Point(t.x, t.z)) < _BESIDE_M
-    ]  # fmt: skip
+        t
+        for r in near
+        if r.kind == "feature"
+        for t in _things_of_row(r, height, floor, left_out)
+        if ground.distance(shapely.Point(t.x, t.z)) < _BESIDE_M
+    ]
     railings = [r.shape for r in near if r.subtype == "RAILING"]
     drawn = [DrawnArea(a.shape, a.subtype, is_plain=a.subtype == "ROOM") for a in areas]
     rooms = typed_rooms("swiss", drawn, things, openings, left_out, railings)
@@ -240,10 +256,11 @@ def _wall_of_railing(row: _Row, balconies: Any, height: float) -> dict[str, Any]
         return None
     dx, dz = math.cos(box.turn_rad) * box.width / 2, -math.sin(box.turn_rad) * box.width / 2
     return {
-        "start": [box.x - dx, box.z - dz], "end": [box.x + dx, box.z + dz],
+        "start": [box.x - dx, box.z - dz],
+        "end": [box.x + dx, box.z + dz],
         "thickness": min(max(box.depth, 0.04), 2.0),
         "height": min(PARAPET_HEIGHT_M, height) if is_railing else None,
-    }  # fmt: skip
+    }
 
 
 def _opening_of_row(row: _Row, height: float, floor: float | None) -> dict[str, Any]:
@@ -273,12 +290,18 @@ def _things_of_row(row: _Row, height: float, floor: float | None, left_out: Left
     return [
         Thing("swiss-feature", row.subtype, b.x, b.z, low, b.width, b.depth, tall, b.turn_rad)
         for b in footprints(row.shape)
-    ]  # fmt: skip
+    ]
 
 
 FORMAT = PlanFormat(
-    title="Swiss Dwellings", files="geometries.csv and --apartment ID", order=110,
-    brings="rooms, doors, windows, fixtures", where="zenodo.org/records/7788422", licence="CC BY 4.0",
-    suffixes=(".csv",), shared_suffixes=frozenset({".csv"}), contains=re.compile(rb"\bapartment_id\b"),
+    title="Swiss Dwellings",
+    files="geometries.csv and --apartment ID",
+    order=110,
+    brings="rooms, doors, windows, fixtures",
+    where="zenodo.org/records/7788422",
+    licence="CC BY 4.0",
+    suffixes=(".csv",),
+    shared_suffixes=frozenset({".csv"}),
+    contains=re.compile(rb"\bapartment_id\b"),
     read=lambda path, _value, part: plan_of_rows(path, part.apartment),
-)  # fmt: skip
+)

@@ -172,9 +172,11 @@ def opening(
 
 
 def value_of(
-    rooms: Sequence[dict[str, Any]], openings: Iterable[dict[str, Any]], height: float,
+    rooms: Sequence[dict[str, Any]],
+    openings: Iterable[dict[str, Any]],
+    height: float,
     walls: Sequence[dict[str, Any]] = (),
-) -> dict[str, Any]:  # fmt: skip
+) -> dict[str, Any]:
     """A storey in the form of this project's plan JSON (plan_files.py).
 
     rooms, walls: its rows. openings: rows of any kind, sorted here into doors and windows. height: from
@@ -184,7 +186,8 @@ def value_of(
     glazed = ("window", "french_window")
     return {
         "height": min(max(height, 2.0), 6.0) if math.isfinite(height) else 2.6,
-        "rooms": list(rooms), "walls": list(walls),
+        "rooms": list(rooms),
+        "walls": list(walls),
         "doors": [row for row in rows if row["kind"] not in glazed],
         "windows": [row for row in rows if row["kind"] in glazed],
-    }  # fmt: skip
+    }

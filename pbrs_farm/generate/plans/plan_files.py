@@ -124,8 +124,16 @@ def _of_machine(path: Path, parsed: ParsedPlan, part: Part) -> PlanFile:
 def _is_sound(thing: Thing) -> bool:
     return all(
         math.isfinite(v) and abs(v) < 1e9
-        for v in (thing.x, thing.z, thing.low, thing.width, thing.depth, thing.height, thing.turn_rad)
-    )  # fmt: skip
+        for v in (
+            thing.x,
+            thing.z,
+            thing.low,
+            thing.width,
+            thing.depth,
+            thing.height,
+            thing.turn_rad,
+        )
+    )
 
 
 def _origin(parsed: ParsedPlan) -> tuple[float, float]:
@@ -174,10 +182,13 @@ def upright(file: PlanFile) -> PlanFile:
             x=t.x * cos - t.z * sin, z=t.x * sin + t.z * cos, turn_rad=t.turn_rad - angle
         )
 
-    return replace(file, storeys=tuple(
-        replace(s, plan=turned_by(s.plan, angle), things=tuple(map(turned, s.things)))
-        for s in file.storeys
-    ))  # fmt: skip
+    return replace(
+        file,
+        storeys=tuple(
+            replace(s, plan=turned_by(s.plan, angle), things=tuple(map(turned, s.things)))
+            for s in file.storeys
+        ),
+    )
 
 
 class _Geometry(BaseModel):

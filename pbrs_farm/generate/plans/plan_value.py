@@ -43,10 +43,12 @@ _LEAST_M2: Final = 0.5
 _LEAST_TALL_M: Final = 0.3  # of an opening
 _REACH_M: Final = 0.6  # from an opening to its wall
 _SIZES: Final = {
-    OpeningKind.DOOR: (0.9, 2.1, 0.0), OpeningKind.ENTRANCE: (0.95, 2.1, 0.0),
+    OpeningKind.DOOR: (0.9, 2.1, 0.0),
+    OpeningKind.ENTRANCE: (0.95, 2.1, 0.0),
     OpeningKind.PASSAGE: (0.9, 2.1, 0.0),
-    OpeningKind.WINDOW: (1.3, 1.3, 0.9), OpeningKind.FRENCH_WINDOW: (1.6, 2.1, 0.1),
-}  # fmt: skip
+    OpeningKind.WINDOW: (1.3, 1.3, 0.9),
+    OpeningKind.FRENCH_WINDOW: (1.6, 2.1, 0.1),
+}
 _USUAL_SIDE_M: Final = (0.7, 30.0)  # root of a room's area; beyond, the file is in another unit
 
 
@@ -151,10 +153,13 @@ def _check_unit(path: Path, rooms: list[_RoomFields]) -> None:
     side = float(np.median(sides))
     low, high = _USUAL_SIDE_M
     looks = next(
-        (f": looks like {name}" for factor, name in ((100, "centimetres"), (1000, "millimetres"))
-         if low <= side / factor <= high),
+        (
+            f": looks like {name}"
+            for factor, name in ((100, "centimetres"), (1000, "millimetres"))
+            if low <= side / factor <= high
+        ),
         "",
-    )  # fmt: skip
+    )
     if extent > _FAR_M:
         raise BadInput(path, "", f"is over {_FAR_M:g} m wide{looks}", hint="coordinates in metres")
     if side > high and looks:
@@ -185,9 +190,11 @@ def _room_of_fields(
             return DrawnRoom(place, room.type, name, simple)
     n = len(simple.exterior.coords) - 1
     raise BadInput(
-        path, place, f"has {n} corners even when curves of {_TOLERANCES_M[-1]} m are made straight",
+        path,
+        place,
+        f"has {n} corners even when curves of {_TOLERANCES_M[-1]} m are made straight",
         hint=f"{_MOST_SIDES} work",
-    )  # fmt: skip
+    )
 
 
 def _check_apart(path: Path, drawn: list[DrawnRoom]) -> None:
@@ -283,9 +290,13 @@ class _Openings:
         return wall
 
     def _put(
-        self, place: str, at: shapely.Point, number: int, kind: OpeningKind,
+        self,
+        place: str,
+        at: shapely.Point,
+        number: int,
+        kind: OpeningKind,
         size: tuple[float, float, float],
-    ) -> None:  # fmt: skip
+    ) -> None:
         width, tall, sill = size
         wall = self.walls[number]
         along = self._lines[number].project(at)
@@ -311,14 +322,28 @@ class _Openings:
             kind = OpeningKind.ENTRANCE
         if self.is_of_machine and wall.height is not None and sill + tall > wall.height:
             raise BadInput(self.path, place, "stands in a parapet")
-        self.found.append(PlanOpening(
-            kind, number, round(along, 4), width, tall, sill, beside[0], other_room,
-            hinge_at_start=along < wall.length / 2,
-        ))  # fmt: skip
+        self.found.append(
+            PlanOpening(
+                kind,
+                number,
+                round(along, 4),
+                width,
+                tall,
+                sill,
+                beside[0],
+                other_room,
+                hinge_at_start=along < wall.length / 2,
+            )
+        )
 
 
 FORMAT = PlanFormat(
-    title="plan of one's own", files=".json or .geojson", order=180, brings="rooms, doors, windows",
-    where="written by hand or by a program", licence="yours", suffixes=(".geojson",),
+    title="plan of one's own",
+    files=".json or .geojson",
+    order=180,
+    brings="rooms, doors, windows",
+    where="written by hand or by a program",
+    licence="yours",
+    suffixes=(".geojson",),
     keys=(("features",), ("rooms",)),
-)  # fmt: skip
+)

@@ -123,8 +123,10 @@ def _opening_of_hole(
     t = (low + high) / 2 / length
     row: dict[str, Any] = {
         "at": [a.x + t * (b.x - a.x), -(a.z + t * (b.z - a.z))],
-        "width": max(high - low, 0.3), "height": max(top - bottom, 0.3), "kind": kind,
-    }  # fmt: skip
+        "width": max(high - low, 0.3),
+        "height": max(top - bottom, 0.3),
+        "kind": kind,
+    }
     if kind == "window":
         return row | {"sill": max(bottom, 0.0)}
     is_outer = "exterior" in f"{hole.wall0} {hole.wall1}"
@@ -167,10 +169,18 @@ def _thing(
     width, height, depth = size
     p = thing.position
     return Thing(
-        "ai2thor", name, p.x, -p.z, p.y - height / 2, width, depth, height,
+        "ai2thor",
+        name,
+        p.x,
+        -p.z,
+        p.y - height / 2,
+        width,
+        depth,
+        height,
         # Clockwise in a left-handed frame; mirrored, its front (sin, cos) becomes (sin, -cos).
-        math.pi - math.radians(thing.rotation.y), is_front_given=True,
-    )  # fmt: skip
+        math.pi - math.radians(thing.rotation.y),
+        is_front_given=True,
+    )
 
 
 def _assets(path: Path) -> dict[str, tuple[float, float, float]]:
@@ -192,9 +202,14 @@ def _assets(path: Path) -> dict[str, tuple[float, float, float]]:
 
 
 FORMAT = PlanFormat(
-    title="ProcTHOR and Holodeck", files="*.json", order=120,
-    brings="rooms, doors, windows, objects as stand-ins", where="github.com/allenai/procthor-10k",
-    licence="Apache-2.0", keys=(("rooms", "walls", "objects"),), beside=(ASSETS,),
+    title="ProcTHOR and Holodeck",
+    files="*.json",
+    order=120,
+    brings="rooms, doors, windows, objects as stand-ins",
+    where="github.com/allenai/procthor-10k",
+    licence="Apache-2.0",
+    keys=(("rooms", "walls", "objects"),),
+    beside=(ASSETS,),
     fits=lambda value: {"rooms", "walls", "objects", "doors"} <= set(value),
     read=lambda path, value, _part: plan_of_procthor(path, value),
-)  # fmt: skip
+)

@@ -63,8 +63,9 @@ def plan_of_react_planner(path: Path, value: Any) -> ParsedPlan:
     layers = sorted(given.layers.items(), key=lambda row: row[1].altitude)
     drawn = [
         _Drawing(path, f"layers.{key}"[:60], layer, _METRES[given.unit], math.sqrt(given.scale))
-        for key, layer in layers if layer.lines
-    ]  # fmt: skip
+        for key, layer in layers
+        if layer.lines
+    ]
     if not drawn:
         raise BadInput(path, "layers", "has no layer with lines")
     return ParsedPlan(tuple(d.storey(left_out) for d in drawn), left_out.lines())
@@ -90,11 +91,14 @@ class _Drawing:
             if kind in ("wall", "area_splitter"):
                 heights.append(self._length(row, "height", 2.6))
             elif math.dist(*line) > 0.05:
-                walls.append({
-                    "start": list(line[0]), "end": list(line[1]),
-                    "thickness": min(max(self._length(row, "thickness", 0.1), 0.04), 2.0),
-                    "height": 1.0 if kind == "railing" else None,
-                })  # fmt: skip
+                walls.append(
+                    {
+                        "start": list(line[0]),
+                        "end": list(line[1]),
+                        "thickness": min(max(self._length(row, "thickness", 0.1), 0.04), 2.0),
+                        "height": 1.0 if kind == "railing" else None,
+                    }
+                )
         openings = [
             o
             for k, row in self.layer.holes.items()
@@ -202,8 +206,10 @@ class _Drawing:
             )
         kind = str(row.get("type", "door")).lower()
         found: dict[str, Any] = {
-            "at": [x0 + t * (x1 - x0), z0 + t * (z1 - z0)], "width": max(width, 0.3), "kind": "door",
-        }  # fmt: skip
+            "at": [x0 + t * (x1 - x0), z0 + t * (z1 - z0)],
+            "width": max(width, 0.3),
+            "kind": "door",
+        }
         if "window" in kind or "curtain" in kind:
             sill, height = self._sill_and_height(row)
             found |= {"kind": "window", "height": max(height, 0.3), "sill": max(sill, 0.0)}
@@ -239,22 +245,34 @@ class _Drawing:
         width = self._length(row, "width", self._length(row, "length", size[0]))
         turn = row.get("rotation", 0)
         return Thing(
-            "cubicasa-icon", name, *at, max(self._length(row, "altitude", 0.0), 0.0), max(width, 0.05),
-            max(self._length(row, "depth", size[2]), 0.05), max(self._length(row, "height", size[1]), 0.05),
+            "cubicasa-icon",
+            name,
+            *at,
+            max(self._length(row, "altitude", 0.0), 0.0),
+            max(width, 0.05),
+            max(self._length(row, "depth", size[2]), 0.05),
+            max(self._length(row, "height", size[1]), 0.05),
             math.radians(float(turn)) if _is_number(turn) else 0.0,
-        )  # fmt: skip
+        )
 
 
 def _is_number(value: object) -> TypeGuard[int | float]:
     return (
-        isinstance(value, int | float) and not isinstance(value, bool)
-        and math.isfinite(value) and abs(value) < 1e9
-    )  # fmt: skip
+        isinstance(value, int | float)
+        and not isinstance(value, bool)
+        and math.isfinite(value)
+        and abs(value) < 1e9
+    )
 
 
 FORMAT = PlanFormat(
-    title="react-planner", files="*.json", order=170, brings="rooms, doors, windows, fixtures",
-    where="react-planner's own export", licence="yours", keys=(("layers", "unit"),),
+    title="react-planner",
+    files="*.json",
+    order=170,
+    brings="rooms, doors, windows, fixtures",
+    where="react-planner's own export",
+    licence="yours",
+    keys=(("layers", "unit"),),
     fits=lambda value: "layers" in value,
     read=lambda path, value, _part: plan_of_react_planner(path, value),
-)  # fmt: skip
+)

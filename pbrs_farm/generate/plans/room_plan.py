@@ -127,18 +127,24 @@ def _storey_of_scan(path: Path, scan: _Scan, left_out: LeftOut, *, is_top: bool)
     else:
         height = max(y for top in tops for y in top.heights)
     outlines = [
-        shape for k, f in enumerate(scan.floors, 1)
-        if len(f.polygonCorners or ()) >= 4 and (shape := _outline_of_floor(path, f"floor {k}", f)).area >= 0.5
-    ]  # fmt: skip
+        shape
+        for k, f in enumerate(scan.floors, 1)
+        if len(f.polygonCorners or ()) >= 4
+        and (shape := _outline_of_floor(path, f"floor {k}", f)).area >= 0.5
+    ]
     lines += _lines_in_gaps(path, scan, lines)
     walls_of_plan = [LineString(line) for line in lines if line[0] != line[1]]
     outlines = [room for o in outlines for room in rooms_by_walls(o, walls_of_plan) or [o]]
     outlines = outlines or closed_rings(path, lines, _JOIN_M)
     openings = [
         _opening_of_surface(s, _parse_pose(path, f"{kind} {k}", s), kind, floor)
-        for kind, surfaces in (("door", scan.doors), ("window", scan.windows), ("opening", scan.openings))
+        for kind, surfaces in (
+            ("door", scan.doors),
+            ("window", scan.windows),
+            ("opening", scan.openings),
+        )
         for k, s in enumerate(surfaces, 1)
-    ]  # fmt: skip
+    ]
     things = [
         _thing(s, _parse_pose(path, f"object {k}", s), floor) for k, s in enumerate(scan.objects, 1)
     ]
@@ -219,9 +225,11 @@ def _opening_of_surface(surface: _Surface, pose: F64, kind: str, floor: float) -
     width, height = surface.dimensions[:2]
     low = float(pose[1, 3]) - height / 2 - floor
     row: dict[str, Any] = {
-        "at": [float(pose[0, 3]), float(pose[2, 3])], "width": max(width, 0.3),
-        "height": max(height, 0.3), "kind": _KINDS[kind],
-    }  # fmt: skip
+        "at": [float(pose[0, 3]), float(pose[2, 3])],
+        "width": max(width, 0.3),
+        "height": max(height, 0.3),
+        "kind": _KINDS[kind],
+    }
     if kind == "window":
         row["sill"] = max(low, 0.0)
     return row
@@ -231,10 +239,16 @@ def _thing(surface: _Surface, pose: F64, floor: float) -> Thing:
     width, height, depth = (*surface.dimensions, 0.5)[:3]
     right = pose[:3, 0]
     return Thing(
-        "roomplan", _category(surface), float(pose[0, 3]), float(pose[2, 3]),
-        float(pose[1, 3]) - height / 2 - floor, width, max(depth, 0.02), height,
+        "roomplan",
+        _category(surface),
+        float(pose[0, 3]),
+        float(pose[2, 3]),
+        float(pose[1, 3]) - height / 2 - floor,
+        width,
+        max(depth, 0.02),
+        height,
         math.atan2(-float(right[2]), float(right[0])),
-    )  # fmt: skip
+    )
 
 
 def _section_label(shape: Polygon, sections: list[_Section]) -> str:
@@ -252,7 +266,13 @@ def _is_scan(value: dict[str, Any]) -> bool:
 
 
 FORMAT = PlanFormat(
-    title="RoomPlan", files="*.json", order=140, brings="walls, doors, windows, boxes as stand-ins",
-    where="a phone's own scan", licence="yours", keys=(("walls", "doors", "windows", "objects"),),
-    fits=_is_scan, read=lambda path, value, _part: plan_of_room_plan(path, value),
-)  # fmt: skip
+    title="RoomPlan",
+    files="*.json",
+    order=140,
+    brings="walls, doors, windows, boxes as stand-ins",
+    where="a phone's own scan",
+    licence="yours",
+    keys=(("walls", "doors", "windows", "objects"),),
+    fits=_is_scan,
+    read=lambda path, value, _part: plan_of_room_plan(path, value),
+)

@@ -25,16 +25,19 @@ _LIVING_M2, _ROOM_M2, _STORE_M2 = 18.0, 9.0, 3.0
 _SMALL_ROOM_M2: Final = 6.0  # of a room to live in with one door and a window
 _OPEN_AIR_SHARE: Final = 0.25  # minimum share of a balcony's outline with railings
 _NEAR_RAILING_M: Final = 0.3
-_TYPES: Final = {
-    RoomKind.DINING: "living", RoomKind.OUTDOOR: "balcony", RoomKind.OTHER: "hall",
-}  # fmt: skip
+_TYPES: Final = {RoomKind.DINING: "living", RoomKind.OUTDOOR: "balcony", RoomKind.OTHER: "hall"}
 _GLAZED: Final = ("window", "french_window")
 # Item words that imply a room type; the first matching row wins.
 _FIXTURES: Final = (
-    ("bath", {"bathtub", "tub", "shower", "jacuzzi"}), ("toilet", {"toilet", "wc", "urinal"}),
-    ("kitchen", {"kitchen", "stove", "oven", "cooker", "hob", "fridge", "refrigerator", "dishwasher"}),
-    ("bed", {"bed"}), ("sofa", {"sofa", "couch"}),
-)  # fmt: skip
+    ("bath", {"bathtub", "tub", "shower", "jacuzzi"}),
+    ("toilet", {"toilet", "wc", "urinal"}),
+    (
+        "kitchen",
+        {"kitchen", "stove", "oven", "cooker", "hob", "fridge", "refrigerator", "dishwasher"},
+    ),
+    ("bed", {"bed"}),
+    ("sofa", {"sofa", "couch"}),
+)
 
 
 class DrawnArea(NamedTuple):
@@ -95,7 +98,7 @@ def typed_rooms(
     return [
         {"type": kind, "polygon": ring_of(area.shape)} | ({"name": area.name} if area.name else {})
         for area, kind in _with_living(kept)
-    ]  # fmt: skip
+    ]
 
 
 def _by_word(source: str, area: DrawnArea) -> str:

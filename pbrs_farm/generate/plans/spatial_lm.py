@@ -92,16 +92,25 @@ def _entity(path: Path, number: int, line: str) -> tuple[str, str, list[float]]:
 def _opening_of_numbers(kind: str, numbers: list[float], floor: float) -> dict[str, Any]:
     x, y, z, width, height = numbers
     row: dict[str, Any] = {
-        "at": [x, -y], "width": max(width, 0.3), "height": max(height, 0.3), "kind": kind.lower(),
-    }  # fmt: skip
+        "at": [x, -y],
+        "width": max(width, 0.3),
+        "height": max(height, 0.3),
+        "kind": kind.lower(),
+    }
     if kind == "Window":
         row["sill"] = max(z - height / 2 - floor, 0.0)
     return row
 
 
 FORMAT = PlanFormat(
-    title="SpatialLM", files="*.txt", order=130, brings="walls, doors, windows, boxes as stand-ins",
-    where="huggingface.co/manycore-research", licence="CC BY-NC 4.0", suffixes=(".txt",),
-    shared_suffixes=frozenset({".txt"}), contains=re.compile(rb"^\s*\w+\s*=\s*Wall\(", re.MULTILINE),
+    title="SpatialLM",
+    files="*.txt",
+    order=130,
+    brings="walls, doors, windows, boxes as stand-ins",
+    where="huggingface.co/manycore-research",
+    licence="CC BY-NC 4.0",
+    suffixes=(".txt",),
+    shared_suffixes=frozenset({".txt"}),
+    contains=re.compile(rb"^\s*\w+\s*=\s*Wall\(", re.MULTILINE),
     read=lambda path, _value, _part: plan_of_layout(path),
-)  # fmt: skip
+)

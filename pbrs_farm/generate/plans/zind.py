@@ -107,7 +107,13 @@ def _opening_between(kind: str, a: tuple[float, float], b: tuple[float, float]) 
 
 
 FORMAT = PlanFormat(
-    title="ZInD", files="zind_data.json", order=160, brings="rooms, doors, windows",
-    where="github.com/zillow/zind", licence="academic, on request", keys=(("redraw",),),
-    fits=lambda value: "redraw" in value, read=lambda path, value, _part: plan_of_zind(path, value),
-)  # fmt: skip
+    title="ZInD",
+    files="zind_data.json",
+    order=160,
+    brings="rooms, doors, windows",
+    where="github.com/zillow/zind",
+    licence="academic, on request",
+    keys=(("redraw",),),
+    fits=lambda value: "redraw" in value,
+    read=lambda path, value, _part: plan_of_zind(path, value),
+)

@@ -104,16 +104,26 @@ def builtin_home() -> House:
         name="Built-in home",
         source=Source("builtin", "builtin", sha, author="pbrs_farm", licence="Apache-2.0"),
         levels=(Level("0", "Ground floor", 0.0, WALL_HEIGHT_M),),
-        rooms=(_make_room("0_0", "Living room", LIVING, "Living_Room"), _make_room("0_1", "Bedroom", BEDROOM, "Bedroom")),
+        rooms=(
+            _make_room("0_0", "Living room", LIVING, "Living_Room"),
+            _make_room("0_1", "Bedroom", BEDROOM, "Bedroom"),
+        ),
         items=items,
         materials=library.materials,
         textures=library.textures,
         openings=openings,
         cameras=(
-            StoredCamera("Living room", np.array([4.6, 1.6, 3.6]), np.array([-0.8, -0.16, -0.58]), math.radians(65)),
-            StoredCamera("Bedroom", np.array([5.4, 1.6, 0.4]), np.array([0.7, -0.18, 0.69]), math.radians(65)),
+            StoredCamera(
+                "Living room",
+                np.array([4.6, 1.6, 3.6]),
+                np.array([-0.8, -0.16, -0.58]),
+                math.radians(65),
+            ),
+            StoredCamera(
+                "Bedroom", np.array([5.4, 1.6, 0.4]), np.array([0.7, -0.18, 0.69]), math.radians(65)
+            ),
         ),
-    )  # fmt: skip
+    )
 
 
 def _materials() -> tuple[MaterialLibrary, dict[str, int]]:
@@ -169,13 +179,17 @@ def _wall_items(index: dict[str, int]) -> tuple[Item, ...]:
             kind=ItemKind.WALL,
             level_id="0",
             surfaces=wall_prism(
-                left, right, 0.0, top, top,
+                left,
+                right,
+                0.0,
+                top,
+                top,
                 (index[sides[0]], index[sides[1]], index["wall_default"]),
             ),
             nyu40=WALL,
         )
         for k, (left, right, sides) in enumerate(outlines)
-    )  # fmt: skip
+    )
 
 
 def _plane_items(index: dict[str, int]) -> list[Item]:

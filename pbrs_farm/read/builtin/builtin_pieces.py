@@ -121,9 +121,14 @@ def _legs(w: float, d: float, h: float, t: float) -> Boxes:
 
 
 def place_piece(
-    name: str, piece: BuiltinPiece, item_id: str, room_id: str, at: Triple, turn_deg: float,
+    name: str,
+    piece: BuiltinPiece,
+    item_id: str,
+    room_id: str,
+    at: Triple,
+    turn_deg: float,
     materials: dict[str, int],
-) -> Item:  # fmt: skip
+) -> Item:
     """The piece as an item, turned about +y and moved to at (3,).
 
     turn_deg: about +y; materials: name -> index in the house. Turned parts (lathe) are round, so

@@ -168,13 +168,27 @@ def _entry(row: dict[str, str], library: str, notes: LibraryNotes) -> Entry | No
         notes.add("unreadable-entry", place, f"{error}: left out")
         return None
     piece = PlanPiece(
-        tag="light" if lights else "pieceOfFurniture", place=place, level="", catalogue_id=place,
-        name=row.get("name", inner), model=row.get("model", "").lstrip("/"), centre=(0.0, 0.0),
-        elevation=elevation, angle=0.0, pitch=0.0, roll=0.0, size=(width, depth, height),
-        height_in_plan=None, is_mirrored=False, rotation=tuple(rotation) or None,
-        paint=Paint(), materials=(), frame=_WHOLE if is_opening else None, lights=lights,
+        tag="light" if lights else "pieceOfFurniture",
+        place=place,
+        level="",
+        catalogue_id=place,
+        name=row.get("name", inner),
+        model=row.get("model", "").lstrip("/"),
+        centre=(0.0, 0.0),
+        elevation=elevation,
+        angle=0.0,
+        pitch=0.0,
+        roll=0.0,
+        size=(width, depth, height),
+        height_in_plan=None,
+        is_mirrored=False,
+        rotation=tuple(rotation) or None,
+        paint=Paint(),
+        materials=(),
+        frame=_WHOLE if is_opening else None,
+        lights=lights,
         power=_POWER if lights else 0.0,
-    )  # fmt: skip
+    )
     return Entry(place, row.get("category", ""), row.get("creator", ""), piece)
 
 

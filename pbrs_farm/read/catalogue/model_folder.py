@@ -39,9 +39,11 @@ _FIELDS: Final = ReadFields(max_model_triangles=MAX_TRIANGLES)
 _UNITS: Final = {0.01: "centimetres", 0.001: "millimetres", 0.0254: "inches"}
 _MAX_JSON_BYTES: Final = 64_000_000
 _MOST_NODES: Final = 20_000  # maximum nodes of a model to visit for its bounds
+# fmt: off
 _FAULTS: Final = (
     PbrsError, OSError, ValueError, KeyError, TypeError, IndexError, AttributeError, RecursionError,
-)  # fmt: skip
+)
+# fmt: on
 
 FolderPiece = tuple[Piece, "partial[Shape | None]"]
 
@@ -123,9 +125,17 @@ def _indexed(model: ObjectModel, file: str, row: ModelRow, notes: LibraryNotes) 
     if rule is None:
         return None
     return _Indexed(
-        file, name, rule.group, rule.place.value, rule.nyu40, rule.kind.value, size,
-        row.quarters, row.creator, row.licence,
-    )  # fmt: skip
+        file,
+        name,
+        rule.group,
+        rule.place.value,
+        rule.nyu40,
+        rule.kind.value,
+        size,
+        row.quarters,
+        row.creator,
+        row.licence,
+    )
 
 
 def _find_rule_and_size(
@@ -271,10 +281,17 @@ def _read_index(file: Path) -> tuple[str, tuple[_Indexed, ...], tuple[Note, ...]
 
 def _piece_of_model(path: Path, one: _Indexed, notes: LibraryNotes) -> FolderPiece:
     piece = Piece(
-        id=f"{path.name}#{one.file.rpartition('.')[0]}", name=one.name, group=one.group,
-        place=Place(one.place), nyu40=one.nyu40, size=one.size, kind=ItemKind(one.kind),
-        library=path.name, creator=one.creator, licence=one.licence,
-    )  # fmt: skip
+        id=f"{path.name}#{one.file.rpartition('.')[0]}",
+        name=one.name,
+        group=one.group,
+        place=Place(one.place),
+        nyu40=one.nyu40,
+        size=one.size,
+        kind=ItemKind(one.kind),
+        library=path.name,
+        creator=one.creator,
+        licence=one.licence,
+    )
     file = path / one.file
     model = ObjectModel(keys.slug(file.stem), one.name, one.group, one.nyu40, file, path)
     return piece, partial(_shape, model, piece, one.quarters, notes)

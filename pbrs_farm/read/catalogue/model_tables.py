@@ -29,8 +29,11 @@ Size = tuple[float, float, float]
 TABLE: Final = "catalogue.csv"
 _INFO: Final = ("model_info.json", "3D-FUTURE-model/model_info.json")
 _OBJECTS: Final = (
-    "objects.csv", "semantics/objects.csv", "metadata/objects.csv", "semantics/hssd-hab_semantics_objects.csv",
-)  # fmt: skip
+    "objects.csv",
+    "semantics/objects.csv",
+    "metadata/objects.csv",
+    "semantics/hssd-hab_semantics_objects.csv",
+)
 _ANNOTATIONS: Final = ("annotations.json", "annotations.json.gz")
 _MAX_BYTES: Final = 256_000_000  # of a table, unpacked
 _MOST_M: Final = 50.0

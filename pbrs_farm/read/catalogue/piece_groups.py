@@ -110,11 +110,16 @@ def group_rules() -> tuple[GroupRule, ...]:
     """The rows of groups.csv in their order."""
     return tuple(
         GroupRule(
-            r["group"], Place(r["place"]), NYU40_NAMES.index(r["nyu40"]), r["category"],
-            _range(r["side_cm"]), _range(r["height_cm"]), tuple(r["words"].split("|")),
+            r["group"],
+            Place(r["place"]),
+            NYU40_NAMES.index(r["nyu40"]),
+            r["category"],
+            _range(r["side_cm"]),
+            _range(r["height_cm"]),
+            tuple(r["words"].split("|")),
         )
         for r in _rows_of_table("groups.csv")
-    )  # fmt: skip
+    )
 
 
 @cache

@@ -57,9 +57,13 @@ class Found:
 
 
 def catalogue_from(
-    libraries: Sequence[Path], *, jar: Path | None = None, given: Sequence[Path] = (),
-    store: Path | None = None, may_be_empty: bool = False,
-) -> Catalogue:  # fmt: skip
+    libraries: Sequence[Path],
+    *,
+    jar: Path | None = None,
+    given: Sequence[Path] = (),
+    store: Path | None = None,
+    may_be_empty: bool = False,
+) -> Catalogue:
     """Merge libraries into a catalogue; for repeated ids the later library wins.
 
     libraries: .sh3f files of the packages. jar: the program's, with its own models. given: the

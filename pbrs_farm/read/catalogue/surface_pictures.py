@@ -134,9 +134,13 @@ def surface_group(name: str, category: str) -> str:
 
 
 def _picture_of_row(
-    row: dict[str, str], group: str, contents: Resources, library: str, licence: str,
+    row: dict[str, str],
+    group: str,
+    contents: Resources,
+    library: str,
+    licence: str,
     notes: LibraryNotes,
-) -> Picture | None:  # fmt: skip
+) -> Picture | None:
     place = f"{library}#{row.get('id', row.get('name', ''))}"
     try:
         width, height = (float(row[key]) / 100 for key in ("width", "height"))

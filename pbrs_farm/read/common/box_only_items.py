@@ -54,10 +54,17 @@ def box_only_item(
     axes = np.array([[cos, 0, sin], [0, 1, 0], [-sin, 0, cos]])
     tags = (BOX_ONLY, FRONT_GIVEN) if is_front_given else (BOX_ONLY,)
     return Item(
-        id=item_id, name=_spoken(name), kind=seen.item_kind if seen else ItemKind.OBJECT, level_id=level_id, surfaces=(),
-        nyu40=seen.nyu40 if seen else 40, source_class=name, room_id=room_id,
-        box=Box(np.array(centre, np.float64), np.array(size, np.float64) / 2, axes), tags=tags,
-    )  # fmt: skip
+        id=item_id,
+        name=_spoken(name),
+        kind=seen.item_kind if seen else ItemKind.OBJECT,
+        level_id=level_id,
+        surfaces=(),
+        nyu40=seen.nyu40 if seen else 40,
+        source_class=name,
+        room_id=room_id,
+        box=Box(np.array(centre, np.float64), np.array(size, np.float64) / 2, axes),
+        tags=tags,
+    )
 
 
 def _spoken(name: str) -> str:

@@ -33,9 +33,11 @@ _HANDLE_Y: Final = 1.02
 _MATERIALS: Final = {
     "frame": Material("frame", diffuse=(0.92, 0.92, 0.9)),
     "leaf": Material("leaf", diffuse=(0.86, 0.82, 0.76), specular=(0.1, 0.1, 0.1), shininess=30.0),
-    "handle": Material("handle", diffuse=(0.5, 0.5, 0.51), specular=(0.6, 0.6, 0.6), shininess=80.0),
+    "handle": Material(
+        "handle", diffuse=(0.5, 0.5, 0.51), specular=(0.6, 0.6, 0.6), shininess=80.0
+    ),
     "pane": Material("pane", MaterialKind.PANE, diffuse=(0.9, 0.95, 0.95), opacity=PANE_OPACITY),
-}  # fmt: skip
+}
 _Boxes = dict[str, list[tuple[tuple[float, float, float], tuple[float, float, float]]]]
 
 
@@ -94,17 +96,25 @@ def fill_hole(
     )
     half = np.array(hole.size) / 2 + [0, 0, _LINING_M]
     return Item(
-        id=hole.id, name=hole.name or hole.kind, kind=ItemKind.WINDOW if is_window else ItemKind.DOOR,
-        level_id=level_id, surfaces=surfaces, nyu40=WINDOW if is_window else DOOR,
-        source_class=hole.source_class or hole.kind, room_id=room_id, box=Box(hole.centre, half, hole.axes),
+        id=hole.id,
+        name=hole.name or hole.kind,
+        kind=ItemKind.WINDOW if is_window else ItemKind.DOOR,
+        level_id=level_id,
+        surfaces=surfaces,
+        nyu40=WINDOW if is_window else DOOR,
+        source_class=hole.source_class or hole.kind,
+        room_id=room_id,
+        box=Box(hole.centre, half, hole.axes),
         tags=("made",),
-    )  # fmt: skip
+    )
 
 
 def _boxes_surface(
-    name: str, boxes: list[tuple[tuple[float, float, float], tuple[float, float, float]]],
-    hole: Hole, library: MaterialLibrary,
-) -> Surface:  # fmt: skip
+    name: str,
+    boxes: list[tuple[tuple[float, float, float], tuple[float, float, float]]],
+    hole: Hole,
+    library: MaterialLibrary,
+) -> Surface:
     quads = []
     for low, high in boxes:
         a, b = np.array(low), np.array(high)
@@ -121,10 +131,16 @@ def _lining(hole: Hole) -> tuple[float, float, float, float]:
 
 def _door(hole: Hole) -> _Boxes:
     w, h, post, d = _lining(hole)
-    boxes: _Boxes = {"frame": [
-        ((-w, -h, -d), (-w + post, h, d)), ((w - post, -h, -d), (w, h, d)),
-        ((-w + post, h - post, -d), (w - post, h, d)),
-    ], "leaf": [], "handle": [], "pane": []}  # fmt: skip
+    boxes: _Boxes = {
+        "frame": [
+            ((-w, -h, -d), (-w + post, h, d)),
+            ((w - post, -h, -d), (w, h, d)),
+            ((-w + post, h - post, -d), (w - post, h, d)),
+        ],
+        "leaf": [],
+        "handle": [],
+        "pane": [],
+    }
     left, right, top = -w + post, w - post, h - post
     n = {"swing": 1, "double": 2, "sliding": 2, "folding": 4}[hole.style]
     if hole.style == "swing" and 2 * w > _WIDE_DOOR_M:
@@ -156,10 +172,11 @@ def _add_door_leaf(
         boxes["leaf"].append(((x0, y0, z - t), (x1, y1, z + t)))
         return
     boxes["leaf"] += [
-        ((x0, y0, z - t), (x0 + rail, y1, z + t)), ((x1 - rail, y0, z - t), (x1, y1, z + t)),
+        ((x0, y0, z - t), (x0 + rail, y1, z + t)),
+        ((x1 - rail, y0, z - t), (x1, y1, z + t)),
         ((x0 + rail, y0, z - t), (x1 - rail, y0 + rail, z + t)),
         ((x0 + rail, y1 - rail, z - t), (x1 - rail, y1, z + t)),
-    ]  # fmt: skip
+    ]
     glass = _PANE_M / 2
     boxes["pane"].append(((x0 + rail, y0 + rail, z - glass), (x1 - rail, y1 - rail, z + glass)))
 
@@ -176,9 +193,11 @@ def _window_boxes(hole: Hole) -> _Boxes:
     w, h, post, _ = _lining(hole)
     d = min(_SASH_M / 2, hole.size[2] / 2 + _LINING_M)
     frame = [
-        ((-w, -h, -d), (-w + post, h, d)), ((w - post, -h, -d), (w, h, d)),
-        ((-w + post, h - post, -d), (w - post, h, d)), ((-w + post, -h, -d), (w - post, -h + post, d)),
-    ]  # fmt: skip
+        ((-w, -h, -d), (-w + post, h, d)),
+        ((w - post, -h, -d), (w, h, d)),
+        ((-w + post, h - post, -d), (w - post, h, d)),
+        ((-w + post, -h, -d), (w - post, -h + post, d)),
+    ]
     n = max(int(2 * w // _WIDE_WINDOW_M), 0) + 1
     edges = np.linspace(-w + post, w - post, n + 1)
     half = min(post, 0.05) / 2

@@ -133,10 +133,15 @@ def _opening_of_void(void: Void, frames: Sequence[_WallFrame]) -> Opening | None
     ]
     holes = [h for points in others if (h := _hole(points, ends[0], ends[1])) is not None]
     return _opening(
-        void.id if void.item is None else f"{void.item.id}_hole", void.level_id, void.item,
-        is_window=void.is_window, axes=axes, ends=_across_walls(ends, [*depth, *others]),
-        has_holes=is_bare, is_cut=is_bare and len(holes) == len(others),
-    )  # fmt: skip
+        void.id if void.item is None else f"{void.item.id}_hole",
+        void.level_id,
+        void.item,
+        is_window=void.is_window,
+        axes=axes,
+        ends=_across_walls(ends, [*depth, *others]),
+        has_holes=is_bare,
+        is_cut=is_bare and len(holes) == len(others),
+    )
 
 
 def _is_niche(rim: F64, sides: Sequence[F64]) -> bool:
@@ -229,15 +234,28 @@ def _opening_of_leaf(item: Item, leaf: Box, frames: Sequence[_WallFrame]) -> Ope
     if (ends[1] - ends[0])[:2].min() < LEAST_HOLE_M:
         return None
     return _opening(
-        f"{item.id}_hole", item.level_id, item, is_window=item.kind is ItemKind.WINDOW, axes=axes,
-        ends=ends, has_holes=bool(holes), is_cut=len(holes) == len(standing),
-    )  # fmt: skip
+        f"{item.id}_hole",
+        item.level_id,
+        item,
+        is_window=item.kind is ItemKind.WINDOW,
+        axes=axes,
+        ends=ends,
+        has_holes=bool(holes),
+        is_cut=len(holes) == len(standing),
+    )
 
 
 def _opening(
-    id_: str, level_id: str, item: Item | None, *, is_window: bool, axes: F64, ends: F64,
-    has_holes: bool, is_cut: bool,
-) -> Opening:  # fmt: skip
+    id_: str,
+    level_id: str,
+    item: Item | None,
+    *,
+    is_window: bool,
+    axes: F64,
+    ends: F64,
+    has_holes: bool,
+    is_cut: bool,
+) -> Opening:
     """The opening between two corners (2, 3) in axes along the wall, up and across it."""
     low, high = ends
     # Lay the quad in the middle; a plug overlaps its hole, a cutter reaches out of the wall.

@@ -76,9 +76,14 @@ class ZipResources:
                 # Read one byte more than announced: a bomb is longer than it says.
                 data = stream.read(entry.file_size + 1)
         except (
-            zipfile.BadZipFile, zlib.error, EOFError, OSError, ValueError,
-            NotImplementedError, RuntimeError,
-        ):  # fmt: skip
+            zipfile.BadZipFile,
+            zlib.error,
+            EOFError,
+            OSError,
+            ValueError,
+            NotImplementedError,
+            RuntimeError,
+        ):
             text = "cannot be unpacked: damaged, encrypted, or packed by an unknown method"
             raise BadHouse(self._file, place, text) from None
         if len(data) > entry.file_size:

@@ -74,9 +74,13 @@ def covered_share(surface: Surface, polygon: F64) -> float:
 
 
 def floor_polygons(
-    floor: Sequence[Surface], walls: Sequence[Surface], *, min_area_m2: float, min_width_m: float,
+    floor: Sequence[Surface],
+    walls: Sequence[Surface],
+    *,
+    min_area_m2: float,
+    min_width_m: float,
     doors: Sequence[F64] = (),
-) -> list[F64]:  # fmt: skip
+) -> list[F64]:
     """Every piece of floor between the walls, planar walls too, that is a room by its size.
 
     doors: (2, 3) bounds of each, which part rooms however wide they are. Each as floor_polygon gives it, largest first.

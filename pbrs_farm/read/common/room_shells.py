@@ -227,9 +227,15 @@ def _parts_by_plane(item: Item, shown: Bools) -> tuple[Item, ...]:
                 kind = ItemKind.FLOOR if up > 0 else ItemKind.CEILING
             found.append(
                 replace(
-                    item, id=f"{item.id}.{len(found)}", name=f"{item.name} {kind}".strip(),
-                    kind=kind, nyu40=CLASS_OF_STRUCTURE[kind], surfaces=picked(item, own), lights=(),
-                    box=None, tags=tuple(t for t in item.tags if t != "unmapped"),
+                    item,
+                    id=f"{item.id}.{len(found)}",
+                    name=f"{item.name} {kind}".strip(),
+                    kind=kind,
+                    nyu40=CLASS_OF_STRUCTURE[kind],
+                    surfaces=picked(item, own),
+                    lights=(),
+                    box=None,
+                    tags=tuple(t for t in item.tags if t != "unmapped"),
                 )
-            )  # fmt: skip
+            )
     return (replace(found[0], lights=item.lights), *found[1:])

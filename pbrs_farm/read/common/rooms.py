@@ -105,9 +105,12 @@ def rooms_from_floors(items: Sequence[Item]) -> list[Room]:
         low, high = item.bounds[:, [0, 2]]
         standing = _surfaces_within(standing, low - _EDGE_M, high + _EDGE_M)
         pieces = floor_polygons(
-            item.surfaces, standing, min_area_m2=MIN_ROOM_M2, min_width_m=MIN_ROOM_WIDTH_M,
+            item.surfaces,
+            standing,
+            min_area_m2=MIN_ROOM_M2,
+            min_width_m=MIN_ROOM_WIDTH_M,
             doors=[d.bounds for d in doors if abs(d.bounds[0, 1] - height) < _SLACK_M],
-        )  # fmt: skip
+        )
         given = {"floor_y": height, "ceiling_y": None}
         found += [_with_heights(p, "", (), given, items) for p in pieces]
     return found

@@ -21,9 +21,15 @@ def _companions_of_front3d(given: GivenFile, files: SourceFiles) -> str:
 
 
 FORMAT = Format(
-    kind="front3d", title="3D-FRONT", files="<uid>.json", order=50,
+    kind="front3d",
+    title="3D-FRONT",
+    files="<uid>.json",
+    order=50,
     brings="walls, floors, ceilings, holes, furniture by --models, lamps",
-    where="mirrors; the publisher's pages no longer answer", licence="research only",
-    keys=(("furniture", "mesh"),), has_box_only_items=True,
-    read=_read_front3d, companions=_companions_of_front3d,
-)  # fmt: skip
+    where="mirrors; the publisher's pages no longer answer",
+    licence="research only",
+    keys=(("furniture", "mesh"),),
+    has_box_only_items=True,
+    read=_read_front3d,
+    companions=_companions_of_front3d,
+)

@@ -198,16 +198,26 @@ def _meshes(
             pairs = numbers(row["uv"], 0, file, f"{place}.uv")
             uvs = pairs.reshape(-1, 2) if len(pairs) == 2 * len(points) else None
         found[uid] = FrontMesh(
-            uid, str(row.get("type", ""))[:60], points, faces, uvs, str(row.get("material", "")),
-            room_of.get(uid, ""), f"{place} ({str(row.get('type', ''))[:40]})",
-        )  # fmt: skip
+            uid,
+            str(row.get("type", ""))[:60],
+            points,
+            faces,
+            uvs,
+            str(row.get("material", "")),
+            room_of.get(uid, ""),
+            f"{place} ({str(row.get('type', ''))[:40]})",
+        )
     return tuple(found.values())
 
 
 def _parse_front_pieces(
-    children: Sequence[tuple[str, dict[str, Any], str]], entries: dict[str, dict[str, Any]],
-    meshes: set[str], lamps: set[str], file: str, notes: Notes,
-) -> tuple[tuple[FrontPiece, ...], list[tuple[str, F64, str]]]:  # fmt: skip
+    children: Sequence[tuple[str, dict[str, Any], str]],
+    entries: dict[str, dict[str, Any]],
+    meshes: set[str],
+    lamps: set[str],
+    file: str,
+    notes: Notes,
+) -> tuple[tuple[FrontPiece, ...], list[tuple[str, F64, str]]]:
     """The placed pieces, and (ref, location, room) of every child that is not a mesh."""
     found, places = [], []
     n_missing = n_invalid = n_flat = 0
@@ -235,11 +245,22 @@ def _parse_front_pieces(
         world[:3, 3] = at
         found.append(
             FrontPiece(
-                ref, str(entry.get("jid") or "")[:100], str(entry.get("title") or "")[:100],
-                str(entry.get("category") or "")[:100], _size_of_entry(entry), world, scale, room, place,
+                ref,
+                str(entry.get("jid") or "")[:100],
+                str(entry.get("title") or "")[:100],
+                str(entry.get("category") or "")[:100],
+                _size_of_entry(entry),
+                world,
+                scale,
+                room,
+                place,
             )
-        )  # fmt: skip
-    for n, why in ((n_missing, "name no entry"), (n_invalid, "name an invalid piece"), (n_flat, "are flat or huge")):  # fmt: skip
+        )
+    for n, why in (
+        (n_missing, "name no entry"),
+        (n_invalid, "name an invalid piece"),
+        (n_flat, "are flat or huge"),
+    ):
         if n:
             notes.add("missing-piece", "scene.room", f"{n} children {why}: left out")
     return tuple(found), places
@@ -248,11 +269,13 @@ def _parse_front_pieces(
 def _rotation(q: F64) -> F64:
     """(3, 3) of a unit quaternion x, y, z, w."""
     x, y, z, w = q
-    return np.array([
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-    ])  # fmt: skip
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
 
 
 def _size_of_entry(entry: dict[str, Any]) -> tuple[float, float, float] | None:

@@ -62,13 +62,13 @@ from pbrs_farm.read.front3d.front_walls import (
     solid_of,
 )
 
-_TEXTURES: Final = (
-    "3D-FRONT-texture", "../3D-FRONT-texture", "../../3D-FRONT-texture", "texture",
-)  # fmt: skip
+_TEXTURES: Final = ("3D-FRONT-texture", "../3D-FRONT-texture", "../../3D-FRONT-texture", "texture")
 # Mesh types that the generated solids and repair's slabs replace.
+# fmt: off
 _MADE: Final = frozenset(
     {"WallInner", "WallOuter", "WallTop", "WallBottom", "SlabTop", "SlabSide", "SlabBottom", *HOLE_TYPES}
-)  # fmt: skip
+)
+# fmt: on
 _STOREY_M: Final = 2.7
 _LIGHT_BAND_LM: Final = 800.0
 
@@ -208,9 +208,11 @@ class _Paints:
         ):
             folder, name = self._folder, f"{jid}/texture.png"
             found = self.library.texture(
-                f"3D-FRONT-texture/{name}", name=name, place=f"material {uid[:40]}",
+                f"3D-FRONT-texture/{name}",
+                name=name,
+                place=f"material {uid[:40]}",
                 load=lambda: folder.read(name, max_bytes=MAX_TEXTURE_BYTES),
-            )  # fmt: skip
+            )
         if found is not None:
             return Material(uid[:60], texture_id=found.texture.id, alpha_cutout=found.has_holes())
         return Material(uid[:60], diffuse=colour or (1.0, 1.0, 1.0), is_default=colour is None)
@@ -275,10 +277,15 @@ class _Structure:
                 name = f"{word} room"  # a LivingDiningRoom is to live in, whatever else it names
             rooms.append(
                 Room(
-                    id=front_room.id, name=name, level_id="", polygon=polygon, floor_y=low, ceiling_y=high,
+                    id=front_room.id,
+                    name=name,
+                    level_id="",
+                    polygon=polygon,
+                    floor_y=low,
+                    ceiling_y=high,
                     types=(word or front_room.kind,) if front_room.kind else (),
                 )
-            )  # fmt: skip
+            )
             self._areas[front_room.id] = shapely.Polygon(polygon)
         if not rooms:
             raise BadHouse(file, "scene.room", "no room has a mesh of the type Floor")
@@ -297,16 +304,20 @@ class _Structure:
         if uvs is None:
             uvs = mesh.points[:, [0, 2]] * (np.array([1, -1]) if up else 1)
         return Surface(
-            mesh.kind, mesh.points.astype(np.float32), np.ascontiguousarray(faces, np.int32),
-            self._paints.index(mesh.material), uvs.astype(np.float32),
-        )  # fmt: skip
+            mesh.kind,
+            mesh.points.astype(np.float32),
+            np.ascontiguousarray(faces, np.int32),
+            self._paints.index(mesh.material),
+            uvs.astype(np.float32),
+        )
 
     def walls(self, file: str) -> tuple[list[Any], list[Item]]:
         """(the holes, the walls as solids)."""
         drawn = [
-            replace(m, uvs=self._paints.uvs(m)) for m in self._house.meshes
+            replace(m, uvs=self._paints.uvs(m))
+            for m in self._house.meshes
             if m.kind in ("WallInner", "WallOuter")
-        ]  # fmt: skip
+        ]
         if len(drawn) > MAX_SHEETS:
             raise BadHouse(file, "mesh", f"{len(drawn)} walls, at most {MAX_SHEETS} are read")
         inner, outer = sheets_of(drawn, self._areas)
@@ -355,13 +366,20 @@ class _Structure:
                 )
             found.append(
                 Item(
-                    id=f"mesh_{len(found)}", name=parted(mesh.kind).lower() or "mesh",
-                    kind=ItemKind.LAMP if is_lamp else ItemKind.OBJECT, level_id="0", surfaces=(surface,),
-                    nyu40=OTHERPROP if seen is None else max(seen.nyu40, 0), source_class=mesh.kind,
-                    room_id=mesh.room, lights=lights,
-                    tags=("structure",) if seen is not None and seen.nyu40 in (WALL, FLOOR, CEILING) else (),
+                    id=f"mesh_{len(found)}",
+                    name=parted(mesh.kind).lower() or "mesh",
+                    kind=ItemKind.LAMP if is_lamp else ItemKind.OBJECT,
+                    level_id="0",
+                    surfaces=(surface,),
+                    nyu40=OTHERPROP if seen is None else max(seen.nyu40, 0),
+                    source_class=mesh.kind,
+                    room_id=mesh.room,
+                    lights=lights,
+                    tags=("structure",)
+                    if seen is not None and seen.nyu40 in (WALL, FLOOR, CEILING)
+                    else (),
                 )
-            )  # fmt: skip
+            )
         return found
 
     def material(self, index: int) -> Material:
@@ -380,6 +398,12 @@ def _front_structure_item(
 ) -> Item:
     nyu40 = {ItemKind.WALL: WALL, ItemKind.FLOOR: FLOOR, ItemKind.CEILING: CEILING}[kind]
     return Item(
-        id=item_id, name=kind.value, kind=kind, level_id="0", surfaces=tuple(surfaces), nyu40=nyu40,
-        source_class=kind.value.title(), room_id=room,
-    )  # fmt: skip
+        id=item_id,
+        name=kind.value,
+        kind=kind,
+        level_id="0",
+        surfaces=tuple(surfaces),
+        nyu40=nyu40,
+        source_class=kind.value.title(),
+        room_id=room,
+    )

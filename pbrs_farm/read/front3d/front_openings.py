@@ -85,11 +85,15 @@ def _openings_by_name(house: FrontFile) -> list[_NamedOpening]:
         is_window = seen is not None and seen.kind == "window"
         found.append(
             _NamedOpening(
-                at, "window" if is_window else "door", piece.title, 0 if door else 1,
-                bool(door and door.is_entry) or "entry" in piece.title, door.hinge if door else "",
+                at,
+                "window" if is_window else "door",
+                piece.title,
+                0 if door else 1,
+                bool(door and door.is_entry) or "entry" in piece.title,
+                door.hinge if door else "",
                 is_mirrored=bool(piece.scale[0] < 0),
             )
-        )  # fmt: skip
+        )
     return found
 
 
@@ -143,10 +147,14 @@ def _with_name_of(hole: Hole, named: _NamedOpening) -> Hole:
         style = "double"
     name = named.kind if named.kind != "door" else "front door" if named.is_entry else "door"
     return replace(
-        hole, kind=named.kind, name=name, source_class=named.title, style=style,
+        hole,
+        kind=named.kind,
+        name=name,
+        source_class=named.title,
+        style=style,
         is_glazed="sliding" in title or "door window" in title or "glass" in title,
         is_hinged_right=named.hinge.endswith("Right") != named.is_mirrored,
-    )  # fmt: skip
+    )
 
 
 def _of_mesh(named: _NamedOpening, every: Sequence[_NamedOpening]) -> Hole:

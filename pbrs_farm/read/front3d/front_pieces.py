@@ -50,10 +50,13 @@ def model_folder(path: Path, models: str) -> RootFolder | None:
         below = Path(models) / "3D-FUTURE-model"
         return RootFolder(below if below.is_dir() else Path(models))
     return next(
-        (RootFolder(path.parent / b) for b in _BESIDE if (path.parent / b / INFO).is_file()
-         or (b != "." and (path.parent / b).is_dir())),
+        (
+            RootFolder(path.parent / b)
+            for b in _BESIDE
+            if (path.parent / b / INFO).is_file() or (b != "." and (path.parent / b).is_dir())
+        ),
         None,
-    )  # fmt: skip
+    )
 
 
 def files_of_model(jid: str) -> Iterator[str]:
@@ -100,20 +103,28 @@ class FrontModels:
         kind = ItemKind.OBJECT if is_trim else seen.item_kind
         tags = ["mirrored"] if np.linalg.det(piece.world_from_model[:3, :3]) < 0 else []
         item = Item(
-            id=item_id, name=name.rpartition("/")[2] or "piece", kind=kind, level_id="0",
-            surfaces=tuple(surfaces), nyu40=max(seen.nyu40, 0), source_class=name, room_id=piece.room,
+            id=item_id,
+            name=name.rpartition("/")[2] or "piece",
+            kind=kind,
+            level_id="0",
+            surfaces=tuple(surfaces),
+            nyu40=max(seen.nyu40, 0),
+            source_class=name,
+            room_id=piece.room,
             box=oriented_box(model.meshes, piece.world_from_model),
             tags=(*tags, *(["structure"] if is_trim else [])),
-        )  # fmt: skip
+        )
         return replace(item, lights=(assumed_light(item),)) if kind is ItemKind.LAMP else item
 
     def _class(self, piece: FrontPiece) -> tuple[str, str, GivenClass]:
         """(vocabulary, name, class) by category, title, super category, the words of the title."""
         info = self._info.get(piece.jid, {})
         names = [
-            ("3dfuture", str(info.get("category") or "")), ("3dfuture", piece.category),
-            ("3dfront-title", piece.title), ("3dfuture-super", str(info.get("super-category") or "")),
-        ]  # fmt: skip
+            ("3dfuture", str(info.get("category") or "")),
+            ("3dfuture", piece.category),
+            ("3dfront-title", piece.title),
+            ("3dfuture-super", str(info.get("super-category") or "")),
+        ]
         for vocabulary, name in names:
             seen = given_class(vocabulary, name) if name else None
             if seen is not None:
@@ -145,9 +156,15 @@ class FrontModels:
         front = piece.world_from_model[:3, 2] * np.sign(piece.scale[2])
         turn = math.atan2(float(front[0]), float(front[2]))
         return box_only_item(
-            item_id, vocabulary, name, triple(at), triple(size), turn, is_front_given=True,
+            item_id,
+            vocabulary,
+            name,
+            triple(at),
+            triple(size),
+            turn,
+            is_front_given=True,
             room_id=piece.room,
-        )  # fmt: skip
+        )
 
 
 def _info(folder: RootFolder) -> dict[str, dict[str, Any]]:
@@ -181,9 +198,11 @@ def _is_card(mesh: Mesh, low: float) -> bool:
 
 
 def light_items(
-    lights: Sequence[FrontLight], items: Sequence[Item], areas: dict[str, float],
+    lights: Sequence[FrontLight],
+    items: Sequence[Item],
+    areas: dict[str, float],
     ceilings: dict[str, float],
-) -> list[Item]:  # fmt: skip
+) -> list[Item]:
     """An invisible lamp for every listed light without a lamp item.
 
     areas, ceilings: square metres and height by room. The lights of a room share the flux that gives its
@@ -206,15 +225,27 @@ def light_items(
         at[1] = min(at[1], ceilings[light.room] - _BELOW_M)
         rgb = _rgb_of_kelvin(light.kelvin) if light.kelvin else (1.0, 1.0, 1.0)
         part = LightPart(
-            triple(at), BULB_RADIUS_M, flux, PowerUnit.LUMEN, rgb_linear=rgb,
+            triple(at),
+            BULB_RADIUS_M,
+            flux,
+            PowerUnit.LUMEN,
+            rgb_linear=rgb,
             is_coloured=bool(light.kelvin),
-        )  # fmt: skip
+        )
         found.append(
             Item(
-                f"light_{k}", "spotlight", ItemKind.LAMP, "0", (), LAMP, "lights", light.room,
-                lights=(part,), tags=("made",),
+                f"light_{k}",
+                "spotlight",
+                ItemKind.LAMP,
+                "0",
+                (),
+                LAMP,
+                "lights",
+                light.room,
+                lights=(part,),
+                tags=("made",),
             )
-        )  # fmt: skip
+        )
     return found
 
 

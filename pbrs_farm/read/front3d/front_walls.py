@@ -379,10 +379,12 @@ def holes_of(pieces: Sequence[WallPiece]) -> list[tuple[Hole, WallPiece]]:
                 continue
             axes = np.stack([sheet.along, [0.0, 1.0, 0.0], sheet.normal], 1)
             hole = Hole(
-                id=f"hole_{len(found)}", kind="open",
+                id=f"hole_{len(found)}",
+                kind="open",
                 centre=sheet.point(middle, (y0 + y1) / 2, piece.through / 2),
-                size=(s1 - s0, y1 - y0, piece.through), axes=axes,
-            )  # fmt: skip
+                size=(s1 - s0, y1 - y0, piece.through),
+                axes=axes,
+            )
             found.append((hole, piece))
     return found
 

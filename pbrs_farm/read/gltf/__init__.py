@@ -20,10 +20,12 @@ def _companions_of_gltf(given: GivenFile, files: SourceFiles) -> str:
     return scene.companions_of_gltf(given, files)
 
 
+# fmt: off
 FORMAT = Format(
     kind="gltf", title="glTF", files=".glb or .gltf", order=30,
     brings="what its nodes and their names say", where="any modeller exports it", licence="of each scene",
     needs="the extra gltf for compressed files", suffixes=(".glb", ".gltf"),
     beside=("*.classes.json", "*.rooms.json"),
     read=_read_gltf, companions=_companions_of_gltf,
-)  # fmt: skip
+)
+# fmt: on

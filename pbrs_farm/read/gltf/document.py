@@ -32,23 +32,27 @@ MAX_DEPTH: Final = 200  # levels of the node tree
 _MOVES: Final = frozenset({"matrix", "rotation", "scale", "translation"})  # keys of a node
 
 # Extensions that a file may require.
+# fmt: off
 UNDERSTOOD: Final = frozenset({
     "KHR_lights_punctual", "KHR_materials_emissive_strength", "KHR_materials_ior",
     "KHR_materials_specular", "KHR_materials_transmission", "KHR_materials_unlit",
     "KHR_mesh_quantization", "KHR_texture_transform", "EXT_texture_webp",
     "KHR_draco_mesh_compression", "KHR_texture_basisu", "KHR_materials_pbrSpecularGlossiness",
-})  # fmt: skip
+})
+# fmt: on
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6  # values of primitive.mode
 UNREAD: Final = "unread-part"
 _WRAPS: Final = {33071: CLAMP, 33648: MIRROR}  # values of sampler.wrapS
 
 # Extensions without visible effect for a reader that ignores them: a fallback is included
 # (compressed meshes, pictures), or they do not concern the picture.
+# fmt: off
 _UNSEEN: Final = frozenset({
     "KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_texture_basisu",
     "EXT_texture_avif", "MSFT_texture_dds", "KHR_materials_variants", "KHR_xmp", "KHR_xmp_json_ld",
     "KHR_animation_pointer", "FB_geometry_metadata",
-})  # fmt: skip
+})
+# fmt: on
 
 _Row = dict[str, Any]
 

@@ -172,10 +172,16 @@ class SceneMaterials:
         if shine is None or is_lost or (diffuse and not self._lie_alike(diffuse, shine)):
             return factor, found, is_lost
         # Metals of two pictures are black in the one and coloured in the other.
-        made = self._made(shine, f"{place}: base colour", lambda data: base_colour_picture(
-            found.texture.data if found else None, data,
-            np.clip(factor[:3], 0, 1), self._specular_factor(glossy, place),
-        ))  # fmt: skip
+        made = self._made(
+            shine,
+            f"{place}: base colour",
+            lambda data: base_colour_picture(
+                found.texture.data if found else None,
+                data,
+                np.clip(factor[:3], 0, 1),
+                self._specular_factor(glossy, place),
+            ),
+        )
         if made is None:
             return factor, found, False
         return np.array([1, 1, 1, factor[3]]), made, False

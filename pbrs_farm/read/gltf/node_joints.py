@@ -24,8 +24,9 @@ KEY: Final = "pbrs_joint"
 _LEAST: Final = 1e-3  # radians or metres; what moves less is fixed
 
 
-def joint_row(part: str, kind: JointKind, point: Any, axis: Any, limits: tuple[float, float],
-              value: float) -> dict[str, Any]:  # fmt: skip
+def joint_row(
+    part: str, kind: JointKind, point: Any, axis: Any, limits: tuple[float, float], value: float
+) -> dict[str, Any]:
     """Joint description for a node's extras, under KEY.
 
     limits: minimum and maximum value, radians or metres. A joint that opens to the negative side is
@@ -36,9 +37,14 @@ def joint_row(part: str, kind: JointKind, point: Any, axis: Any, limits: tuple[f
     if abs(lower) > abs(upper):
         lower, upper, value, axis = -upper, -lower, -value, -axis
     return {
-        "part": part, "kind": kind.value, "point": [float(x) for x in point], "axis": axis.tolist(),
-        "lower": float(lower), "upper": float(upper), "value": float(value),
-    }  # fmt: skip
+        "part": part,
+        "kind": kind.value,
+        "point": [float(x) for x in point],
+        "axis": axis.tolist(),
+        "lower": float(lower),
+        "upper": float(upper),
+        "value": float(value),
+    }
 
 
 def joints_of_parts(gltf: Gltf, parts: Sequence[Placed]) -> dict[tuple[int, ...], Joint]:
@@ -68,7 +74,12 @@ def _joint(gltf: Gltf, row: dict[str, Any], part: Placed) -> Joint | None:
     if row.get("kind") not in known or upper - lower < _LEAST or length < 1e-9:
         return None
     joint = Joint(
-        str(row.get("part"))[:100], known[row["kind"]], triple(point), triple(axis / length),
-        float(upper), float(lower), float(value),
-    )  # fmt: skip
+        str(row.get("part"))[:100],
+        known[row["kind"]],
+        triple(point),
+        triple(axis / length),
+        float(upper),
+        float(lower),
+        float(value),
+    )
     return joint.placed(part.world_from_node)

@@ -181,10 +181,17 @@ def _fitting_item(item: Item, faces: Bools, said: I64, number: int) -> Item:
     points = np.concatenate([s.positions for s in surfaces]).astype(np.float64)
     low, high = points.min(0), points.max(0)
     return replace(
-        item, id=f"{item.id}.{name}{number}", name=f"{item.name} {name}".strip(), kind=kind,
-        nyu40=nyu40, surfaces=surfaces, lights=(), source_class=name,
-        box=_upright_box(low, high), tags=tuple(t for t in item.tags if t != "unmapped"),
-    )  # fmt: skip
+        item,
+        id=f"{item.id}.{name}{number}",
+        name=f"{item.name} {name}".strip(),
+        kind=kind,
+        nyu40=nyu40,
+        surfaces=surfaces,
+        lights=(),
+        source_class=name,
+        box=_upright_box(low, high),
+        tags=tuple(t for t in item.tags if t != "unmapped"),
+    )
 
 
 def _upright_box(low: F64, high: F64) -> Box:

@@ -71,10 +71,15 @@ def _by_materials(item: Item) -> tuple[Item, ...]:
     for kind, surfaces in groups.items():
         assert kind is not None
         part = replace(
-            item, id=f"{item.id}.{kind}" if found else item.id, kind=kind,
-            nyu40=CLASS_OF_STRUCTURE[kind], surfaces=tuple(surfaces), box=None,
-            lights=() if found else item.lights, tags=_tags_of_known(item),
-        )  # fmt: skip
+            item,
+            id=f"{item.id}.{kind}" if found else item.id,
+            kind=kind,
+            nyu40=CLASS_OF_STRUCTURE[kind],
+            surfaces=tuple(surfaces),
+            box=None,
+            lights=() if found else item.lights,
+            tags=_tags_of_known(item),
+        )
         found.append(part)
     return tuple(found)
 

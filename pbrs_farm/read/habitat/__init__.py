@@ -20,10 +20,12 @@ def _companions_of_habitat(given: GivenFile, files: SourceFiles) -> str:
     return scene_instance.companions_of_habitat(given, files)
 
 
+# fmt: off
 FORMAT = Format(
     kind="habitat", title="Habitat", files="*.scene_instance.json", order=60,
     brings="a stage, objects, regions", where="HSSD-hab, ReplicaCAD, ai2thor-hab",
     licence="of each data set", needs="the extra gltf for compressed files",
     keys=(("stage_instance",),), has_box_only_items=True,
     read=_read_habitat, companions=_companions_of_habitat,
-)  # fmt: skip
+)
+# fmt: on

@@ -53,8 +53,10 @@ _MOST_JSON_BYTES: Final = 64 * 2**20
 _MOST_FILES: Final = 200_000
 _BAKED: Final = "baked"
 _LIGHTS: Final = "KHR_lights_punctual"
+# fmt: off
 _ARRAYS: Final = ("buffers", "bufferViews", "accessors", "meshes", "materials", "textures", "images",
-                  "samplers", "nodes")  # fmt: skip
+                  "samplers", "nodes")
+# fmt: on
 
 
 def read_habitat(given: GivenFile, fields: ReadFields) -> House:
@@ -300,8 +302,11 @@ class _Built:
     def place(self, roots: list[int], matrix: F64, name: str, extras: dict[str, Any]) -> None:
         """Put an asset's roots below a new node."""
         node = {
-            "name": name, "matrix": matrix.T.reshape(-1).tolist(), "children": roots, "extras": extras
-        }  # fmt: skip
+            "name": name,
+            "matrix": matrix.T.reshape(-1).tolist(),
+            "children": roots,
+            "extras": extras,
+        }
         self.roots.append(len(self.document["nodes"]))
         self.document["nodes"].append(node)
 
@@ -310,9 +315,10 @@ class _Built:
         empty: dict[str, Any] = {_LIGHTS: {"lights": []}}
         lights = self.document.setdefault("extensions", empty)[_LIGHTS]["lights"]
         node = {
-            "name": name, "translation": position.tolist(),
+            "name": name,
+            "translation": position.tolist(),
             "extensions": {_LIGHTS: {"light": len(lights)}},
-        }  # fmt: skip
+        }
         lights.append(row)
         self.roots.append(len(self.document["nodes"]))
         self.document["nodes"].append(node)
@@ -320,15 +326,23 @@ class _Built:
     def gltf(self) -> Gltf:
         """The whole."""
         whole = self.document | {
-            "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": self.roots}]
-        }  # fmt: skip
+            "asset": {"version": "2.0"},
+            "scene": 0,
+            "scenes": [{"nodes": self.roots}],
+        }
         return Gltf(whole, tuple(self.buffers), self.file)
 
 
 # Where one entry names another by number -> the list it means.
-_NUMBERS: Final = {"buffer": "buffers", "bufferView": "bufferViews", "mesh": "meshes",
-                   "material": "materials", "sampler": "samplers", "source": "images",
-                   "indices": "accessors"}  # fmt: skip
+_NUMBERS: Final = {
+    "buffer": "buffers",
+    "bufferView": "bufferViews",
+    "mesh": "meshes",
+    "material": "materials",
+    "sampler": "samplers",
+    "source": "images",
+    "indices": "accessors",
+}
 
 
 def _shifted(copy: dict[str, Any], start: dict[str, int]) -> None:
@@ -584,9 +598,11 @@ def _rooms_of_regions(dataset: _Dataset, named: Any, stem: str) -> bytes | None:
         (floor_y,) = numbers(where, [floor], 1, f"{place}.floor_height")
         label = str(row.get("label") or row.get("name") or "")[:60]
         room: dict[str, Any] = {
-            "name": str(row.get("name") or label)[:60], "types": [label] if label else [],
-            "polygon": [[float(c[0]), float(c[2])] for c in corners], "floor_y": float(floor_y),
-        }  # fmt: skip
+            "name": str(row.get("name") or label)[:60],
+            "types": [label] if label else [],
+            "polygon": [[float(c[0]), float(c[2])] for c in corners],
+            "floor_y": float(floor_y),
+        }
         if type(high) in (int, float) and 0.5 < high < 50:
             room["ceiling_y"] = float(floor_y + high)
         rooms.append(room)

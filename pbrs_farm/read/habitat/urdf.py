@@ -19,9 +19,10 @@ from pbrs_farm.core.joints import JointKind
 MAX_BYTES: Final = 16 * 2**20
 _MOST_LINKS: Final = 1_000
 _KINDS: Final = {
-    "revolute": JointKind.REVOLUTE, "continuous": JointKind.REVOLUTE,
+    "revolute": JointKind.REVOLUTE,
+    "continuous": JointKind.REVOLUTE,
     "prismatic": JointKind.PRISMATIC,
-}  # fmt: skip
+}
 
 
 @dataclass(frozen=True, slots=True)

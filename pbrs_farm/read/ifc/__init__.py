@@ -13,9 +13,11 @@ def _read_ifc(given: GivenFile, fields: ReadFields) -> House:
     return building.read_ifc(given, fields)
 
 
+# fmt: off
 FORMAT = Format(
     kind="ifc", title="IFC", files=".ifc or .ifczip", order=80,
     brings="storeys, spaces, walls, doors, windows, fittings", where="any BIM program exports it",
     licence="of each building", needs="the extra ifc", library="ifcopenshell", suffixes=(".ifc", ".ifczip"),
     read=_read_ifc,
-)  # fmt: skip
+)
+# fmt: on

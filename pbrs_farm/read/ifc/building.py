@@ -75,8 +75,11 @@ _BELOW_SLAB_M: Final = 0.005  # a room's own ceiling hangs so far below a slab
 _OPENINGS: Final = (ItemKind.DOOR, ItemKind.WINDOW)
 # Entities of furniture and fixtures, which are never structure or openings, whatever their names.
 _PIECES: Final = (
-    "IfcFurnishingElement", "IfcFlowTerminal", "IfcElectricAppliance", "IfcSanitaryTerminal",
-)  # fmt: skip
+    "IfcFurnishingElement",
+    "IfcFlowTerminal",
+    "IfcElectricAppliance",
+    "IfcSanitaryTerminal",
+)
 _BETWEEN: Final = re.compile(r"[-:;,/&+()]")  # parts of a name
 _UPWARD: Final = 0.05  # y of the normal of a face of a body's top, at least
 _LEVEL_M: Final = 0.01  # a top whose heights differ less is level
@@ -224,9 +227,16 @@ class _Building:
             hint = "limit: read.max_extent_m"
             raise BadHouse(self._path.name, f"#{product.id()} {name}", text, hint=hint)
         item = Item(
-            id=str(product.GlobalId), name=name, kind=kind, level_id="", surfaces=surfaces,
-            nyu40=nyu40, source_class=product.is_a(), box=self._box(product, kind, mesh), tags=tags,
-        )  # fmt: skip
+            id=str(product.GlobalId),
+            name=name,
+            kind=kind,
+            level_id="",
+            surfaces=surfaces,
+            nyu40=nyu40,
+            source_class=product.is_a(),
+            box=self._box(product, kind, mesh),
+            tags=tags,
+        )
         if kind is ItemKind.LAMP:
             item = replace(item, lights=(assumed_light(item),), tags=(*tags, "assumed_light"))
         return item
@@ -337,10 +347,12 @@ class _Building:
         )
         opacity = 1.0 - style.transparency if style.transparency >= _CLEAR else PANE_OPACITY
         return Material(
-            style.name, kind=clear if is_glass else MaterialKind.OPAQUE,
-            diffuse=style.rgb or (0.8, 0.8, 0.8), opacity=opacity if is_glass else 1.0,
+            style.name,
+            kind=clear if is_glass else MaterialKind.OPAQUE,
+            diffuse=style.rgb or (0.8, 0.8, 0.8),
+            opacity=opacity if is_glass else 1.0,
             is_default=style.rgb is None,
-        )  # fmt: skip
+        )
 
     def _unstyled(self, product: Any) -> Material:
         """Material of a product without a style, from its name."""
@@ -414,9 +426,14 @@ class _Building:
             return None
         corners = points.astype(np.float64)[mesh.faces]
         room = Room(
-            id="", name=name, level_id="", polygon=polygon, floor_y=low, ceiling_y=high,
+            id="",
+            name=name,
+            level_id="",
+            polygon=polygon,
+            floor_y=low,
+            ceiling_y=high,
             types=(str(row.ObjectType)[:60],) if row.ObjectType else (),
-        )  # fmt: skip
+        )
         return room, corners[unit_normals(corners)[:, 1] > _UPWARD]
 
     def _named(self, levels: Sequence[Level]) -> tuple[Level, ...]:
@@ -604,9 +621,15 @@ def _looking_down(top: F64, material: int) -> Surface:
 def _floor_or_ceiling_item(room: Room, kind: ItemKind, surface: Surface) -> Item:
     nyu40 = FLOOR if kind is ItemKind.FLOOR else CEILING
     return Item(
-        id=f"{kind}_{room.id}", name=f"{room.name} {kind}".strip(), kind=kind, level_id="",
-        surfaces=(surface,), nyu40=nyu40, source_class="IfcSpace", room_id=room.id,
-    )  # fmt: skip
+        id=f"{kind}_{room.id}",
+        name=f"{room.name} {kind}".strip(),
+        kind=kind,
+        level_id="",
+        surfaces=(surface,),
+        nyu40=nyu40,
+        source_class="IfcSpace",
+        room_id=room.id,
+    )
 
 
 def _is_walled(room: Room, items: Sequence[Item], least_m: float) -> bool:

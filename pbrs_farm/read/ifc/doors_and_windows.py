@@ -25,13 +25,17 @@ _THRESHOLD_M: Final = 0.3  # above the storey: a door begins lower
 _SILL_M: Final = 0.5  # above the storey: what begins higher may be a window
 _DOOR_HEIGHT_M: Final = 1.7  # least height of a door
 # Families of doors whose names do not say door (of Revit's libraries): all words of one.
+# fmt: off
 _DOOR_FAMILIES: Final = (
     "single flush", "double flush", "single glass", "double glass", "single panel", "double panel", "raised panel", "sliding closet",
     "bifold", "bi fold", "bypass", "pocket slider", "overhead rolling", "overhead sectional",
-)  # fmt: skip
+)
+# fmt: on
+# fmt: off
 _WINDOW_FAMILIES: Final = (
     "fixed", "casement", "awning", "hopper", "hung", "skylight", "sash", "transom", "archtop",
-)  # fmt: skip
+)
+# fmt: on
 _SLIDING: Final = frozenset({"sliding", "slider", "bifold", "fold", "bypass", "pocket"})
 _GARAGE: Final = frozenset({"overhead", "garage"})
 
@@ -127,10 +131,14 @@ def hole_of_undrawn(opening: Opening, product: Any) -> Hole:
     depth = float(np.ptp(opening.cutter.positions @ normal))
     width, height = np.ptp(corners, axis=0)[:2].tolist()
     return Hole(
-        id=str(product.GlobalId), kind="window" if opening.is_window else "door",
-        centre=opening.quad.mean(0), size=(width, height, depth), axes=axes,
-        name=str(product.Name or "")[:200], source_class=product.is_a(),
-    )  # fmt: skip
+        id=str(product.GlobalId),
+        kind="window" if opening.is_window else "door",
+        centre=opening.quad.mean(0),
+        size=(width, height, depth),
+        axes=axes,
+        name=str(product.Name or "")[:200],
+        source_class=product.is_a(),
+    )
 
 
 def _walls(product: Any, items: Mapping[str, Item]) -> frozenset[str]:

@@ -123,8 +123,10 @@ def _mtl_number(word: str) -> float | None:
 
 
 # Options of a map_ line and how many values follow each (OBJ specification, appendix B1).
+# fmt: off
 _OPTIONS = {"-s": 3, "-o": 3, "-t": 3, "-mm": 2, "-bm": 1, "-clamp": 1, "-blendu": 1,
-            "-blendv": 1, "-texres": 1, "-imfchan": 1, "-cc": 1, "-boost": 1}  # fmt: skip
+            "-blendv": 1, "-texres": 1, "-imfchan": 1, "-cc": 1, "-boost": 1}
+# fmt: on
 
 
 def _picture_of_line(words: list[str], raw: str) -> tuple[dict[str, list[str]], str]:

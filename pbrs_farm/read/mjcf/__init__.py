@@ -22,10 +22,12 @@ def _companions_of_mjcf(given: GivenFile, files: SourceFiles) -> str:
     return model_files.companions_of_mjcf(given, files)
 
 
+# fmt: off
 FORMAT = Format(
     kind="mjcf", title="MuJoCo", files=".xml that begins with <mujoco>", order=75,
     brings="meshes, materials, joints as a keyframe has them", where="RoboCasa, MolmoSpaces, SceneSmith",
     licence="of each data set", needs="the extra physics", library="mujoco",
     suffixes=(".xml", ".mjcf"), shared_suffixes=frozenset({".xml"}), contains=re.compile(rb"<mujoco\b"),
     beside=("*.classes.json", "*.rooms.json"), read=_read_mjcf, companions=_companions_of_mjcf,
-)  # fmt: skip
+)
+# fmt: on

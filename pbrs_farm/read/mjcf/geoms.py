@@ -92,10 +92,11 @@ def shape_of(model: Any, geom: int, half_m: F64) -> Shape | None:
 def _of_surface(surface: Surface, model: Any, geom: int) -> Shape:
     normals, material = surface.normals, int(model.geom_matid[geom])
     return Shape(
-        surface.positions.astype(np.float64), surface.faces.astype(np.int64),
+        surface.positions.astype(np.float64),
+        surface.faces.astype(np.int64),
         None if surface.uvs is None else _laid(surface.uvs.astype(np.float64), model, material),
         None if normals is None else normals.astype(np.float64),
-    )  # fmt: skip
+    )
 
 
 def _laid(uvs_m: F64, model: Any, material: int) -> F64:
@@ -142,8 +143,9 @@ def material_row(model: Any, geom: int, texture: int | None) -> dict[str, Any]:
     rgba = np.array(rgba_of(model, geom))
     pbr: dict[str, Any] = {
         "baseColorFactor": [*linear_from_srgb(rgba[:3].clip(0, 1)).tolist(), float(rgba[3])],
-        "metallicFactor": 0.0, "roughnessFactor": 0.5,
-    }  # fmt: skip
+        "metallicFactor": 0.0,
+        "roughnessFactor": 0.5,
+    }
     row: dict[str, Any] = {"name": "", "pbrMetallicRoughness": pbr}
     if material >= 0:
         row["name"] = name_of(model, mujoco.mjtObj.mjOBJ_MATERIAL, material)

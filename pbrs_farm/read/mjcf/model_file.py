@@ -42,8 +42,9 @@ from pbrs_farm.read.mjcf.model_files import files_of_model, root_of
 _Row = dict[str, Any]
 _OBJECT: Final = mujoco.mjtObj
 _KINDS: Final = {
-    mujoco.mjtJoint.mjJNT_HINGE: JointKind.REVOLUTE, mujoco.mjtJoint.mjJNT_SLIDE: JointKind.PRISMATIC,
-}  # fmt: skip
+    mujoco.mjtJoint.mjJNT_HINGE: JointKind.REVOLUTE,
+    mujoco.mjtJoint.mjJNT_SLIDE: JointKind.PRISMATIC,
+}
 _Y_UP: Final = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
 _FLAT_M: Final = 0.02  # maximum height of a room's floor geom, metres
 _LEAST_ROOM_M: Final = 2.0  # minimum size of a room; a smaller body with a room's name is an item, such as a kitchen unit
@@ -68,11 +69,15 @@ def read_mjcf(given: GivenFile, fields: ReadFields) -> House:
     mapping, rooms = (folder.name_from(at, beside) for beside in side_files(path))
     own = folder.read(mapping, max_bytes=_MOST_JSON_BYTES)
     return house_of_gltf(
-        gltf, Source("mjcf", path.name, folder.sha256), path.stem, fields, notes,
+        gltf,
+        Source("mjcf", path.name, folder.sha256),
+        path.stem,
+        fields,
+        notes,
         mapping=Mapping() if own is None else mapping_from_json(own, mapping),
         fetch=lambda number: png_of_texture(model, int(number)),
         rooms=folder.read(rooms, max_bytes=_MOST_JSON_BYTES),
-    )  # fmt: skip
+    )
 
 
 def _compiled(given: GivenFile) -> tuple[Any, Any, list[bool]]:
@@ -142,8 +147,11 @@ class _Scene:
                 else:
                     found.setdefault(int(model.geom_bodyid[geom]), []).append(geom)
         # Visual geoms do not collide; items with visual geoms have separate colliders.
-        drawn = {int(model.body_rootid[b]) for b, geoms in found.items() if b
-                 and not all(collides[g] for g in geoms)}  # fmt: skip
+        drawn = {
+            int(model.body_rootid[b])
+            for b, geoms in found.items()
+            if b and not all(collides[g] for g in geoms)
+        }
         return {
             body: [g for g in geoms if not collides[g]]
             if int(model.body_rootid[body]) in drawn
@@ -158,19 +166,25 @@ class _Scene:
             self._notes.add(UNREAD, kind, f"{n} geoms are {kind}s, which are not read")
         extensions = {_LIGHTS: {"lights": self._lights}} if self._lights else {}
         document = {
-            "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": self._nodes,
-            "meshes": self._meshes, "materials": self._materials, "extensions": extensions,
+            "asset": {"version": "2.0"},
+            "scene": 0,
+            "scenes": [{"nodes": [0]}],
+            "nodes": self._nodes,
+            "meshes": self._meshes,
+            "materials": self._materials,
+            "extensions": extensions,
             "textures": [{"source": k} for k in range(len(self._textures))],
             "images": [{"uri": str(k)} for k in self._textures],
-        }  # fmt: skip
+        }
         return self._writer.gltf(document, self._file)
 
     def _group(self, body: int, above: int) -> None:
         """Add the members of a grouping body separately: its geoms, and its child bodies."""
         has_floor = any(
             "floor" in self._words(g).lower() and not is_endless(self._model, g)
-            for geoms in self._geoms.values() for g in geoms
-        )  # fmt: skip
+            for geoms in self._geoms.values()
+            for g in geoms
+        )
         is_room = bool(body) and _names_room(self._body_name(body))
         for geom in self._geoms.get(body, []):
             if is_endless(self._model, geom) and has_floor:
@@ -296,9 +310,10 @@ class _Scene:
         if shape.uvs is not None:
             attributes["TEXCOORD_0"] = add(shape.uvs.astype(np.float32))
         row = {
-            "attributes": attributes, "indices": self._writer.add_faces(shape.faces.astype(np.int32)),
+            "attributes": attributes,
+            "indices": self._writer.add_faces(shape.faces.astype(np.int32)),
             "material": self._material(geom),
-        }  # fmt: skip
+        }
         self._meshes.append({"primitives": [row]})
         self._known[key] = len(self._meshes) - 1
         return len(self._meshes) - 1
@@ -321,9 +336,11 @@ class _Scene:
         bodies = set(self._below(body)) if below else {body}
         directional = mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
         return [
-            k for k in range(self._model.nlight)
-            if int(self._model.light_bodyid[k]) in bodies and self._model.light_type[k] != directional
-        ]  # fmt: skip
+            k
+            for k in range(self._model.nlight)
+            if int(self._model.light_bodyid[k]) in bodies
+            and self._model.light_type[k] != directional
+        ]
 
     def _light_node(self, light: int) -> _Row:
         colour = np.asarray(self._model.light_diffuse[light], np.float64)

@@ -110,9 +110,14 @@ def _model(file: Path, root: Path) -> ObjectModel:
         name = after[0] if after else file.stem
         nyu40 = NYU40_NAMES.index(synset["nyu40"])
         return ObjectModel(
-            _id(synset["synset"], name), name, synset["name"], nyu40, file, root,
+            _id(synset["synset"], name),
+            name,
+            synset["name"],
+            nyu40,
+            file,
+            root,
             attribution="ShapeNet",
-        )  # fmt: skip
+        )
     # Elsewhere the first folder is the category, and the rest is the name.
     category = folders[0] if folders else root.name
     label = nyu40_of("", category) or nyu40_of("", file.stem) or OTHERPROP

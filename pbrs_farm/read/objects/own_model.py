@@ -160,9 +160,12 @@ def _from_trimesh(
         with _quiet_trimesh():
             # Its pictures are ours to open: they may be missing, or lead out of the folder.
             loaded: Any = trimesh.load(
-                io.BytesIO(data), file_type=path.suffix[1:].lower(), force="mesh", process=False,
+                io.BytesIO(data),
+                file_type=path.suffix[1:].lower(),
+                force="mesh",
+                process=False,
                 skip_materials=True,
-            )  # fmt: skip
+            )
             points = np.asarray(loaded.vertices, np.float64)
             faces = np.asarray(loaded.faces, np.int64)
     except Exception as error:  # noqa: BLE001  whatever the library meets in a foreign file
@@ -205,9 +208,11 @@ def _picture_of_ply(path: Path, library: MaterialLibrary, notes: Notes) -> Image
         notes.add("unread-part", path.name, text)
     name, folder = names[-1], RootFolder(path.parent)
     found = library.texture(
-        name, name=name, place=path.name,
+        name,
+        name=name,
+        place=path.name,
         load=lambda: folder.read(name, max_bytes=MAX_TEXTURE_BYTES),
-    )  # fmt: skip
+    )
     return None if found is None else Image.open(io.BytesIO(found.texture.data))
 
 

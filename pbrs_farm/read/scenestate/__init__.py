@@ -20,9 +20,11 @@ def _companions_of_scenestate(given: GivenFile, files: SourceFiles) -> str:
     return scene_state.companions_of_scenestate(given, files)
 
 
+# fmt: off
 FORMAT = Format(
     kind="scenestate", title="sceneState", files="*.scenestate.json or *.scene.json", order=40,
     brings="walls, floors, holes, furniture by --models", where="HSSD-200: huggingface.co/datasets/hssd",
     licence="CC BY-NC 4.0", keys=(("scene", "object", "arch"), ("format", "scene")), has_box_only_items=True,
     read=_read_scenestate, companions=_companions_of_scenestate,
-)  # fmt: skip
+)
+# fmt: on

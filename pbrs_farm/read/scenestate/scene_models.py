@@ -37,12 +37,16 @@ from pbrs_farm.read.scenestate.scene_document import PlacedModel
 from pbrs_farm.regular_files import MAX_SCENE_BYTES, text_from_bytes
 
 _TABLES: Final = (
-    "objects.csv", "semantics/objects.csv", "metadata/objects.csv", "semantics/hssd-hab_semantics_objects.csv",
-)  # fmt: skip
+    "objects.csv",
+    "semantics/objects.csv",
+    "metadata/objects.csv",
+    "semantics/hssd-hab_semantics_objects.csv",
+)
 _MAX_TABLE_BYTES: Final = 64_000_000
 _BESIDE: Final = ("", "..", "../..")  # where models and tables lie when no folder is named
 
 # Default width, height, depth by class for items with a missing model, metres.
+# fmt: off
 _USUAL: Final = {
     "bathtub": (1.7, 0.58, 0.75), "bed": (1.6, 0.9, 2.05), "bookshelf": (0.9, 1.8, 0.32),
     "cabinet": (0.9, 0.9, 0.45), "chair": (0.52, 0.85, 0.55), "counter": (1.2, 0.9, 0.6),
@@ -51,7 +55,8 @@ _USUAL: Final = {
     "night stand": (0.48, 0.52, 0.4), "picture": (0.6, 0.5, 0.03), "refrigerator": (0.65, 1.75, 0.65),
     "shelves": (0.9, 1.6, 0.35), "sink": (0.6, 0.85, 0.48), "sofa": (1.95, 0.8, 0.9),
     "table": (1.3, 0.74, 0.85), "television": (1.1, 0.65, 0.08), "toilet": (0.38, 0.75, 0.68),
-}  # fmt: skip
+}
+# fmt: on
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,10 +119,16 @@ class SceneModels:
         kind = ItemKind.OBJECT if seen.kind in _STRUCTURE else seen.item_kind
         name = row.category if row else one.model
         item = Item(
-            id=item_id, name=name.replace("_", " "), kind=kind, level_id="0", surfaces=kept,
-            nyu40=seen.nyu40, source_class=f"{one.source}.{one.model}", box=oriented_box(meshes, world),
+            id=item_id,
+            name=name.replace("_", " "),
+            kind=kind,
+            level_id="0",
+            surfaces=kept,
+            nyu40=seen.nyu40,
+            source_class=f"{one.source}.{one.model}",
+            box=oriented_box(meshes, world),
             tags=("mirrored",) if np.linalg.det(world[:3, :3]) < 0 else (),
-        )  # fmt: skip
+        )
         return replace(item, lights=(assumed_light(item),)) if kind is ItemKind.LAMP else item
 
     def _box_only(
@@ -138,9 +149,14 @@ class SceneModels:
         x, y, z = (float(v) for v in world[:3, 3])
         turn = math.atan2(float(columns[0, 2]), float(columns[2, 2]))
         return box_only_item(
-            item_id, "hssd", row.category, (x, y + height / 2, z), (width, height, depth), turn,
+            item_id,
+            "hssd",
+            row.category,
+            (x, y + height / 2, z),
+            (width, height, depth),
+            turn,
             is_front_given=True,
-        )  # fmt: skip
+        )
 
     def _surfaces(self, model: str, place: str) -> tuple[Surface, ...]:
         if model not in self._known:

@@ -105,8 +105,13 @@ def read_scenestate(given: GivenFile, fields: ReadFields) -> House:
 
 
 def _object_items(
-    document: SceneDocument, path: Path, models: str, shell: _Shell, notes: Notes, fields: ReadFields
-) -> tuple[list[Item], str]:  # fmt: skip
+    document: SceneDocument,
+    path: Path,
+    models: str,
+    shell: _Shell,
+    notes: Notes,
+    fields: ReadFields,
+) -> tuple[list[Item], str]:
     """The objects, and what to say of those that have neither a model nor a known class."""
     found = SceneModels(roots_of(path, models), shell.materials.library, notes, fields)
     items = []
@@ -220,8 +225,9 @@ class _Shell:
         parts: list[Item] = []
         ceilings = [
             (e, shapely.make_valid(shapely.Polygon(e.element.points[0][:, [0, 2]])))
-            for e in self._slabs if e.element.kind == "Ceiling"
-        ]  # fmt: skip
+            for e in self._slabs
+            if e.element.kind == "Ceiling"
+        ]
         for name in dict.fromkeys(order):
             floors = self._floors.get(name)
             if floors is None:
@@ -241,9 +247,12 @@ class _Shell:
         return wall_surfaces(_AS_IT_STANDS, wall.element, wall.frame, self.materials)
 
     def _room(
-        self, name: str, floors: list[SceneElement], ceilings: list[tuple[SceneElement, Any]],
+        self,
+        name: str,
+        floors: list[SceneElement],
+        ceilings: list[tuple[SceneElement, Any]],
         walls: list[tuple[StandingWall, Surface]],
-    ) -> tuple[Room, list[Item]] | None:  # fmt: skip
+    ) -> tuple[Room, list[Item]] | None:
         parts = []
         for k, one in enumerate(floors):
             surfaces = slab_surfaces(_AS_IT_STANDS, one.element, self.materials)
@@ -264,10 +273,11 @@ class _Shell:
             return None
         area = shapely.Polygon(polygon)
         above = [
-            e for e, shape in ceilings
+            e
+            for e, shape in ceilings
             if shape.intersection(area).area > 0.3 * area.area
             and float(e.element.points[0][:, 1].min()) > low + 1.0
-        ]  # fmt: skip
+        ]
         own = [e for e in ceilings if name in e[0].rooms]
         tops = sorted(w.frame.start[1] + w.element.height_m for w, _ in near)
         top = float(tops[len(tops) // 2]) if tops else low + _STOREY_M
@@ -297,9 +307,14 @@ class _Shell:
         high = top if high is None else high
         types = self._document.room_types.get(name, ())
         room = Room(
-            id=name, name=types[0].replace("_", " ") if types else "", level_id="", polygon=polygon,
-            floor_y=low, ceiling_y=high if high > low + 0.5 else low + _STOREY_M, types=types,
-        )  # fmt: skip
+            id=name,
+            name=types[0].replace("_", " ") if types else "",
+            level_id="",
+            polygon=polygon,
+            floor_y=low,
+            ceiling_y=high if high > low + 0.5 else low + _STOREY_M,
+            types=types,
+        )
         return room, parts
 
     def holes(self, rooms: Sequence[Room]) -> list[Hole]:
@@ -313,9 +328,13 @@ class _Shell:
         return merge_holes(found)
 
     def _hole(
-        self, wall: StandingWall, k: int, hole: tuple[float, float, float, float], kind: str,
+        self,
+        wall: StandingWall,
+        k: int,
+        hole: tuple[float, float, float, float],
+        kind: str,
         rooms: Sequence[Room],
-    ) -> Hole | None:  # fmt: skip
+    ) -> Hole | None:
         e, frame = wall.element, wall.frame
         u0, v0 = max(hole[0], 0.0), max(hole[1], 0.0)
         u1, v1 = min(hole[2], frame.length), min(hole[3], e.height_m)
@@ -335,19 +354,33 @@ class _Shell:
             centre = centre + np.array([0.0, (here - foot) / 2, 0.0])
             v0 += here - foot
         return Hole(
-            id=f"{wall.id}_{'window' if is_window else 'door'}{k}", kind="window" if is_window else "door",
-            centre=centre, size=(u1 - u0, v1 - v0, e.depth_m), axes=axes, source_class=kind,
-        )  # fmt: skip
+            id=f"{wall.id}_{'window' if is_window else 'door'}{k}",
+            kind="window" if is_window else "door",
+            centre=centre,
+            size=(u1 - u0, v1 - v0, e.depth_m),
+            axes=axes,
+            source_class=kind,
+        )
 
 
 def _scene_structure_item(
-    item_id: str, kind: ItemKind, surfaces: tuple[Surface, ...], room: str | None,
+    item_id: str,
+    kind: ItemKind,
+    surfaces: tuple[Surface, ...],
+    room: str | None,
     tags: tuple[str, ...] = (),
-) -> Item:  # fmt: skip
+) -> Item:
     return Item(
-        id=item_id, name=f"{kind.value} {room or ''}".strip(), kind=kind, level_id="0", surfaces=surfaces,
-        nyu40=NYU40_NAMES.index(kind.value), source_class=kind.value.title(), room_id=room, tags=tags,
-    )  # fmt: skip
+        id=item_id,
+        name=f"{kind.value} {room or ''}".strip(),
+        kind=kind,
+        level_id="0",
+        surfaces=surfaces,
+        nyu40=NYU40_NAMES.index(kind.value),
+        source_class=kind.value.title(),
+        room_id=room,
+        tags=tags,
+    )
 
 
 def _ceiling_over(floor: Element, top: float) -> Element:

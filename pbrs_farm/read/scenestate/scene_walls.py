@@ -151,9 +151,12 @@ def _same_height(a: StandingWall, b: StandingWall) -> bool:
 
 
 def _cut_at_crossings(
-    drawn: Sequence[StandingWall], k: int, runs: list[tuple[float, float, tuple[int, ...]]],
-    origin: F64, axis: F64,
-) -> list[StandingWall]:  # fmt: skip
+    drawn: Sequence[StandingWall],
+    k: int,
+    runs: list[tuple[float, float, tuple[int, ...]]],
+    origin: F64,
+    axis: F64,
+) -> list[StandingWall]:
     wall = drawn[k]
     e, axes = wall.element, wall.frame.axes
     found = []
@@ -172,8 +175,13 @@ def _cut_at_crossings(
         depth = max(w.element.depth_m for w in (wall, *others))
         start = start + axes[:, 2] * (e.depth_m - depth) / 2
         piece = replace(
-            e, overrides=overrides, height_m=float(top - start[1]), depth_m=depth, holes=(), hole_types=()
-        )  # fmt: skip
+            e,
+            overrides=overrides,
+            height_m=float(top - start[1]),
+            depth_m=depth,
+            holes=(),
+            hole_types=(),
+        )
         rooms = tuple(dict.fromkeys(r for w in (wall, *others) for r in w.rooms))
         name = wall.id if number == 0 else f"{wall.id}.{number}"
         found.append(

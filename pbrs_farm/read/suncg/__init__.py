@@ -22,9 +22,11 @@ def _companions_of_suncg(given: GivenFile, files: SourceFiles) -> str:
     return files.digest(root, suncg_companions(root, given.path.name, files))
 
 
+# fmt: off
 FORMAT = Format(
     kind="suncg", title="SUNCG", files="ROOT/house/ID", order=20,
     brings="walls, rooms, furniture, lamps", where="no longer published",
     licence="of the copy you have", main_file="house.json", travels=False,
     read=_read_suncg, companions=_companions_of_suncg,
-)  # fmt: skip
+)
+# fmt: on

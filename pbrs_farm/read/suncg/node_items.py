@@ -197,9 +197,16 @@ def box_item(context: ReaderContext, node: Node, room_id: str | None) -> Item | 
         context.notes.add("empty-model", node.place, "a Box without extent; left out")
         return None
     return Item(
-        node.id, "box", ItemKind.OBJECT, node.level_id, tuple(surfaces), UNLABELLED, "Box", room_id,
+        node.id,
+        "box",
+        ItemKind.OBJECT,
+        node.level_id,
+        tuple(surfaces),
+        UNLABELLED,
+        "Box",
+        room_id,
         tags=("box", "unmapped"),
-    )  # fmt: skip
+    )
 
 
 def _box_face(half: F64, axis: int, sign: int, world_from_box: F64, index: int) -> Surface:

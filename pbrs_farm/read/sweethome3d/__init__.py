@@ -22,10 +22,12 @@ def _companions_of_sweethome3d(given: GivenFile, files: SourceFiles) -> str:
     return packaged_home.companions_of_home(given, files)
 
 
+# fmt: off
 FORMAT = Format(
     kind="sweethome3d", title="Sweet Home 3D", files=".sh3d or Home.xml", order=10,
     brings="walls, rooms, furniture, lamps", where="sweethome3d.com, or your own",
     licence="of each home", suffixes=(".sh3d", ".xml", ".zip"), shared_suffixes=frozenset({".xml", ".zip"}),
     contains=re.compile(rb"\A\s*(<\?xml[^>]*>\s*)?<home\b|\APK.{28}(Home|ContentDigests)", re.DOTALL),
     read=_read_sweethome3d, companions=_companions_of_sweethome3d, uses_packages=True,
-)  # fmt: skip
+)
+# fmt: on

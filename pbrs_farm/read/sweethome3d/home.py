@@ -286,9 +286,11 @@ def _read_pieces(
         n_faces += item.n_faces
         if n_faces > fields.max_triangles:
             raise BadHouse(
-                file, piece.place, f"more than {fields.max_triangles} triangles in the house",
+                file,
+                piece.place,
+                f"more than {fields.max_triangles} triangles in the house",
                 hint="raise read.max_triangles",
-            )  # fmt: skip
+            )
         found.append(StandingPiece(piece, level, item, frame))
         opening = piece_opening(piece, item, frame, walls, materials, cutter_material)
         if opening is not None:
@@ -297,9 +299,11 @@ def _read_pieces(
     missing = materials.notes.count("missing-model")
     if n_pieces and missing and not found:
         raise BadHouse(
-            file, "", f"none of its {n_pieces} models can be found",
+            file,
+            "",
+            f"none of its {n_pieces} models can be found",
             hint="save the home as .sh3d with its contents, or fetch the program's: pbrs-farm homes",
-        )  # fmt: skip
+        )
     if fields.doors == "open":
         return opened_doors(found, models, materials, rooms, walls), tuple(openings)
     return [placed.item for placed in found], tuple(openings)

@@ -93,12 +93,19 @@ def rooms_between_walls(plan: HomePlan, outlines: dict[str, Outline]) -> tuple[H
         inside = [room for piece in pieces for room in parted_at_doorways(piece, ways)]
         found += [
             HomeRoom(
-                place=f"walls of level {level_id or '0'}", level=level_id, name="", points=_ring(p.exterior),
-                has_floor=True, has_ceiling=True, floor=Paint(), ceiling=Paint(), is_ceiling_flat=False,
+                place=f"walls of level {level_id or '0'}",
+                level=level_id,
+                name="",
+                points=_ring(p.exterior),
+                has_floor=True,
+                has_ceiling=True,
+                floor=Paint(),
+                ceiling=Paint(),
+                is_ceiling_flat=False,
             )
             for p in sorted(inside, key=lambda p: (p.bounds, p.area))
             if p.area >= LEAST_ROOM_M2
-        ]  # fmt: skip
+        ]
     return tuple(found)
 
 
@@ -157,12 +164,19 @@ def room_nouns(rooms: list[ReadRoom], ceilings: CeilingHeights) -> tuple[Room, .
         outline = rest[0] if len(rest) == 1 and not rest[0].interiors else room.outline
         polygon = counter_clockwise(_ring(outline.exterior))
         height = ceilings.highest(room.level, polygon, is_flat=room.plan.is_ceiling_flat)
-        nouns.append(Room(
-            id=room.id, name=room.plan.name, level_id=room.level_id, polygon=polygon,
-            floor_y=room.level.elevation, ceiling_y=room.level.elevation + height,
-            types=(room.plan.name,) if room.plan.name else (),
-            has_floor=room.plan.has_floor, has_ceiling=room.plan.has_ceiling,
-        ))  # fmt: skip
+        nouns.append(
+            Room(
+                id=room.id,
+                name=room.plan.name,
+                level_id=room.level_id,
+                polygon=polygon,
+                floor_y=room.level.elevation,
+                ceiling_y=room.level.elevation + height,
+                types=(room.plan.name,) if room.plan.name else (),
+                has_floor=room.plan.has_floor,
+                has_ceiling=room.plan.has_ceiling,
+            )
+        )
     return tuple(nouns)
 
 

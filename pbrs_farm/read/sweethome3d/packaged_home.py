@@ -37,9 +37,13 @@ def read_example(name: str, fields: ReadFields) -> House:
     package = homes_package.fetch()
     data, file = package.home(name)
     return read_home(
-        data, file, resources=package.resources(), fields=fields,
-        package=package.label, package_note=package.note,
-    )  # fmt: skip
+        data,
+        file,
+        resources=package.resources(),
+        fields=fields,
+        package=package.label,
+        package_note=package.note,
+    )
 
 
 def package_digest(package: Package | None) -> str:

@@ -261,11 +261,14 @@ def _merge_meshes(meshes: tuple[Mesh, ...]) -> tuple[tuple[Mesh, ...], tuple[str
         first = np.cumsum([0, *(len(p.positions) for p in parts[:-1])])
         faces = np.concatenate([p.faces + n for p, n in zip(parts, first, strict=True)])
         uvs = [p.uvs for p in parts if p.uvs is not None]
-        merged.append(replace(
-            parts[0], group=role,
-            positions=np.concatenate([p.positions for p in parts]),
-            faces=faces.astype(np.int32),
-            uvs=np.concatenate(uvs) if has_uvs else None,
-            normals=np.concatenate([p.normals for p in parts]),
-        ))  # fmt: skip
+        merged.append(
+            replace(
+                parts[0],
+                group=role,
+                positions=np.concatenate([p.positions for p in parts]),
+                faces=faces.astype(np.int32),
+                uvs=np.concatenate(uvs) if has_uvs else None,
+                normals=np.concatenate([p.normals for p in parts]),
+            )
+        )
     return tuple(merged), tuple(hanger for *_, hanger in grouped)

@@ -88,10 +88,14 @@ def _wall_item(
     left_top = level.elevation + top_heights(wall, outline.left, outline.along)
     right_top = level.elevation + top_heights(wall, outline.right, outline.along)
     surfaces = wall_prism(
-        outline.left, outline.right, foot,
-        np.maximum(left_top, foot + 1e-3), np.maximum(right_top, foot + 1e-3), sides,
+        outline.left,
+        outline.right,
+        foot,
+        np.maximum(left_top, foot + 1e-3),
+        np.maximum(right_top, foot + 1e-3),
+        sides,
         top=materials.painted(wall.top, "wall top", f"{place} top"),
-    )  # fmt: skip
+    )
     painted = tuple(
         _textured(s, paint, level.elevation)
         for s, paint in zip(surfaces, (wall.left, wall.right, *[Paint()] * 4), strict=True)

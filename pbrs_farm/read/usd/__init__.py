@@ -20,10 +20,12 @@ def _companions_of_usd(given: GivenFile, files: SourceFiles) -> str:
     return stage.companions_of_usd(given, files)
 
 
+# fmt: off
 FORMAT = Format(
     kind="usd", title="OpenUSD", files=".usd .usda .usdc .usdz", order=70,
     brings="meshes, materials, labels, lights", where="GRScenes, InteriorAgent, SimReady homes",
     licence="of each data set", needs="the extra usd", library="pxr",
     suffixes=(".usd", ".usda", ".usdc", ".usdz"), beside=("*.classes.json", "*.rooms.json", "rooms.json"),
     read=_read_usd, companions=_companions_of_usd,
-)  # fmt: skip
+)
+# fmt: on

@@ -84,11 +84,17 @@ class StageNodes:
         shaders = self._shaders
         extensions = {"KHR_lights_punctual": {"lights": self._lights}} if self._lights else {}
         document = {
-            "asset": {"version": "2.0"}, "scene": 0,
-            "scenes": [{"nodes": [0], "extras": scene_extras}], "nodes": self._nodes,
-            "meshes": self._meshes, "materials": shaders.materials, "textures": shaders.textures, "samplers": shaders.samplers,
-            "images": shaders.images, "extensions": extensions,
-        }  # fmt: skip
+            "asset": {"version": "2.0"},
+            "scene": 0,
+            "scenes": [{"nodes": [0], "extras": scene_extras}],
+            "nodes": self._nodes,
+            "meshes": self._meshes,
+            "materials": shaders.materials,
+            "textures": shaders.textures,
+            "samplers": shaders.samplers,
+            "images": shaders.images,
+            "extensions": extensions,
+        }
         return self._writer.gltf(document, self._file)
 
     def _visit(self, prim: Any, above: _Above) -> Iterator[tuple[Any, _Above]]:
@@ -354,9 +360,11 @@ class StageNodes:
             raise BadHouse(self._file, str(prim.GetPath()), "names a prototype that does not exist")
         # The prototypes' own places are part of each instance's.
         places = instancer.ComputeInstanceTransformsAtTime(
-            self._time, self._time, UsdGeom.PointInstancer.IncludeProtoXform,
+            self._time,
+            self._time,
+            UsdGeom.PointInstancer.IncludeProtoXform,
             UsdGeom.PointInstancer.IgnoreMask,
-        )  # fmt: skip
+        )
         mask = instancer.ComputeMaskAtTime(self._time)
         if len(places) != len(numbers):
             raise BadHouse(self._file, str(prim.GetPath()), "has not one place for each instance")

@@ -248,8 +248,9 @@ class Shaders:
         values = PictureValues(
             picture.channel if picture.channel in tuple("rba") else "",
             decode=picture.space == "sRGB",
-            scale=(1.0 if factor != 1 else scale,) * 3, bias=(bias,) * 3,
-        )  # fmt: skip
+            scale=(1.0 if factor != 1 else scale,) * 3,
+            bias=(bias,) * 3,
+        )
         return factor, self._changed(picture.info, values)
 
     def _opacity(
@@ -339,11 +340,12 @@ class Shaders:
             self._notes.add("texture-layout", str(node.GetPath()), text)
         scale, bias = (self._input(node, name, None)[0] for name in ("scale", "bias"))
         picture = _Picture(
-            self._info(asset, wraps), channel,
+            self._info(asset, wraps),
+            channel,
             scale=tuple(_component(scale, k, 1.0) for k in range(4)),
             bias=tuple(_component(bias, k, 0.0) for k in range(4)),
             space=self._colour_space(node),
-        )  # fmt: skip
+        )
         turn = self._place_of_picture(node)
         return picture._replace(info=picture.info | {"extensions": turn}) if turn else picture
 
@@ -596,9 +598,11 @@ def _transform(
     offset = np.array([shift[0], 1 - shift[1]]) - turned * [1, -1]
     return {
         "KHR_texture_transform": {
-            "offset": [float(c) for c in offset], "rotation": angle, "scale": list(size),
+            "offset": [float(c) for c in offset],
+            "rotation": angle,
+            "scale": list(size),
         }
-    }  # fmt: skip
+    }
 
 
 def _alpha_mode(threshold: float) -> _Row:

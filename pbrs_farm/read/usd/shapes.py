@@ -18,8 +18,14 @@ _ROUND: Final = 24  # segments around a round shape
 _OFF_M: Final = 0.005  # offset of a flat light from its ceiling, metres
 # Other shape types, which are not triangulated.
 NOT_READ: Final = (
-    "BasisCurves", "NurbsCurves", "NurbsPatch", "HermiteCurves", "Points", "TetMesh", "Volume",
-)  # fmt: skip
+    "BasisCurves",
+    "NurbsCurves",
+    "NurbsPatch",
+    "HermiteCurves",
+    "Points",
+    "TetMesh",
+    "Volume",
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -104,8 +110,13 @@ def _texture_coordinates(prim: Any, time: Any, uv_name: str) -> tuple[F64 | None
 
 def _is_pair(primvar: Any) -> bool:
     return str(primvar.GetTypeName()) in (
-        "texCoord2f[]", "texCoord2d[]", "texCoord2h[]", "float2[]", "double2[]", "half2[]",
-    )  # fmt: skip
+        "texCoord2f[]",
+        "texCoord2d[]",
+        "texCoord2h[]",
+        "float2[]",
+        "double2[]",
+        "half2[]",
+    )
 
 
 def _normals(mesh: Any, time: Any) -> tuple[F64 | None, str]:

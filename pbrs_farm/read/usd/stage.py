@@ -61,10 +61,14 @@ def read_usd(given: GivenFile, fields: ReadFields) -> House:
         raise damaged(path, error) from None
     sha256 = keys.sha256(path.read_bytes())
     house = house_of_gltf(
-        gltf, Source("usd", path.name, sha256, attribution=_credit(stage)), path.stem, fields, notes,
+        gltf,
+        Source("usd", path.name, sha256, attribution=_credit(stage)),
+        path.stem,
+        fields,
+        notes,
         mapping=_mapping(folder, path),
         fetch=lambda number: shaders.picture(int(number), folder.picture),
-    )  # fmt: skip
+    )
     if rooms:
         return house
     return replace(house, rooms=tuple(_name_by_scope(room, house.items) for room in house.rooms))

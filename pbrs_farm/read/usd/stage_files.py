@@ -204,9 +204,13 @@ def _fault_of(path: str, _size: int, _changed: int, n_bytes: int) -> str:
     limit_s = _TRIAL_S + n_bytes / _BYTES_A_SECOND
     try:
         done = subprocess.run(
-            [sys.executable, "-c", _TRIAL, path], timeout=limit_s, check=False,
-            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, stdin=subprocess.DEVNULL,
-        )  # fmt: skip
+            [sys.executable, "-c", _TRIAL, path],
+            timeout=limit_s,
+            check=False,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            stdin=subprocess.DEVNULL,
+        )
     except subprocess.TimeoutExpired:
         return f"damaged: the library does not open it within {limit_s:.0f} s"
     return "damaged: the library dies of it" if has_crashed(done.returncode) else ""

@@ -27,22 +27,33 @@ class SurfaceWords(NamedTuple):
 
 
 _PREVIEW: Final = SurfaceWords(
-    "diffuseColor", "roughness", "metallic", "opacity", "normal", "emissiveColor",
+    "diffuseColor",
+    "roughness",
+    "metallic",
+    "opacity",
+    "normal",
+    "emissiveColor",
     default_colour=0.18,
-)  # fmt: skip
+)
+# fmt: off
 _STANDARD: Final = SurfaceWords(
     "base_color", "specular_roughness", "metalness", "opacity", "normal", "emission_color",
     "base", "emission", "transmission", default_roughness=0.2,
-)  # fmt: skip
+)
+# fmt: on
+# fmt: off
 _GLTF: Final = SurfaceWords(
     "base_color", "roughness", "metallic", "alpha", "normal", "emissive",
     transmission="transmission", default_colour=1.0, default_roughness=1.0, default_metallic=1.0,
-)  # fmt: skip
+)
+# fmt: on
+# fmt: off
 _OPEN: Final = SurfaceWords(
     "base_color", "specular_roughness", "base_metalness", "geometry_opacity", "geometry_normal",
     "emission_color", "base_weight", "emission_luminance", "transmission_weight",
     default_roughness=0.3,
-)  # fmt: skip
+)
+# fmt: on
 
 _BY_NAME: Final = {
     "UsdPreviewSurface": _PREVIEW,
@@ -79,7 +90,5 @@ def is_picture(kind: str) -> bool:
     )
 
 
-WRAPS: Final = {
-    "clamp": 33071, "black": 33071, "constant": 33071, "mirror": 33648
-}  # fmt: skip
+WRAPS: Final = {"clamp": 33071, "black": 33071, "constant": 33071, "mirror": 33648}
 """How a picture goes on beyond its edges, in words of USD and MaterialX -> glTF's number; others repeat."""

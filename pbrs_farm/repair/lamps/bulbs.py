@@ -124,7 +124,9 @@ def _fitting_sphere(position: F64, radius: float, corners: F64) -> tuple[F64, fl
     near = corners[distances_to_triangles(position, corners) < 4 * radius]
     rng = np.random.default_rng(0)  # fixed: repair is a function of the house
     steps = rng.normal(size=(_N_MOVES, 3))
-    steps *= (radius * rng.random((_N_MOVES, 1)) ** (1 / 3)) / np.linalg.norm(steps, axis=1, keepdims=True)  # fmt: skip
+    steps *= (radius * rng.random((_N_MOVES, 1)) ** (1 / 3)) / np.linalg.norm(
+        steps, axis=1, keepdims=True
+    )
     room = [_distance_to_lamp(position + step, near) for step in steps]
     best = int(np.argmax(room))
     return position + steps[best], max(min(radius, _CLEARANCE * room[best]), _LEAST_RADIUS_M / 4)

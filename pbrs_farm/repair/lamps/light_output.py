@@ -80,7 +80,9 @@ def lamp_scene_of_house(house: House, occluder_from: Callable[[House], Occluder]
             if house.materials[s.material].kind in _SEE_THROUGH or not len(s.faces):
                 continue
             # Split the surface into connected parts, the units that may become shades.
-            labels[k, j] = np.unique(components([patch_from_surface(s, k)])[0], return_inverse=True)[1]  # fmt: skip
+            labels[k, j] = np.unique(
+                components([patch_from_surface(s, k)])[0], return_inverse=True
+            )[1]
             numbers.append(labels[k, j] + len(parts))
             parts += [(k, j, part) for part in range(int(labels[k, j].max()) + 1)]
             moved = (s.positions.astype(np.float64) + offset_of[k]).astype(np.float32)
@@ -95,7 +97,9 @@ def lamp_scene_of_house(house: House, occluder_from: Callable[[House], Occluder]
     scene = house.with_items(items)
     part_of_face = np.concatenate([np.zeros(0, np.int64), *numbers])
     if not len(part_of_face):
-        return LampScene(house, None, (), part_of_face, np.zeros((0, 3)), offset_of, bounds_of, labels)  # fmt: skip
+        return LampScene(
+            house, None, (), part_of_face, np.zeros((0, 3)), offset_of, bounds_of, labels
+        )
     normals = unit_normals(corners_of_surfaces(s for _, _, _, s in scene.surfaces()))
     occluder = occluder_from(scene)
     return LampScene(

@@ -250,9 +250,15 @@ def _closes(room: Room, cover: Cover, *, above: bool) -> bool:
     heights = cover.plane.at(corners)
     if above:
         if cover.is_roof:
-            return bool(heights.max() > room.floor_y + _LEAST_M and heights.min() < room.ceiling_y + _STOREY_GAP_M)  # fmt: skip
+            return bool(
+                heights.max() > room.floor_y + _LEAST_M
+                and heights.min() < room.ceiling_y + _STOREY_GAP_M
+            )
         if cover.is_ceiling:
-            return bool(heights.min() > room.floor_y + _LEAST_M and heights.min() < room.ceiling_y + _STOREY_GAP_M)  # fmt: skip
+            return bool(
+                heights.min() > room.floor_y + _LEAST_M
+                and heights.min() < room.ceiling_y + _STOREY_GAP_M
+            )
         return bool(-GAP_M <= heights.min() - room.ceiling_y <= _STOREY_GAP_M)
     if cover.is_ceiling:
         return bool(-GAP_M <= room.floor_y - heights.max() <= _STOREY_GAP_M)

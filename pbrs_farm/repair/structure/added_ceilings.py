@@ -77,11 +77,17 @@ def with_ceilings(house: House) -> House:
         surface, closed[room.id] = found
         made.append(
             Item(
-                id=f"added_ceiling_{room.id}", name=f"Ceiling of {room.name or 'room ' + room.id}",
-                kind=ItemKind.CEILING, level_id=room.level_id, surfaces=(surface,), nyu40=CEILING,
-                source_class="ceiling", room_id=room.id, tags=(ADDED_CEILING,),
+                id=f"added_ceiling_{room.id}",
+                name=f"Ceiling of {room.name or 'room ' + room.id}",
+                kind=ItemKind.CEILING,
+                level_id=room.level_id,
+                surfaces=(surface,),
+                nyu40=CEILING,
+                source_class="ceiling",
+                room_id=room.id,
+                tags=(ADDED_CEILING,),
             )
-        )  # fmt: skip
+        )
         covers.append(cover_of_surfaces(made[-1]))
     if not made:
         return house

@@ -169,9 +169,11 @@ def prism(
     return [
         # Turn the top round: both triangulations look down.
         _patch(bottom_tag, lows, triangles, lows[:, [0, 2]] if uv is None else uv(lows)),
-        _patch(top_tag, highs, triangles[:, [0, 2, 1]], highs[:, [0, 2]] if uv is None else uv(highs)),
+        _patch(
+            top_tag, highs, triangles[:, [0, 2, 1]], highs[:, [0, 2]] if uv is None else uv(highs)
+        ),
         _sides(side_tag, rings, lows, highs),
-    ]  # fmt: skip
+    ]
 
 
 def _with_rings_apart(polygon: shapely.Polygon) -> shapely.Polygon:
@@ -224,8 +226,10 @@ def _sides(tag: Tag, rings: list[F64], lows: F64, highs: F64) -> Patch:
         uvs.append(np.stack([u, quads[-1][:, :, 1]], -1))
         first += len(ring)
     corners = np.concatenate(quads)
-    faces = (np.array([[0, 1, 2], [0, 2, 3]]) + 4 * np.arange(len(corners))[:, None, None])  # fmt: skip
-    return _patch(tag, corners.reshape(-1, 3), faces.reshape(-1, 3), np.concatenate(uvs).reshape(-1, 2))  # fmt: skip
+    faces = np.array([[0, 1, 2], [0, 2, 3]]) + 4 * np.arange(len(corners))[:, None, None]
+    return _patch(
+        tag, corners.reshape(-1, 3), faces.reshape(-1, 3), np.concatenate(uvs).reshape(-1, 2)
+    )
 
 
 def _patch(tag: Tag, positions: F64, faces: I64, uvs: F64) -> Patch:

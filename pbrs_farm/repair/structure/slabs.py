@@ -73,7 +73,9 @@ def _wall_meets_surface(surface: PlanarSurface, wall: Wall) -> bool:
     # Ask whether the wall comes within GAP_M of the surface's plane.
     corners = shapely.get_coordinates(wall.footprint)
     heights = surface.plane.at(corners)
-    return bool((wall.bottom_y - GAP_M <= heights).any() and (heights <= wall.top.at(corners) + GAP_M).any())  # fmt: skip
+    return bool(
+        (wall.bottom_y - GAP_M <= heights).any() and (heights <= wall.top.at(corners) + GAP_M).any()
+    )
 
 
 def visible_areas(

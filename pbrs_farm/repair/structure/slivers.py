@@ -109,7 +109,9 @@ class _Mesh:
     def _split(self, f: int, c: int, a: int, b: int) -> None:
         # Put the position of vertex b into the edge of face f from place c to place a.
         face = self._faces[f]
-        k = next(k for k in range(3) if self._place[face[k]] == c and self._place[face[(k + 1) % 3]] == a)  # fmt: skip
+        k = next(
+            k for k in range(3) if self._place[face[k]] == c and self._place[face[(k + 1) % 3]] == a
+        )
         first, second, third = (face[(k + j) % 3] for j in range(3))
         start, end, at = self._vertices[first], self._vertices[second], self._vertices[b]
         # Interpolate properties there, but keep b's exact position.

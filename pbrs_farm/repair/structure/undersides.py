@@ -69,11 +69,17 @@ def with_undersides(house: House) -> House:
             level_id, room_id = stand.room.level_id, stand.room.id
         made.append(
             Item(
-                id=f"{UNDERSIDE}_{item.id}", name=f"Underside of {item.name or item.id}",
-                kind=ItemKind.CEILING, level_id=level_id, surfaces=under, nyu40=CEILING,
-                source_class="ceiling", room_id=room_id, tags=(UNDERSIDE,),
+                id=f"{UNDERSIDE}_{item.id}",
+                name=f"Underside of {item.name or item.id}",
+                kind=ItemKind.CEILING,
+                level_id=level_id,
+                surfaces=under,
+                nyu40=CEILING,
+                source_class="ceiling",
+                room_id=room_id,
+                tags=(UNDERSIDE,),
             )
-        )  # fmt: skip
+        )
     return house.with_items([*items, *made])
 
 

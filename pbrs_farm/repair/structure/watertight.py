@@ -151,7 +151,9 @@ def _slabs(
     for surface, footprint, own in zip(planar, footprints, visible, strict=True):
         # Keep slabs out of every room but their own.
         for solid in slab(surface, footprint, own, thickness_m, table):
-            found.append(without_volumes(solid, surface.tag("hidden"), surface.item, volumes, table))  # fmt: skip
+            found.append(
+                without_volumes(solid, surface.tag("hidden"), surface.item, volumes, table)
+            )
     return found + bridge_gaps(planar, thickness_m, table)
 
 

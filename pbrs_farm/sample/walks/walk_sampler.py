@@ -52,9 +52,13 @@ def sample_walk(
     eyes = _eyes(space, motion.places, fields, rng)
     turn_rps = math.radians(fields.walk_turn_dps) - shaken.turn_rps
     azimuth, tilt = gaze(
-        Walker(eyes, motion.heading, times), things_of(house), geometry, first_hit,
-        max(turn_rps, 0.02), rng,
-    )  # fmt: skip
+        Walker(eyes, motion.heading, times),
+        things_of(house),
+        geometry,
+        first_hit,
+        max(turn_rps, 0.02),
+        rng,
+    )
     views = _views_of_walk(house, space, fields, _poses(eyes, azimuth, tilt, shaken))
     notes = _notes(house, space, views, motion.length_m)
     return Sampling.of_views(fields, views, notes)

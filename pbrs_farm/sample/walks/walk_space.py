@@ -103,10 +103,15 @@ def _walk_space(
     free = np.isfinite(floor_y) & ~occupied & (has_floor | strips)
     ways = connected_ways(free)
     return WalkSpace(
-        level_id, grid, room, floor_y, clearance_m(free), ways,
+        level_id,
+        grid,
+        room,
+        floor_y,
+        clearance_m(free),
+        ways,
         tuple(DoorWay(_name_of_room(house, door), _joins(grid, ways, door)) for door in doors),
         *_most_interesting(house, level_id, grid, room, ways),
-    )  # fmt: skip
+    )
 
 
 def _things_by_room(

@@ -18,8 +18,13 @@ def curves_svg(panels: Mapping[str, Mapping[str, Points]]) -> str:
     Curves without a point are left out.
     """
     height = _HEIGHT * len(panels)
-    svg = svg_file(viewBox=f"0 0 {_WIDTH} {height}", width=_WIDTH, height=height,
-                   font_family="system-ui, sans-serif", font_size=12)  # fmt: skip
+    svg = svg_file(
+        viewBox=f"0 0 {_WIDTH} {height}",
+        width=_WIDTH,
+        height=height,
+        font_family="system-ui, sans-serif",
+        font_size=12,
+    )
     element(svg, "rect", width=_WIDTH, height=height, fill="#ffffff")
     for k, (title, curves) in enumerate(panels.items()):
         _panel(element(svg, "g", transform=f"translate(0 {k * _HEIGHT})"), title, curves)
@@ -58,10 +63,24 @@ def _axes(svg: Element, last: float, top: float) -> None:
         y, x = _y(value, top), _x(step, last)
         element(svg, "line", x1=_LEFT, x2=_WIDTH - _RIGHT, y1=y, y2=y, stroke=_LINE)
         element(svg, "text", f"{value:g}", x=_LEFT - 8, y=y + 4, fill=_FAINT, text_anchor="end")
-        element(svg, "text", f"{step:,.0f}", x=x, y=_HEIGHT - _BOTTOM + 18, fill=_FAINT,
-                text_anchor="middle")  # fmt: skip
-    element(svg, "text", "steps", x=(_LEFT + _WIDTH - _RIGHT) / 2, y=_HEIGHT - 8, fill=_FAINT,
-            text_anchor="middle")  # fmt: skip
+        element(
+            svg,
+            "text",
+            f"{step:,.0f}",
+            x=x,
+            y=_HEIGHT - _BOTTOM + 18,
+            fill=_FAINT,
+            text_anchor="middle",
+        )
+    element(
+        svg,
+        "text",
+        "steps",
+        x=(_LEFT + _WIDTH - _RIGHT) / 2,
+        y=_HEIGHT - 8,
+        fill=_FAINT,
+        text_anchor="middle",
+    )
 
 
 def _x(step: float, last: float) -> float:

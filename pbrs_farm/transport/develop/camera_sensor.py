@@ -26,14 +26,26 @@ from pbrs_farm.transport.develop.tone_mapping import add_veil, encode_tone
 _ABERRATION_WIDTH_PX: Final = 640.0  # of the picture that aberration_px is of
 _SATURATION_LX_S: Final = 78.0  # times 1 / ISO: exposure that saturates, ISO 12232:2019
 _GREEN_KERNEL: Final = (
-    (0, 0, -1, 0, 0), (0, 0, 2, 0, 0), (-1, 2, 4, 2, -1), (0, 0, 2, 0, 0), (0, 0, -1, 0, 0),
-)  # fmt: skip
+    (0, 0, -1, 0, 0),
+    (0, 0, 2, 0, 0),
+    (-1, 2, 4, 2, -1),
+    (0, 0, 2, 0, 0),
+    (0, 0, -1, 0, 0),
+)
 _ALONG_KERNEL: Final = (
-    (0, 0, 0.5, 0, 0), (0, -1, 0, -1, 0), (-1, 4, 5, 4, -1), (0, -1, 0, -1, 0), (0, 0, 0.5, 0, 0),
-)  # fmt: skip
+    (0, 0, 0.5, 0, 0),
+    (0, -1, 0, -1, 0),
+    (-1, 4, 5, 4, -1),
+    (0, -1, 0, -1, 0),
+    (0, 0, 0.5, 0, 0),
+)
 _OTHER_KERNEL: Final = (
-    (0, 0, -1.5, 0, 0), (0, 2, 0, 2, 0), (-1.5, 0, 6, 0, -1.5), (0, 2, 0, 2, 0), (0, 0, -1.5, 0, 0),
-)  # fmt: skip
+    (0, 0, -1.5, 0, 0),
+    (0, 2, 0, 2, 0),
+    (-1.5, 0, 6, 0, -1.5),
+    (0, 2, 0, 2, 0),
+    (0, 0, -1.5, 0, 0),
+)
 
 
 @dataclass(frozen=True, slots=True)

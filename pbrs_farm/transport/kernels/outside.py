@@ -113,13 +113,18 @@ class Outside:
         if not len(portals):
             return dome
         # Look from random places in the windows in directions spread over each texel.
-        area = np.linalg.norm(np.cross(portals[:, 1] - portals[:, 0], portals[:, 3] - portals[:, 0]), axis=-1)  # fmt: skip
+        area = np.linalg.norm(
+            np.cross(portals[:, 1] - portals[:, 0], portals[:, 3] - portals[:, 0]), axis=-1
+        )
         largest = np.sort(np.argsort(-area, kind="stable")[:_MAX_WINDOWS])
         area, corners = area[largest], portals[largest]
         rng = np.random.default_rng(0)
         n, (rows, columns) = len(corners), _LIGHT_SHAPE
         u = rng.random((n, rows, columns, 4))
-        along, up = corners[:, None, None, 1] - corners[:, None, None, 0], corners[:, None, None, 3] - corners[:, None, None, 0]  # fmt: skip
+        along, up = (
+            corners[:, None, None, 1] - corners[:, None, None, 0],
+            corners[:, None, None, 3] - corners[:, None, None, 0],
+        )
         o = corners[:, None, None, 0] + u[..., :1] * along + u[..., 1:2] * up
         y = np.cos(np.pi * (np.arange(rows)[:, None] + u[..., 2]) / rows)
         phi = 2 * np.pi * (np.arange(columns) + u[..., 3]) / columns
@@ -238,6 +243,13 @@ def sky_harmonics(sky: Sky) -> F64:
 def _harmonics(x: Any, y: Any, z: Any) -> tuple[Any, ...]:
     """The nine values at a direction."""
     return (
-        0.282095 + 0 * x, 0.488603 * y, 0.488603 * z, 0.488603 * x, 1.092548 * x * y, 1.092548 * y * z,
-        0.315392 * (3 * z * z - 1), 1.092548 * x * z, 0.546274 * (x * x - y * y),
-    )  # fmt: skip
+        0.282095 + 0 * x,
+        0.488603 * y,
+        0.488603 * z,
+        0.488603 * x,
+        1.092548 * x * y,
+        1.092548 * y * z,
+        0.315392 * (3 * z * z - 1),
+        1.092548 * x * z,
+        0.546274 * (x * x - y * y),
+    )

@@ -76,14 +76,21 @@ def trace_prefixes(context: ChainContext, n_pixels: int, sets: range, seed: int)
     prefix = _trace_prefix(context, sampler, pixel)
     kd, f0, tau, wi = prefix.kd, prefix.f0, prefix.tau, prefix.wi
     values = (
-        *xyz(prefix.p), dr.select(prefix.is_valid, mi.Float(1), 0),
-        *xyz(prefix.n), prefix.alpha,
-        *xyz(prefix.ng), wi.x,
-        *rgb(kd), wi.y,
-        *rgb(f0), wi.z,
-        *rgb(tau), mi.Float(0),
-        *rgb(prefix.beta), mi.Float(0),
-    )  # fmt: skip
+        *xyz(prefix.p),
+        dr.select(prefix.is_valid, mi.Float(1), 0),
+        *xyz(prefix.n),
+        prefix.alpha,
+        *xyz(prefix.ng),
+        wi.x,
+        *rgb(kd),
+        wi.y,
+        *rgb(f0),
+        wi.z,
+        *rgb(tau),
+        mi.Float(0),
+        *rgb(prefix.beta),
+        mi.Float(0),
+    )
     rows = _prefix_rows(values)
     dr.eval(rows)
     return Prefixes(rows, sets)
@@ -112,9 +119,17 @@ def _trace_prefix(context: ChainContext, sampler: Sampler, pixel: Any) -> _Prefi
     corner, at = sample_pixel(context.film, pixel, u, paths.fields.is_tent)
     path = camera_path(context.camera, corner, at)
     prefix = _Prefix(
-        mi.Point3f(0), mi.Vector3f(0), mi.Vector3f(0), mi.Vector3f(0), mi.Color3f(0),
-        mi.Color3f(0), mi.Color3f(0), mi.Float(0), mi.Color3f(0), mi.Bool(False),
-    )  # fmt: skip
+        mi.Point3f(0),
+        mi.Vector3f(0),
+        mi.Vector3f(0),
+        mi.Vector3f(0),
+        mi.Color3f(0),
+        mi.Color3f(0),
+        mi.Color3f(0),
+        mi.Float(0),
+        mi.Color3f(0),
+        mi.Bool(False),
+    )
     active = mi.Bool(True)
     while active:
         beta, d = mi.Color3f(path.beta), mi.Vector3f(path.d)

@@ -91,14 +91,21 @@ def record_suffix(
     measure = cos / distance2
     pdfs = left.techniques / dr.maximum(result.guided_weight, 1e-30) * measure * passed
     values = (
-        *xyz(si.p), pdfs,
-        *xyz(si.n_interpolated), bsdf.alpha,
-        *xyz(si.ng), d.x,
-        *rgb(bsdf.kd), d.y,
-        *rgb(bsdf.f0), d.z,
-        *rgb(bsdf.tau), direct.d.x,
-        *rgb(direct.incident), direct.d.y,
-    )  # fmt: skip
+        *xyz(si.p),
+        pdfs,
+        *xyz(si.n_interpolated),
+        bsdf.alpha,
+        *xyz(si.ng),
+        d.x,
+        *rgb(bsdf.kd),
+        d.y,
+        *rgb(bsdf.f0),
+        d.z,
+        *rgb(bsdf.tau),
+        direct.d.x,
+        *rgb(direct.incident),
+        direct.d.y,
+    )
     for k, value in enumerate(values):
         suffix.write(value, mi.UInt32(k), active)
     suffix.write(direct.d.z, mi.UInt32(_EMITTER_Z), active)

@@ -94,10 +94,12 @@ def tables_from_house(
     material = geometry.face_material[keep].astype(np.uint32)
     first, lamp_faces, lamp_areas = _lamp_triangles(lamps, np.cumsum(keep) - 1)
     # Tell which materials let a shadow ray pass; in `released` opacity below 1 does, too.
-    transparent = np.array([
-        m.kind is MaterialKind.GLASS or m.alpha_cutout or (released and m.opacity < 1)
-        for m in house.materials
-    ])  # fmt: skip
+    transparent = np.array(
+        [
+            m.kind is MaterialKind.GLASS or m.alpha_cutout or (released and m.opacity < 1)
+            for m in house.materials
+        ]
+    )
     is_open = transparent[material] | rows[material, TAU].any(1)
     symmetries = np.zeros((len(lamps), 4), np.float32)
     for k, (a, b) in enumerate(pairwise(first)):

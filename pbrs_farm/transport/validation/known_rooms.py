@@ -116,9 +116,14 @@ def bulb(centre: Triple, material: int, lumen: float, *, radius: float = 0.05) -
         centre, radius, lumen, PowerUnit.LUMEN, rgb_linear=(1, 0.8, 0.6), emitting=(0,)
     )
     return Item(
-        f"bulb_{centre}", "bulb", ItemKind.LAMP, "0", (sphere(centre, radius, material),),
-        lights=(part,), room_id="0_0",
-    )  # fmt: skip
+        f"bulb_{centre}",
+        "bulb",
+        ItemKind.LAMP,
+        "0",
+        (sphere(centre, radius, material),),
+        lights=(part,),
+        room_id="0_0",
+    )
 
 
 BULB = Material("bulb", kind=MaterialKind.BULB, diffuse=(0.0, 0.0, 0.0))

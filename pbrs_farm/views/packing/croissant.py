@@ -10,6 +10,7 @@ from typing import Any, Final
 
 from pbrs_farm.views.packing.data_card import TITLE, RootFacts
 
+# fmt: off
 _CONTEXT: Final[dict[str, Any]] = {
     "@language": "en", "@vocab": "https://schema.org/", "citeAs": "cr:citeAs",
     "column": "cr:column", "conformsTo": "dct:conformsTo", "cr": "http://mlcommons.org/croissant/",
@@ -25,7 +26,8 @@ _CONTEXT: Final[dict[str, Any]] = {
     "references": "cr:references", "regex": "cr:regex", "repeated": "cr:repeated",
     "replace": "cr:replace", "samplingRate": "cr:samplingRate", "sc": "https://schema.org/", "separator": "cr:separator",
     "source": "cr:source", "subField": "cr:subField", "transform": "cr:transform",
-}  # fmt: skip
+}
+# fmt: on
 _PARQUET: Final = "application/x-parquet"
 
 
@@ -49,12 +51,14 @@ def croissant_json(files: Sequence[Path], columns: Mapping[str, str], facts: Roo
         "distribution": [*map(_file_object, files), *map(_file_set, splits)],
         "recordSet": [
             {
-                "@type": "cr:RecordSet", "@id": split, "name": split,
+                "@type": "cr:RecordSet",
+                "@id": split,
+                "name": split,
                 "field": [_field(split, name, kind) for name, kind in columns.items()],
             }
             for split in splits
         ],
-    }  # fmt: skip
+    }
     return (json.dumps(row, indent=1, ensure_ascii=False) + "\n").encode()
 
 
@@ -62,27 +66,36 @@ def _file_object(file: Path) -> dict[str, Any]:
     with file.open("rb") as data:
         digest = hashlib.file_digest(data, "sha256").hexdigest()
     return {
-        "@type": "cr:FileObject", "@id": file.name, "name": file.name,
-        "contentUrl": f"data/{file.name}", "contentSize": f"{file.stat().st_size} B",
-        "encodingFormat": _PARQUET, "sha256": digest,
-    }  # fmt: skip
+        "@type": "cr:FileObject",
+        "@id": file.name,
+        "name": file.name,
+        "contentUrl": f"data/{file.name}",
+        "contentSize": f"{file.stat().st_size} B",
+        "encodingFormat": _PARQUET,
+        "sha256": digest,
+    }
 
 
 def _file_set(split: str) -> dict[str, Any]:
     name = f"{split}-files"
     return {
-        "@type": "cr:FileSet", "@id": name, "name": name, "encodingFormat": _PARQUET,
+        "@type": "cr:FileSet",
+        "@id": name,
+        "name": name,
+        "encodingFormat": _PARQUET,
         "includes": f"data/{split}-*.parquet",
-    }  # fmt: skip
+    }
 
 
 def _field(split: str, name: str, kind: str) -> dict[str, Any]:
-    source: dict[str, Any] = {
-        "fileSet": {"@id": f"{split}-files"}, "extract": {"column": name},
-    }  # fmt: skip
+    source: dict[str, Any] = {"fileSet": {"@id": f"{split}-files"}, "extract": {"column": name}}
     if kind == "sc:ImageObject":
         source["transform"] = {"jsonPath": "bytes"}
     return {
-        "@type": "cr:Field", "@id": f"{split}/{name}", "name": name, "source": source,
-        "dataType": kind, **({"repeated": True} if kind == "sc:Integer" else {}),
-    }  # fmt: skip
+        "@type": "cr:Field",
+        "@id": f"{split}/{name}",
+        "name": name,
+        "source": source,
+        "dataType": kind,
+        **({"repeated": True} if kind == "sc:Integer" else {}),
+    }

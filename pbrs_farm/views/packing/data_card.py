@@ -71,10 +71,16 @@ def root_facts(views: Views, root: StoredRoot) -> RootFacts:
         for house, source in sources.items()
     ]
     return RootFacts(
-        tuple(homes), root.credits(views.homes), root.recipe, tuple(sorted(sizes)),
-        (min(hfov_deg), max(hfov_deg)) if hfov_deg else (), dict(pixels.most_common()),
-        tuple(sorted(filter(None, origins))), n_warned, len(views.left_out),
-    )  # fmt: skip
+        tuple(homes),
+        root.credits(views.homes),
+        root.recipe,
+        tuple(sorted(sizes)),
+        (min(hfov_deg), max(hfov_deg)) if hfov_deg else (),
+        dict(pixels.most_common()),
+        tuple(sorted(filter(None, origins))),
+        n_warned,
+        len(views.left_out),
+    )
 
 
 def dataset_description(packing: Packing, credits: Sequence[str]) -> dict[str, Any]:

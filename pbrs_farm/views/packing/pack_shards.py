@@ -85,9 +85,13 @@ def _write_shards(
         shards.append(_write_shard(source, plan, packing, out))
         tell(f"{shards[-1].file}: {len(plan.refs)} views, {shards[-1].n_bytes / 1e6:.1f} MB")
     dataset = Dataset(
-        packing.size, packing.modes if "colour" in packing.layers else (), packing.layers,
-        tuple(shards), packing.shares, NYU40_NAMES,
-    )  # fmt: skip
+        packing.size,
+        packing.modes if "colour" in packing.layers else (),
+        packing.layers,
+        tuple(shards),
+        packing.shares,
+        NYU40_NAMES,
+    )
     facts = root_facts(views, source)
     (out / DATASET_JSON).write_bytes(
         dataset_json(dataset, dataset_description(packing, facts.credits))

@@ -109,12 +109,18 @@ def _parse_levels(elements: list[Attributes]) -> tuple[PlanLevel, ...]:
     for index, (elevation, _, k) in enumerate(sorted(found)):
         a = elements[k]
         thickness = a.length("floorThickness", 0.12)
-        levels.append(PlanLevel(
-            id=a.text("id"), name=a.text("name"), elevation=elevation, floor_thickness=thickness,
-            height=a.length("height", FALLBACK_HEIGHT_M),
-            is_visible=a.flag("visible", True) and a.flag("viewable", True),
-            index=index, reach_down=thickness if elevation > lowest else 0.0,
-        ))  # fmt: skip
+        levels.append(
+            PlanLevel(
+                id=a.text("id"),
+                name=a.text("name"),
+                elevation=elevation,
+                floor_thickness=thickness,
+                height=a.length("height", FALLBACK_HEIGHT_M),
+                is_visible=a.flag("visible", True) and a.flag("viewable", True),
+                index=index,
+                reach_down=thickness if elevation > lowest else 0.0,
+            )
+        )
     return tuple(levels)
 
 
