@@ -151,7 +151,8 @@ def _with_room_lighting(work: Repairing) -> Repairing:
 
 def _with_enclosure(work: Repairing) -> Repairing:
     """Each room closed or open, by the verdict of the space that it belongs to."""
-    spaces, verdicts = work.structure.spaces, {}
+    spaces = work.structure.spaces
+    verdicts: dict[str, dict[str, Any]] = {}
     for space in spaces:
         for room_id in space.rooms:
             is_open = not space.is_closed
