@@ -1,17 +1,20 @@
-"""Photographs with depth as training has them: cut to a plan's form, the truth of their depth; no effects."""
+"""Photographs with depth at the size of a plan, with the truth from their depth."""
 
 from __future__ import annotations
 
-from typing import Final
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import F32, F64
-from pbrs_farm.core.resampling import resized_by_area
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.resampling import resized_any, resized_by_area, resized_nearest
 from pbrs_farm.curate.photographs import Photo
 from pbrs_farm.study.plane_normals import normals_of_depth
 from pbrs_farm.study.tasks.study_task import Arrays
+from pbrs_farm.study.training.training_views import CAMERA, ViewArrays, camera_numbers
 from pbrs_farm.study.training_plan import TrainingPlan
 
 PLANE_TRUTH: Final = (
@@ -26,11 +29,48 @@ PHOTO_TRUTHS: Final = {
 }
 
 
-def photo_truth(photo: Photo, K: F64, plan: TrainingPlan) -> Arrays:
-    """What a photograph's depth says, at its own size, in the form of the task's targets.
+@dataclass(frozen=True, slots=True, eq=False)
+class RealFrame:
+    """A photograph cropped to the aspect ratio of a plan."""
 
-    Depth stands beside normals, which are judged by it.
+    id: str
+    colour: NDArray[np.uint8]  # (h, w, 3) at the plan's size
+    truth: Arrays  # (H, W, ...) targets of the same crop at the photograph's size
+    K: F64  # (3, 3) pixels at the plan's size
+    digest: str = ""  # of the picture's file; training pictures are refused as test pictures
+
+
+def cropped_frame(
+    id: str, rgb: NDArray[np.uint8], truth: Arrays, K: F64, plan: TrainingPlan, digest: str = ""
+) -> RealFrame:
+    """The frame of a photograph, its truth and its K (3, 3), all of the whole picture."""
+    size = plan.width_px, plan.height_px
+    colour, rows, columns = crop_to_size(rgb, size)
+    crops = {key: array[rows, columns] for key, array in truth.items()}
+    return RealFrame(id, colour, crops, camera_of_crop(K, rows, columns, size), digest)
+
+
+def arrays_of_frames(frames: Iterable[RealFrame], plan: TrainingPlan) -> ViewArrays:
+    """Training arrays of frames: colour and truth at the plan's size.
+
+    Labels take the nearest pixel, lines stay connected. Depth beside normals serves scoring only
+    and is left out.
     """
+    ids, rows = [], []
+    for frame in frames:
+        ids.append(frame.id)
+        row: dict[str, NDArray[Any]] = {"colour": frame.colour}
+        for name, array in frame.truth.items():
+            if name != "depth" or plan.task == "depth":
+                resized = resized_any if name == "edges" else resized_nearest
+                row[name] = resized(array, plan.width_px, plan.height_px)
+        rows.append(row | ({CAMERA: camera_numbers(frame.K)} if plan.rays else {}))
+    arrays = {name: np.stack([row[name] for row in rows]) for name in rows[0]}
+    return ViewArrays(tuple(ids), arrays.pop("colour"), arrays)
+
+
+def photo_truth(photo: Photo, K: F64, plan: TrainingPlan) -> Arrays:
+    """Targets from a photograph's depth at its own size: normals with depth for scoring, or depth."""
     depth_m = photo.depth_mm / np.float64(1000)
     depth = {"depth": depth_m.astype(np.float32)}
     if plan.task == "depth":
@@ -39,26 +79,30 @@ def photo_truth(photo: Photo, K: F64, plan: TrainingPlan) -> Arrays:
     return {"normal": np.rint(normal * 32767).astype(np.int16), "valid": valid, **depth}
 
 
-def crop_to_plan(
-    rgb: NDArray[np.uint8], plan: TrainingPlan
+def crop_to_size(
+    rgb: NDArray[np.uint8], size: tuple[int, int]
 ) -> tuple[NDArray[np.uint8], slice, slice]:
-    """The middle of a photograph in the plan's form, at the plan's size; the rows and columns taken."""
-    rows, columns = middle_of_form(rgb.shape[0], rgb.shape[1], plan.width_px, plan.height_px)
-    return resized_by_area(rgb[rows, columns], plan.width_px, plan.height_px), rows, columns
+    """The middle of a picture at a size (width, height), and the rows and columns of the crop."""
+    rows, columns = middle_of_form(rgb.shape[0], rgb.shape[1], *size)
+    return resized_by_area(rgb[rows, columns], *size), rows, columns
 
 
-def camera_of_crop(K: F64, rows: slice, columns: slice, plan: TrainingPlan) -> F32:
-    """(4,) fx, fy, cx, cy at the plan's size of what crop_to_plan took of a photograph of camera K (3, 3)."""
-    x = plan.width_px / (columns.stop - columns.start)
-    y = plan.height_px / (rows.stop - rows.start)
-    cx, cy = K[0, 2] - columns.start, K[1, 2] - rows.start
-    return np.array([K[0, 0] * x, K[1, 1] * y, cx * x, cy * y], np.float32)
+def camera_of_crop(K: F64, rows: slice, columns: slice, size: tuple[int, int]) -> F64:
+    """(3, 3) K of the crop of a picture with K (3, 3), resized to (width, height)."""
+    x = size[0] / (columns.stop - columns.start)
+    y = size[1] / (rows.stop - rows.start)
+    return np.diag([x, y, 1.0]) @ moved_origin(K, rows, columns)
+
+
+def moved_origin(K: F64, rows: slice, columns: slice) -> F64:
+    """(3, 3) K of a crop at the size of the picture."""
+    return K - np.array([[0, 0, columns.start], [0, 0, rows.start], [0, 0, 0]], np.float64)
 
 
 def middle_of_form(
     height: int, width: int, form_width: int, form_height: int
 ) -> tuple[slice, slice]:
-    """Rows and columns of the largest part in the middle that is as wide to high as the form."""
+    """Rows and columns of the largest centred crop with an aspect ratio."""
     share = form_width / form_height
     new_width = min(width, round(height * share))
     new_height = min(height, round(width / share))

@@ -65,7 +65,7 @@ def test_its_train_split_trains_and_its_test_split_is_held_out(task: str, mat: P
     assert views.ids == ("NYUv2/0002",)
     assert held_out is not None
     assert held_out.ids == ("NYUv2/0001", "NYUv2/0003")
-    target = held_out.target(0)
+    target = held_out.all_targets()[0]
     if task == "normals":
         assert target["normal"].shape == (32, 40, 3)
         assert (target["normal"][16, 20] == [0, 0, -32767]).all()

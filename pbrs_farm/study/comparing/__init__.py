@@ -1,1 +1,1 @@
-"""Our views beside photographs: what differs, and in which views most."""
+"""Comparison of rendered views with photographs."""

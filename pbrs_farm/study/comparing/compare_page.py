@@ -1,4 +1,4 @@
-"""A comparison as a folder: compare.json, and a page of histograms and the most unlike views. Effects: files."""
+"""A comparison as a folder: compare.json, and a page of histograms and unlike views. Effects: files."""
 
 from __future__ import annotations
 
@@ -7,25 +7,24 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
-import numpy as np
 from markupsafe import Markup
 
-from pbrs_farm.core.arrays import F64, Srgb8Image
+from pbrs_farm.core.arrays import Srgb8Image
 from pbrs_farm.core.shown_text import MAX_PLACE, shown
 from pbrs_farm.curate.charts import mirrored
 from pbrs_farm.gallery.gallery_page import data_url, small_jpeg
 from pbrs_farm.gallery.html_page import page
-from pbrs_farm.study.comparing.comparison import Comparison, Unlike
+from pbrs_farm.study.comparing.comparison import Comparison, Unlike, mean_histogram
 from pbrs_farm.study.comparing.picture_facts import PictureFacts, bands_of_height
 from pbrs_farm.study.training.run_folder import make_folder
 
-_MOST_BYTES: Final = 14_000  # of a picture in the page
+_MOST_BYTES: Final = 14_000  # maximum size of a picture on the page
 _MOST_CLASSES: Final = 12
-_MOST_LINES: Final = 20  # of pictures that were left out
+_MOST_LINES: Final = 20  # maximum number of unreadable pictures on the page
 
 
 def write_comparison(out: Path, comparison: Comparison) -> Path:
-    """Write compare.json and index.html; the page's path. Raises BadInput where they cannot be written."""
+    """Write compare.json and index.html; the page's path. Raises BadInput if out is not writable."""
     make_folder(out)
     text = json.dumps(comparison.report, indent=1)
     (out / "compare.json").write_text(text + "\n", "utf-8")
@@ -35,7 +34,7 @@ def write_comparison(out: Path, comparison: Comparison) -> Path:
 
 
 def comparison_page(comparison: Comparison) -> str:
-    """HTML without scripts; every picture is inside it."""
+    """HTML without scripts, pictures included."""
     ours, photographs = comparison.ours, comparison.photographs
     left_out = [*ours.left_out, *photographs.left_out]
     return page(
@@ -44,7 +43,7 @@ def comparison_page(comparison: Comparison) -> str:
         report=comparison.report,
         charts=_charts(ours.pictures, photographs.pictures),
         classes=comparison.report["classes"][:_MOST_CLASSES],
-        cards=[_card(one) for one in comparison.unlike],
+        cards=[_card(unlike) for unlike in comparison.unlike],
         left_out=[shown(line, 3 * MAX_PLACE) for line in left_out[:_MOST_LINES]],
         n_left_out=len(left_out),
         credits=[*ours.credits, *photographs.credits],
@@ -52,33 +51,28 @@ def comparison_page(comparison: Comparison) -> str:
 
 
 def _charts(a: Sequence[PictureFacts], b: Sequence[PictureFacts]) -> list[tuple[str, Markup]]:
-    """(title, chart) of what can be drawn as bars, where both sets have it."""
-    drawn = []
+    """(title, chart) of the histograms that both sets have."""
+    charts = []
     for name, title in (
         ("luma", "Luma, from dark to bright"),
         ("depth", "Depth, 0 to 10 m"),
         ("normals", "Surfaces, from those that face down to those that face up"),
     ):
-        ours, photographs = _mean(a, name), _mean(b, name)
+        ours, photographs = mean_histogram(a, name), mean_histogram(b, name)
         if ours is not None and photographs is not None:
             if name == "normals":
                 ours, photographs = bands_of_height(ours), bands_of_height(photographs)
-            drawn.append((title, mirrored(ours, photographs, title)))
-    return drawn
+            charts.append((title, mirrored(ours, photographs, title)))
+    return charts
 
 
-def _mean(pictures: Sequence[PictureFacts], name: str) -> F64 | None:
-    found = [one.histograms[name] for one in pictures if name in one.histograms]
-    return np.asarray(np.mean(found, axis=0)) if found else None
-
-
-def _card(one: Unlike) -> dict[str, Any]:
+def _card(unlike: Unlike) -> dict[str, Any]:
     return {
-        "view": shown(one.view.id, MAX_PLACE),
-        "photograph": shown(one.photograph.id, MAX_PLACE),
-        "times": f"{one.times:.1f}",
-        "reasons": one.reasons,
-        "pictures": [_url(one.view.colour), _url(one.photograph.colour)],
+        "view": shown(unlike.view.id, MAX_PLACE),
+        "photograph": shown(unlike.photograph.id, MAX_PLACE),
+        "times": f"{unlike.times:.1f}",
+        "reasons": unlike.reasons,
+        "pictures": [_url(unlike.view.colour), _url(unlike.photograph.colour)],
     }
 
 

@@ -1,9 +1,8 @@
-"""How far two sets of pictures are from each other, with intervals; no effects.
+"""Distances between two sets of pictures, with bootstrap intervals.
 
-Pictures of one home are alike, and so are those of one room: groups are drawn anew for an interval,
-not pictures, and two pictures of one group are never a pair. A resample repeats groups, so that its
-histograms are rougher than the sets': the interval is that of the resamples, moved so that their mean
-is the figure.
+Pictures of one home are alike, so the bootstrap resamples groups, not pictures, and two pictures of
+one group never form a pair. Resamples repeat groups, which makes their histograms rougher: the
+interval is shifted so that the mean of the resamples is the figure.
 """
 
 from __future__ import annotations
@@ -18,16 +17,16 @@ from numpy.typing import NDArray
 from pbrs_farm.core.arrays import F64, I64
 from pbrs_farm.selection.similarity import intersection
 
-_Figure = Callable[[F64, F64], F64]  # (draws,) of how often each group of two sets is taken
+_Figure = Callable[[F64, F64], F64]  # counts of each group in two sets -> (draws,) figures
 _DRAWS: Final = 1_000
 _LEVEL: Final = 0.9
 LEAST_GROUPS: Final = 3
-KERNEL_SCALE: Final = 1_000  # kernel distances are told in thousandths
+KERNEL_SCALE: Final = 1_000  # unit of kernel distances: thousandths
 
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
-    """A figure and the interval that 90 % of resamples lie in."""
+    """A figure and its 90 % interval."""
 
     value: float
     low: float
@@ -36,7 +35,7 @@ class Estimate:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Grouped:
-    """Rows of numbers, a picture each, and which pictures belong together."""
+    """A row of numbers per picture, and the group of each picture."""
 
     rows: F64  # (n, k)
     groups: tuple[str, ...]  # (n,) names
@@ -47,21 +46,20 @@ class Grouped:
         return tuple(dict.fromkeys(self.groups))
 
     def members(self) -> F64:
-        """(n, groups) 1 where a picture is of a group."""
+        """(n, groups) 1 for the group of each picture, else 0."""
         return np.asarray(np.array(self.groups)[:, None] == np.array(self.names)[None], np.float64)
 
 
 def groups_to_draw(groups: Sequence[str], ids: Sequence[str]) -> tuple[str, ...]:
-    """The group of each picture; each picture its own where there are fewer than three."""
+    """The group of each picture, or its id if there are fewer than three groups."""
     return tuple(groups if len(set(groups)) >= LEAST_GROUPS else ids)
 
 
 def kernel_distance(a: Grouped, b: Grouped) -> Estimate:
-    """Kernel distance of features (Binkowski et al. 2018), in thousandths: 0 where nothing tells the sets apart.
+    """Kernel distance of features (Binkowski et al. 2018), in thousandths; 0 for equal distributions.
 
-    The squared maximum mean discrepancy for the kernel (x y / k + 1)^3, estimated without bias,
-    so that small sets are not farther than large ones; it may be a little below 0. Groups of one
-    name are one group, in whichever set they are.
+    The unbiased estimate of the squared maximum mean discrepancy for the kernel (x y / k + 1)^3; it
+    may be slightly negative. Groups of one name are one group, also across the sets.
 
         >>> rows = np.random.default_rng(0).normal(size=(40, 8))
         >>> names = tuple(map(str, range(40)))
@@ -74,7 +72,7 @@ def kernel_distance(a: Grouped, b: Grouped) -> Estimate:
     parts = [_Pairs.of(a, a, np.eye(len(a.names), dtype=bool)), _Pairs.of(b, b, np.eye(len(b.names), dtype=bool)), _Pairs.of(a, b, same)]  # fmt: skip
 
     def distance(u: F64, v: F64) -> F64:
-        """(draws,) of how often each group is taken (draws, groups)."""
+        """(draws,) distances for counts of each group (draws, groups)."""
         within_a, within_b, across = parts
         return KERNEL_SCALE * (within_a.mean(u, u) + within_b.mean(v, v) - 2 * across.mean(u, v))
 
@@ -83,7 +81,7 @@ def kernel_distance(a: Grouped, b: Grouped) -> Estimate:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Pairs:
-    """The kernel of two sets' pictures, and how many pairs, of each two groups; 0 for one and the same."""
+    """Sum of the kernel and number of pairs for every two groups; 0 for a group with itself."""
 
     sums: F64  # (groups of a, groups of b)
     counts: F64
@@ -96,14 +94,14 @@ class _Pairs:
         return cls(np.where(same, 0, in_a.T @ kernel @ in_b), np.where(same, 0, counts))
 
     def mean(self, u: F64, v: F64) -> F64:
-        """(draws,) over the pairs of groups taken so often; NaN where there is no pair."""
+        """(draws,) means over the pairs for counts of each group; NaN without a pair."""
         n = ((u @ self.counts) * v).sum(-1)
         total = ((u @ self.sums) * v).sum(-1)
         return np.where(n > 0, total / np.maximum(n, 1), np.nan)
 
 
 def shared_histogram(a: Grouped, b: Grouped) -> Estimate:
-    """Histogram intersection of the sets' mean histograms: 1 = equal, 0 = nothing shared."""
+    """Histogram intersection of the sets' mean histograms: 1 = equal, 0 = disjoint."""
     sums_a, sums_b = (_by_group(each) for each in (a, b))
 
     def shared(u: F64, v: F64) -> F64:
@@ -113,27 +111,27 @@ def shared_histogram(a: Grouped, b: Grouped) -> Estimate:
             mean_b / np.maximum(mean_b.sum(-1, keepdims=True), 1e-12),
         )
 
-    found = _estimate(shared, len(sums_a), len(sums_b))
-    return Estimate(found.value, max(found.low, 0.0), min(found.high, 1.0))
+    estimate = _estimate(shared, len(sums_a), len(sums_b))
+    return Estimate(estimate.value, max(estimate.low, 0.0), min(estimate.high, 1.0))
 
 
 def shared_of_halves(a: Grouped, draws: int = 100) -> float | None:
-    """What two halves of one set share, on average: as much as another set can. None below four groups."""
+    """Mean intersection of two random halves of one set, an upper limit; None below four groups."""
     sums = _by_group(a)
     if len(sums) < 4:
         return None
-    dice, found = np.random.default_rng(0), []
+    dice, overlaps = np.random.default_rng(0), []
     for _ in range(draws):
         order = dice.permutation(len(sums))
         halves = [sums[part].sum(0) for part in np.array_split(order, 2)]
-        found.append(float(intersection(*(half / max(half.sum(), 1e-12) for half in halves))))
-    return float(np.mean(found))
+        overlaps.append(float(intersection(*(half / max(half.sum(), 1e-12) for half in halves))))
+    return float(np.mean(overlaps))
 
 
 def nearest_of(a: F64, b: F64, *, leave_out_self: bool = False) -> tuple[F64, I64]:
-    """(n,) distance of each row of a to its nearest of b, and (n,) which that is.
+    """(n,) distance of each row of a to the nearest row of b, and (n,) the index of that row.
 
-    leave_out_self: b is a, and no row is its own nearest.
+    leave_out_self: b is a, and a row is not its own neighbour.
     """
     squares = (a**2).sum(1)[:, None] + (b**2).sum(1)[None] - 2 * a @ b.T
     if leave_out_self:

@@ -1,7 +1,7 @@
-"""The paper's comparison: one network trained on several sets of views, judged on the same ones. Effects: files.
+"""The paper's comparison: one network trained on several sets, tested on the same views. Effects: files.
 
-Each set is trained with each seed; every set has the same number of views and steps, so that a row
-differs from another by its pictures alone.
+Each set is trained with each seed and the same number of views and steps, so that rows differ in
+their pictures only.
 """
 
 from __future__ import annotations
@@ -13,7 +13,13 @@ from typing import Any
 
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.study.judging.evaluation import JudgedViews, evaluate, open_run
-from pbrs_farm.study.judging.figure_text import is_underfit, markdown, spread_text, title_of
+from pbrs_farm.study.judging.figure_text import (
+    is_underfit,
+    markdown,
+    shown_figure,
+    spread_text,
+    title_of,
+)
 from pbrs_farm.study.judging.paper_figures import paper_row
 from pbrs_farm.study.tasks.tasks import task_of
 from pbrs_farm.study.training.training_job import Job, train
@@ -40,7 +46,7 @@ class TrainingSet:
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """What is compared. out: a folder for all runs, each gone on with where it was killed."""
+    """The sets and the plan of a comparison. out: folder of all runs; killed runs resume."""
 
     sets: tuple[TrainingSet, ...]
     plan: TrainingPlan
@@ -53,24 +59,23 @@ class Comparison:
 def compare(
     comparison: Comparison, judged_on: Sequence[JudgedViews], tell: Tell = lambda _line: None
 ) -> dict[str, Any]:
-    """Train every set with every seed and judge each on everything; the figures by set and seed.
+    """Train every set with every seed and test each run on all views; figures by set and seed.
 
-    With equal views every set is cut to the size of the smallest. Every set has the same plan and
-    the same seeds, so a difference comes from the views. tell hears a line a set.
+    With equal_views every set is reduced to the size of the smallest. tell gets a line per set.
     """
     plan, rows = comparison.plan, {}
-    loaded = [training_views(each.source, plan) for each in comparison.sets]
+    loaded = [training_views(row.source, plan) for row in comparison.sets]
     if comparison.equal_views:
         fewest = min(len(views) for views in loaded)
         loaded = [views.some(fewest) for views in loaded]
-    for each, views in zip(comparison.sets, loaded, strict=True):
-        held_out = held_out_views(each.source, plan)
+    for row, views in zip(comparison.sets, loaded, strict=True):
+        held_out = held_out_views(row.source, plan)
         runs = [
-            _one(comparison, each, views, held_out, judged_on, seed)
+            _trained_row(comparison, row, views, held_out, judged_on, seed)
             for seed in range(comparison.n_seeds)
         ]
-        rows[each.name] = {"mode": each.source.modes[0], "views": len(views), "seeds": runs}
-        tell(f"{each.name}: {_line(rows[each.name], plan)}")
+        rows[row.name] = {"mode": row.source.modes[0], "views": len(views), "seeds": runs}
+        tell(f"{row.name}: {_line(rows[row.name], plan)}")
     return {
         "task": plan.task,
         "plan": plan.name,
@@ -83,22 +88,21 @@ def compare(
     }
 
 
-def _one(
-    comparison: Comparison, each: TrainingSet, views: TrainingViews, held_out: ViewArrays | None,
+def _trained_row(
+    comparison: Comparison, row: TrainingSet, views: TrainingViews, held_out: ViewArrays | None,
     judged_on: Sequence[JudgedViews], seed: int,
 ) -> dict[str, Any]:  # fmt: skip
-    out = comparison.out / each.name / f"seed{seed}"
-    source = each.source
-    job = Job(comparison.plan, out, seed, source.modes[0], source.name)
+    """Figures of one seed of a set on its own views and on the test views."""
+    out = comparison.out / row.name / f"seed{seed}"
+    job = Job(comparison.plan, out, seed, row.source.modes[0], row.source.name)
     figures = train(job, views, held_out)
     run = open_run(out, exact=comparison.exact)
-    others = {on.name: evaluate(run, on) for on in judged_on}
-    return {
-        **figures,
+    columns = {on.name: evaluate(run, on).rows for on in judged_on}
+    return figures | {
         "on": {
-            name: {row: judged.figures for row, judged in one.rows.items()}
-            for name, one in others.items()
-        },
+            name: {column: judged.figures for column, judged in judged_rows.items()}
+            for name, judged_rows in columns.items()
+        }
     }
 
 
@@ -114,12 +118,12 @@ def _line(row: dict[str, Any], plan: TrainingPlan) -> str:
 
 
 def ablation_table(result: dict[str, Any]) -> str:
-    """Rows by set: views, training and own held-out homes, then each set judged on, and the paper."""
+    """Rows by set: views, training and held-out homes, each test set, and the paper."""
     task = task_of(result["task"])
     figure = task.figures[0]
-    others = list(result["judged_on"])
+    places = list(result["judged_on"])
     head = ["trained on", "views", "training homes", "held-out homes, own light"]
-    head += [f"{name} ({result['judged_on'][name]['n_views']})" for name in others]
+    head += [f"{name} ({result['judged_on'][name]['n_views']})" for name in places]
     rows, underfit = [], []
     for name, row in result["rows"].items():
         runs = row["seeds"]
@@ -127,23 +131,21 @@ def ablation_table(result: dict[str, Any]) -> str:
             _figure_cell(figure, [run["network"].get(part) for run in runs])
             for part in ("train", "held_out")
         ]
-        cells += [
-            _figure_cell(figure, [run["on"][other]["network"] for run in runs]) for other in others
-        ]
+        cells += [_figure_cell(figure, [run["on"][on]["network"] for run in runs]) for on in places]
         paper = paper_row(task.name, row["mode"], result["n_classes"])
-        known = paper.figures[0] if paper and not paper.tuned else float("nan")
-        rows.append([name, str(row["views"]), *cells, spread_text(figure, [known])])
+        published = paper.figures[0] if paper and not paper.tuned else None
+        rows.append([name, str(row["views"]), *cells, shown_figure(figure, published)])
         if any(_is_underfit(task.name, run) for run in runs):
             underfit.append(name)
-    rows.append(_baseline_row(result, figure, others))
+    rows.append(_baseline_row(result, figure, places))
     text = markdown([*head, "paper, NYUv2"], rows)
-    n = _n_seeds(result)
+    n = len(next(iter(result["rows"].values()))["seeds"])
     spread = f"± is the standard deviation of {n} seeds" if n > 1 else _ONE_SEED
-    said = [f"{title_of(figure)}; {spread}."]
+    notes = [f"{title_of(figure)}; {spread}."]
     if underfit:
-        said.append(f"underfit, rank nothing by it: {', '.join(underfit)}.")
-    said += [f"Truth of {name}: {on['truth']}." for name, on in result["judged_on"].items()]
-    return text + "\n\n" + "\n".join(said) + "\n"
+        notes.append(f"underfit, rank nothing by it: {', '.join(underfit)}.")
+    notes += [f"Truth of {name}: {on['truth']}." for name, on in result["judged_on"].items()]
+    return text + "\n\n" + "\n".join(notes) + "\n"
 
 
 def _figure_cell(figure: str, figures: Sequence[dict[str, float] | None]) -> str:
@@ -151,18 +153,14 @@ def _figure_cell(figure: str, figures: Sequence[dict[str, float] | None]) -> str
     return spread_text(figure, values) if values else "-"
 
 
-def _baseline_row(result: dict[str, Any], figure: str, others: Sequence[str]) -> list[str]:
-    """The baseline of the first set: what is known without a picture."""
+def _baseline_row(result: dict[str, Any], figure: str, places: Sequence[str]) -> list[str]:
+    """The baseline of the first set."""
     row = next(iter(result["rows"].values()))
     run = row["seeds"][0]
     name = run["baseline_name"]
     parts = [_figure_cell(figure, [run["baseline"].get(part)]) for part in ("train", "held_out")]
-    parts += [_figure_cell(figure, [run["on"][other][name]]) for other in others]
+    parts += [_figure_cell(figure, [run["on"][on][name]]) for on in places]
     return [f"baseline: {name}", "-", *parts, "-"]
-
-
-def _n_seeds(result: dict[str, Any]) -> int:
-    return len(next(iter(result["rows"].values()))["seeds"])
 
 
 def _is_underfit(task_name: str, run: dict[str, Any]) -> bool:
@@ -171,11 +169,11 @@ def _is_underfit(task_name: str, run: dict[str, Any]) -> bool:
 
 
 def hold_out_notes(sets: Sequence[TrainingSet]) -> list[str]:
-    """What is said of homes to hold out that some rows lack; BadInput for one that all rows lack."""
-    missing = {each.name: missing_of(each.source) for each in sets}
+    """Notes on held-out homes that some rows lack; BadInput for a home that all rows lack."""
+    missing = {row.name: missing_of(row.source) for row in sets}
     everywhere = set.intersection(*(set(names) for names in missing.values()))
     if everywhere:
-        places = ", ".join(dict.fromkeys(each.source.name for each in sets))
+        places = ", ".join(dict.fromkeys(row.source.name for row in sets))
         raise BadInput("--hold-out", min(everywhere), f"no such home in {places}")
     return [
         f"{row} has no home {', '.join(names)} to hold out"
@@ -187,9 +185,9 @@ def hold_out_notes(sets: Sequence[TrainingSet]) -> list[str]:
 def training_sets(
     words: Sequence[str], modes: Sequence[str], source: TrainingSource
 ) -> tuple[TrainingSet, ...]:
-    """Rows of `[NAME=]ROOT[+ROOT][@MODE]`, one for each mode where none is named.
+    """Rows of `[NAME=]ROOT[+ROOT][@MODE]`, one for each mode unless it has one.
 
-    source: what all rows have in common. Raises BadInput for two rows of one name.
+    source: common fields of all rows. Raises BadInput for two rows of one name.
     """
     sets: dict[str, TrainingSet] = {}
     for word in words:
@@ -199,10 +197,10 @@ def training_sets(
         if places.endswith(".mat"):
             hint = "`train TASK nyu.mat --init RUN` tunes a run on it"
             raise BadInput("ablation", word, "photographs have none of the four lights", hint=hint)
-        for one in (mode,) if mode else tuple(modes):
-            name = "_".join(part for part in (label, "" if mode and label else one) if part)
+        for light in (mode,) if mode else tuple(modes):
+            name = "_".join(part for part in (label, "" if mode and label else light) if part)
             if name in sets:
                 raise BadInput("ablation", word, f"a second row called {name}", hint="NAME=ROOT")
-            each = replace(source, places=tuple(places.split("+")), modes=(one,))
-            sets[name] = TrainingSet(name, each)
+            row_source = replace(source, places=tuple(places.split("+")), modes=(light,))
+            sets[name] = TrainingSet(name, row_source)
     return tuple(sets.values())

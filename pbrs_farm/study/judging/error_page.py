@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import json
 import math
 from pathlib import Path
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core.resampling import resized_by_area, resized_nearest
 from pbrs_farm.core.shown_text import MAX_PLACE, shown
+from pbrs_farm.gallery.gallery_page import data_url
 from pbrs_farm.study.judging.evaluation import (
     Evaluation,
     Trained,
@@ -22,30 +22,29 @@ from pbrs_farm.study.judging.evaluation import (
     report,
 )
 from pbrs_farm.study.judging.figure_text import shown_figure, title_of
-from pbrs_farm.study.tasks.study_task import Arrays, StudyTask
+from pbrs_farm.study.tasks.study_task import WITHOUT_TRUTH, Arrays, StudyTask, grey_picture
 from pbrs_farm.study.training.run_folder import make_folder
 from pbrs_farm.views.png_rows import png_of_rows
 
-N_SHOWN: Final = 8  # of the worst views, and of the best
+N_SHOWN: Final = 8  # number of worst views on the page, and of best ones
 
 
 def write_evaluation(out: Path, run: Trained, evaluations: list[Evaluation]) -> Path:
-    """Write the folder; the page's path. Raises BadInput where it cannot be written to.
+    """Write table.md, evaluation.json and index.html; the page's path.
 
-    table.md, evaluation.json and index.html; files of an earlier evaluation are replaced.
+    Raises BadInput if the folder is not writable.
     """
     make_folder(out)
+    rows = json.dumps(report(run, evaluations), indent=1)
     (out / "table.md").write_text(evaluation_text(run, evaluations) + "\n", "utf-8")
-    (out / "evaluation.json").write_text(
-        json.dumps(report(run, evaluations), indent=1) + "\n", "utf-8"
-    )
+    (out / "evaluation.json").write_text(rows + "\n", "utf-8")
     page = out / "index.html"
     page.write_text(error_page(run, evaluations), "utf-8")
     return page
 
 
 def error_page(run: Trained, evaluations: list[Evaluation]) -> str:
-    """HTML without scripts; every picture is inside it."""
+    """HTML without scripts, pictures included."""
     from pbrs_farm.gallery.html_page import page
 
     return page(
@@ -54,22 +53,22 @@ def error_page(run: Trained, evaluations: list[Evaluation]) -> str:
         run=run.record,
         figure=title_of(run.task.figures[0]),
         notes=notes(run, evaluations),
-        sets=[_set(run, one) for one in evaluations],
+        sets=[_set(run, evaluation) for evaluation in evaluations],
     )
 
 
 def _set(run: Trained, evaluation: Evaluation) -> dict[str, Any]:
-    """One set judged on: its figures, and its worst and best views."""
-    judged, task = evaluation.rows["network"], run.task
-    known = [k for k, error in enumerate(judged.errors) if math.isfinite(error)]
-    order = sorted(known, key=lambda k: judged.errors[k])
+    """Figures, worst and best views of one test set."""
+    errors, task, views = evaluation.rows["network"].errors, run.task, evaluation.views
+    order = sorted((k for k, e in enumerate(errors) if math.isfinite(e)), key=lambda k: errors[k])
     n = min(N_SHOWN, (len(order) + 1) // 2)
-    chosen = {"worst": order[::-1][:n], "best": order[: min(n, len(order) - n)]}
-    wanted = {k for rows in chosen.values() for k in rows}
-    # Predict again, and keep the views that are shown.
-    views = evaluation.views
-    kept = {k: p for k, p in enumerate(predictions_of(run, views)) if k in wanted}
-    cards = {k: _card(task, evaluation, k, prediction) for k, prediction in kept.items()}
+    worst, best = order[::-1][:n], order[: min(n, len(order) - n)]
+    # Predict again rather than keep all predictions in memory.
+    cards = {
+        k: _card(task, evaluation, k, prediction)
+        for k, prediction in enumerate(predictions_of(run, views))
+        if k in worst or k in best
+    }
     rows = [
         (name, [shown_figure(f, judged.figures[f]) for f in task.figures])
         for name, judged in evaluation.rows.items()
@@ -80,8 +79,8 @@ def _set(run: Trained, evaluation: Evaluation) -> dict[str, Any]:
         "credits": list(dict.fromkeys(views.credits)),
         "titles": [title_of(figure) for figure in task.figures],
         "rows": rows,
-        "worst": [cards[k] for k in chosen["worst"]],
-        "best": [cards[k] for k in chosen["best"]],
+        "worst": [cards[k] for k in worst],
+        "best": [cards[k] for k in best],
     }
 
 
@@ -89,34 +88,22 @@ def _card(
     task: StudyTask, evaluation: Evaluation, k: int, prediction: NDArray[Any]
 ) -> dict[str, Any]:
     views, truth = evaluation.views, evaluation.views.truths[k]
-    error = evaluation.rows["network"].errors[k]
+    height, width = views.colour[k].shape[:2]
+    # Labels keep their colours in the truth.
     pictures = {
         "picture": views.colour[k],
-        "truth": task.picture(task.prediction_of(truth)),
-        "prediction": task.picture(prediction),
-        "error": _error_picture(task, prediction, truth),
+        "truth": resized_nearest(task.picture(task.prediction_of(truth)), width, height),
+        "prediction": resized_by_area(task.picture(prediction), width, height),
+        "error": resized_by_area(_error_picture(task, prediction, truth), width, height),
     }
-    height, width = views.colour[k].shape[:2]
-    urls = {name: _url(_fitted(name, picture, width, height)) for name, picture in pictures.items()}
-    place = shown(views.ids[k], MAX_PLACE)
-    return {"id": place, "error": task.error_text(error), "pictures": urls}
-
-
-def _fitted(name: str, picture: NDArray[np.uint8], width: int, height: int) -> NDArray[np.uint8]:
-    """At the size of the network's picture; labels keep their colours."""
-    if name == "truth":
-        return resized_nearest(picture, width, height)
-    return resized_by_area(picture, width, height)
+    error = task.error_text(evaluation.rows["network"].errors[k])
+    urls = {name: data_url(png_of_rows(picture), "png") for name, picture in pictures.items()}
+    return {"id": shown(views.ids[k], MAX_PLACE), "error": error, "pictures": urls}
 
 
 def _error_picture(task: StudyTask, prediction: NDArray[Any], truth: Arrays) -> NDArray[np.uint8]:
-    """Black is right, white is wrong; blue has no truth."""
-    errors, known = task.error_map(prediction, truth)
-    grey = np.rint(255 * np.clip(errors, 0, 1))
-    picture = np.repeat(grey[..., None], 3, axis=-1).astype(np.uint8)
-    picture[~known] = (24, 34, 72)
+    """Black for no error to white, blue without truth."""
+    errors, has_truth = task.error_map(prediction, truth)
+    picture = grey_picture(np.clip(errors, 0, 1))
+    picture[~has_truth] = WITHOUT_TRUTH
     return picture
-
-
-def _url(picture: NDArray[np.uint8]) -> str:
-    return "data:image/png;base64," + base64.b64encode(png_of_rows(picture)).decode()

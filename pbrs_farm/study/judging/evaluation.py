@@ -1,4 +1,4 @@
-"""A finished run judged on views: figures beside the baseline, HED untouched and the paper. Effects: reads the run."""
+"""Figures of a finished run on test views, beside the baseline, HED and the paper. Effects: reads the run."""
 
 from __future__ import annotations
 
@@ -34,27 +34,24 @@ from pbrs_farm.study.training.view_sources import NYU_LIGHT
 from pbrs_farm.study.training_plan import TrainingPlan, plan_of
 
 _HED_ROW = "HED untouched"
-_LEAST_GROUPS = 3
+_LEAST_GROUPS = 3  # minimum number of homes for an interval
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JudgedViews:
-    """Pictures at the network's size, and what is true of each."""
+    """Test pictures at the network's size with their truth."""
 
-    name: str  # what a table calls them
-    truth: str  # which truth and which mask, in words
+    name: str
+    truth: str  # description of the truth and its mask
     ids: tuple[str, ...]
     colour: NDArray[np.uint8]  # (N, h, w, 3) sRGB
-    truths: tuple[Arrays, ...]  # arrays (H, W, ...) of each view, of any size
-    credits: tuple[str, ...] = ()  # whose homes the pictures show
+    truths: tuple[Arrays, ...]  # targets (H, W, ...) of each view at any size
+    credits: tuple[str, ...] = ()  # of the homes in the pictures
     cameras: F32 | None = None  # (N, 4) fx, fy, cx, cy of each picture, of plans with `rays`
 
     @property
     def sizes(self) -> list[tuple[int, int]]:
-        """(height, width) of each truth.
-
-        Truths of one set may differ in size, as photographs do: predictions are asked for at these.
-        """
+        """(height, width) of each truth; photographs differ in size."""
         shapes = [next(iter(truth.values())).shape for truth in self.truths]
         return [(int(shape[0]), int(shape[1])) for shape in shapes]
 
@@ -62,14 +59,14 @@ class JudgedViews:
 def judged_of_arrays(
     name: str, truth: str, views: ViewArrays, credits: tuple[str, ...] = ()
 ) -> JudgedViews:
-    """Rendered views, whose truth has the network's size."""
-    truths = tuple(views.target(k) for k in range(len(views)))
+    """Rendered views, with truth at the network's size."""
+    truths = tuple(views.all_targets())
     return JudgedViews(name, truth, views.ids, views.colour, truths, credits, views.cameras)
 
 
 @dataclass(frozen=True, slots=True)
 class Trained:
-    """A finished run, its network loaded."""
+    """A finished run with its network."""
 
     folder: RunFolder
     record: dict[str, Any]
@@ -80,21 +77,21 @@ class Trained:
 
     @property
     def figures(self) -> dict[str, Any]:
-        """What training said at its end: on its own views and on held-out homes."""
+        """Figures at the end of training, on training views and held-out homes."""
         return self.folder.figures()
 
 
 @dataclass(frozen=True, slots=True)
 class Evaluation:
-    """What was judged on what."""
+    """Figures of predictions for a set of test views."""
 
     views: JudgedViews
     rows: dict[str, Judged]  # "network", the baseline's name, HED untouched
-    parts: dict[str, ErrorParts] = field(default_factory=dict)  # of normals, by the same names
+    parts: dict[str, ErrorParts] = field(default_factory=dict)  # of normals, by the names of rows
 
     @property
     def groups(self) -> dict[str, float]:
-        """Mean error of the network by what the views' ids begin with: a home, a folder of photographs."""
+        """Mean error of the network by home, or by folder of photographs."""
         by_group: dict[str, list[float]] = {}
         for view, error in zip(self.views.ids, self.rows["network"].errors, strict=True):
             if math.isfinite(error):
@@ -116,9 +113,9 @@ class Evaluation:
 
 
 def mean_interval(values: Sequence[float], *, level: float = 0.9) -> tuple[float, float]:
-    """The bootstrap's interval of a mean: of values drawn anew, 4,000 times, with a seed of its own.
+    """Bootstrap interval of a mean, from 4,000 resamples with a fixed seed.
 
-    Views of one room are alike, so that an interval over views would be far too narrow: draw rooms.
+    Views of one room are alike, so an interval over views would be too narrow: pass means of rooms.
 
     Example:
         >>> mean_interval([30.0, 30.0, 30.0])
@@ -130,13 +127,10 @@ def mean_interval(values: Sequence[float], *, level: float = 0.9) -> tuple[float
 
 
 def open_run(root: Path, *, exact: bool = False) -> Trained:
-    """Load a finished run; BadInput for any other folder.
-
-    exact: boundaries are judged at the benchmark's own 99 thresholds.
-    """
+    """Load a finished run; BadInput for any other folder. exact: boundaries at 99 thresholds."""
     folder, record, plan = finished_run(root)
     check_exact(plan.task, exact=exact)
-    task = task_of(plan.task, EXACT_THRESHOLDS if exact else 0)
+    task = task_of(plan.task, EXACT_THRESHOLDS if exact else N_THRESHOLDS)
     network = network_of(plan.network, task.n_out(plan), rays=plan.rays)
     _check_sha256(folder.weights, str(record.get("weights_sha256", "")))
     position = load_checkpoint(folder.weights, network)
@@ -150,38 +144,30 @@ def open_run(root: Path, *, exact: bool = False) -> Trained:
 
 
 def _check_sha256(path: Path, expected: str) -> None:
-    """Raise BadInput where packed weights are not those their record names."""
+    """Raise BadInput if packed weights differ from their record."""
     if expected and path.exists() and hashlib.sha256(path.read_bytes()).hexdigest() != expected:
         raise BadInput(path, "", "other bytes than run.json's weights_sha256: damaged or changed")
 
 
 def check_exact(task_name: str, *, exact: bool) -> None:
-    """Raise BadInput where 99 thresholds are asked for of a task that has none."""
+    """Raise BadInput for --exact with a task without thresholds."""
     if exact and task_name != "boundaries":
         raise BadInput("--exact", "", f"{task_name} has no thresholds: of boundaries alone")
 
 
 def predictions_of(run: Trained, views: JudgedViews) -> Iterator[NDArray[Any]]:
-    """A prediction of each view, of the size of its truth.
-
-    Lazy, in the order of the views; the network's picture is scaled to the truth's size, not the
-    truth to the network's.
-    """
+    """A prediction of each view in order, at the size of its truth."""
     return predict(run.network, views.colour, run.task, run.plan, views.sizes, views.cameras)
 
 
 def evaluate(run: Trained, views: JudgedViews) -> Evaluation:
-    """Judge the network and what needs no training on the same views.
-
-    Beside the network stand the baseline (what the training views are on average) and, for
-    boundaries where its weights are installed, HED untouched. Figures are those of task.figures.
-    """
-    still = (resized_nearest(run.baseline, width, height) for height, width in views.sizes)
-    said = {"network": predictions_of(run, views), run.figures["baseline_name"]: still}
+    """Score the network, the baseline and, for boundaries if its weights are installed, HED."""
+    constant = (resized_nearest(run.baseline, width, height) for height, width in views.sizes)
+    rows = {"network": predictions_of(run, views), run.figures["baseline_name"]: constant}
     if run.task.name == "boundaries" and has_hed():
-        said[_HED_ROW] = _untouched_hed(run, views)
+        rows[_HED_ROW] = _untouched_hed(run, views)
     evaluation = Evaluation(views, {})
-    for name, predictions in said.items():
+    for name, predictions in rows.items():
         evaluation = _with_row(run, evaluation, name, predictions)
     return evaluation
 
@@ -189,10 +175,9 @@ def evaluate(run: Trained, views: JudgedViews) -> Evaluation:
 def with_others(
     run: Trained, evaluation: Evaluation, name: str, predictions: Iterable[NDArray[Any]]
 ) -> Evaluation:
-    """The evaluation with a column more: what another program says of the same views.
+    """The evaluation with another column: predictions in the order and at the sizes of the truths.
 
-    predictions must be in the order of the views and of their truths' size. BadInput for a name
-    that the evaluation has already.
+    BadInput for a name that the evaluation has already.
     """
     if name in evaluation.rows:
         raise BadInput("--predictions", name, "a second column of this name", hint="NAME=DIR")
@@ -213,14 +198,14 @@ def _with_row(
 def _counted(
     predictions: Iterable[NDArray[Any]], views: JudgedViews, parts: ErrorParts
 ) -> Iterator[NDArray[Any]]:
-    """The same predictions; each is counted as it passes."""
+    """The same predictions, each added to parts on the way."""
     for prediction, truth, colour in zip(predictions, views.truths, views.colour, strict=True):
         parts.add(prediction, truth, colour)
         yield prediction
 
 
 def _untouched_hed(run: Trained, views: JudgedViews) -> Iterator[NDArray[Any]]:
-    """What HED says that has seen BSDS500 alone; it knows pictures of 320 pixels and more."""
+    """Predictions of HED as trained on BSDS500, whose pictures have 320 pixels or more."""
     enlarge = str(max(1, round(320 / run.plan.width_px)))
     fields = {"network": "hed", "enlarge": enlarge, "device": run.plan.device}
     plan = plan_of("boundaries", "tiny", fields)
@@ -230,26 +215,22 @@ def _untouched_hed(run: Trained, views: JudgedViews) -> Iterator[NDArray[Any]]:
 
 
 def figures_table(run: Trained, evaluations: list[Evaluation]) -> str:
-    """Figures by row; training homes, held-out homes and what was judged, side by side, as Markdown."""
+    """Figures of training homes, held-out homes and test sets side by side, as Markdown."""
     paper = _paper(run)
     columns: list[tuple[str, dict[str, float]]] = []
-    stored = run.figures
-    for part, title in (("train", "training homes"), ("held_out", "held-out homes")):
-        if part in stored["network"]:
-            n = stored.get("views", run.record["views"])[part]
-            columns.append((f"{title} ({n})", stored["network"][part]))
-            columns.append((stored["baseline_name"], stored["baseline"][part]))
-    for one in evaluations:
-        n = len(one.views.ids)
-        for name, judged in one.rows.items():
-            columns.append(
-                (f"{one.views.name} ({n})" if name == "network" else name, judged.figures)
-            )
+    for title, network, baseline in trained_columns(run):
+        columns += [(title, network), (run.figures["baseline_name"], baseline)]
+    for evaluation in evaluations:
+        first = f"{evaluation.views.name} ({len(evaluation.views.ids)})"
+        for name, judged in evaluation.rows.items():
+            columns.append((first if name == "network" else name, judged.figures))
     rows = []
     for k, figure in enumerate(run.task.figures):
         cells = [shown_figure(figure, figures[figure]) for _, figures in columns]
-        known = shown_figure(figure, paper.figures[k]) if paper and k < len(paper.figures) else "-"
-        rows.append([title_of(figure), *cells, *([known] if paper else [])])
+        if paper:
+            published = paper.figures[k] if k < len(paper.figures) else None
+            cells.append(shown_figure(figure, published))
+        rows.append([title_of(figure), *cells])
     titles = ["", *(title for title, _ in columns)]
     if paper:
         tuned = f", then {paper.tuned}" if paper.tuned else ""
@@ -257,26 +238,37 @@ def figures_table(run: Trained, evaluations: list[Evaluation]) -> str:
     return markdown(titles, rows)
 
 
+def trained_columns(run: Trained) -> list[tuple[str, dict[str, float], dict[str, float]]]:
+    """Title, figures of the network and of the baseline for training and held-out homes."""
+    stored, counts = run.figures, run.figures.get("views", run.record["views"])
+    titles = {"train": "training homes", "held_out": "held-out homes"}
+    return [
+        (f"{title} ({counts[part]})", stored["network"][part], stored["baseline"][part])
+        for part, title in titles.items()
+        if part in stored["network"]
+    ]
+
+
 def parts_tables(evaluations: list[Evaluation]) -> str:
-    """Mean angle by kind of surface, depth and luma, a table each that was judged; "" of other tasks."""
+    """Tables of the mean angle by kind of surface, depth and luma; "" for other tasks."""
     tables = []
-    for one in evaluations:
-        means = {name: parts.means_deg() for name, parts in one.parts.items()}
+    for evaluation in evaluations:
+        means = {name: parts.means_deg() for name, parts in evaluation.parts.items()}
         if not means:
             continue
-        shares = next(iter(one.parts.values())).shares()
+        shares = next(iter(evaluation.parts.values())).shares()
         rows = [
             [part, f"{100 * shares[part]:.1f} %", *(shown_figure("mean_deg", row[part]) for row in means.values())]
             for part in PARTS
             if all(part in row for row in means.values())
         ]  # fmt: skip
-        titles = [f"{one.views.name}: mean, degrees", "pixels", *means]
+        titles = [f"{evaluation.views.name}: mean, degrees", "pixels", *means]
         tables.append(markdown(titles, rows))
     return "\n\n".join(tables)
 
 
 def _paper(run: Trained) -> PaperRow | None:
-    """The paper's row beside this run: of its light, or of the light it was tuned from."""
+    """The paper's row for the light of this run, or for the light of its first weights."""
     mode = str(run.record["mode"])
     row = paper_row(run.task.name, mode, run.plan.n_classes)
     if row is None or mode != NYU_LIGHT:
@@ -285,66 +277,60 @@ def _paper(run: Trained) -> PaperRow | None:
 
 
 def notes(run: Trained, evaluations: list[Evaluation]) -> list[str]:
-    """What must be said with the table, a line each.
-
-    Underfit networks, timing of both arithmetics, which truth and mask were used, thresholds, means
-    over homes with their interval, and that the paper's numbers are of other pictures.
-    """
-    said = []
+    """Notes under the table: underfitting, speed, truths, thresholds, intervals, the paper."""
+    lines = []
     stored = run.figures
-    train, still = (run.task.error(stored[name]["train"]) for name in ("network", "baseline"))
-    if is_underfit(train, still):
-        said.append(
+    train, constant = (run.task.error(stored[name]["train"]) for name in ("network", "baseline"))
+    if is_underfit(train, constant):
+        lines.append(
             f"underfit: the error on its own training views, {train:.3g}, is above 80 % of the"
-            f" baseline's, {still:.3g}; rank nothing by it"
+            f" baseline's, {constant:.3g}; rank nothing by it"
         )
     if seconds := run.record.get("seconds_a_step"):
-        taken = min(seconds, key=lambda name: float(seconds[name]))
+        fastest = min(seconds, key=lambda name: float(seconds[name]))
         timed = ", ".join(f"{name} {value:.2f} s" for name, value in seconds.items())
-        said.append(f"a step takes {timed} here: trained in {taken}")
-    said.append(f"truth of training and held-out homes: {run.record['truth']}")
+        lines.append(f"a step takes {timed} here: trained in {fastest}")
+    lines.append(f"truth of training and held-out homes: {run.record['truth']}")
     if isinstance(run.task, EdgesTask):
         text = f"thresholds: {N_THRESHOLDS} of training and held-out homes"
-        said.append(text + f", {run.task.n_thresholds} of all else" * bool(evaluations))
-    for one in evaluations:
-        said.append(f"truth of {one.views.name}: {one.views.truth}")
-        said += _said_of_groups(run.task, one)
+        lines.append(text + f", {run.task.n_thresholds} of all else" * bool(evaluations))
+    for evaluation in evaluations:
+        lines.append(f"truth of {evaluation.views.name}: {evaluation.views.truth}")
+        lines += _interval_of_groups(run.task, evaluation)
     if _paper(run):
-        said.append("the paper's numbers are of other pictures, another truth and 568,793 views")
-    return said
+        lines.append("the paper's numbers are of other pictures, another truth and 568,793 views")
+    return lines
 
 
-def _said_of_groups(task: StudyTask, evaluation: Evaluation) -> list[str]:
-    """The mean over homes or folders with its interval, where there are enough to tell one."""
+def _interval_of_groups(task: StudyTask, evaluation: Evaluation) -> list[str]:
+    """The mean over homes or folders with its interval, if there are enough."""
     groups = list(evaluation.groups.values())
     if len(groups) < _LEAST_GROUPS:
         return []
     scale, unit = task.error_scale, task.error_unit
     mean, low, high = (scale * x for x in (statistics.fmean(groups), *mean_interval(groups)))
-    what = f"{evaluation.views.name}, over its {len(groups)} homes or folders"
-    return [
-        f"{what}: {task.error_name}, mean {mean:.1f}{unit}, 90 % within {low:.1f} to {high:.1f}"
-    ]
+    place = f"{evaluation.views.name}, over its {len(groups)} homes or folders: {task.error_name}"
+    return [f"{place}, mean {mean:.1f}{unit}, 90 % within {low:.1f} to {high:.1f}"]
 
 
 def evaluation_text(run: Trained, evaluations: list[Evaluation]) -> str:
-    """The table of figures, of normals those by part, and the notes, as Markdown."""
+    """The tables and the notes as Markdown."""
     parts = parts_tables(evaluations)
     tables = [figures_table(run, evaluations), "", *([parts, ""] if parts else [])]
     return "\n".join([*tables, *notes(run, evaluations)])
 
 
 def report(run: Trained, evaluations: list[Evaluation]) -> dict[str, Any]:
-    """Everything of the table and more, as JSON values: evaluation.json.
+    """Content of evaluation.json; None for figures without pixels.
 
-    run, trained (figures at the end of training), evaluations (figures, of normals the parts, groups
-    and every view's error), the paper's row and the notes. What no pixel tells is None.
+    run, trained (figures at the end of training), evaluations (figures, parts of normals, groups and
+    the error of each view), the paper's row and the notes.
     """
     paper = _paper(run)
     row = {
         "run": run.record,
         "trained": run.figures,
-        "evaluations": [one.as_json() for one in evaluations],
+        "evaluations": [evaluation.as_json() for evaluation in evaluations],
         "paper": asdict(paper) if paper else None,
         "notes": notes(run, evaluations),
     }
@@ -352,9 +338,9 @@ def report(run: Trained, evaluations: list[Evaluation]) -> dict[str, Any]:
 
 
 def _without_nan(value: Any) -> Any:
-    """The value with None for what is not finite: JSON has no word for it."""
+    """The value with None for NaN and infinities, which JSON lacks."""
     if isinstance(value, dict):
-        return {key: _without_nan(one) for key, one in value.items()}
+        return {key: _without_nan(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_without_nan(one) for one in value]
+        return [_without_nan(item) for item in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value

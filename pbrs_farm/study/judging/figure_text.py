@@ -1,4 +1,4 @@
-"""Figures as text and Markdown tables: titles, units, spreads; no effects."""
+"""Figures as text and Markdown tables."""
 
 from __future__ import annotations
 
@@ -7,8 +7,10 @@ import statistics
 from collections.abc import Sequence
 from typing import Final
 
-UNDERFIT: Final = 0.8  # training error above this share of the baseline's: nothing may be ranked
-_UNITS: Final = ("_deg", "_m")  # that names of figures end with; others are shares
+UNDERFIT: Final = (
+    0.8  # training error, as a share of the baseline's, above which a network is underfit
+)
+_UNITS: Final = ("_deg", "_m")  # endings of names with units; other figures are shares
 _TITLES: Final = {
     "mean_deg": "mean, degrees", "median_deg": "median, degrees",
     "rms_deg": "RMS, degrees", "below_5": "< 5", "below_7_5": "< 7.5",
@@ -22,23 +24,19 @@ _TITLES: Final = {
 
 
 def title_of(figure: str) -> str:
-    """A figure's name as tables have it."""
+    """Title of a figure in tables."""
     return _TITLES[figure]
 
 
 def shown_figure(figure: str, value: float | None) -> str:
-    """Degrees and metres with two places, shares as per cent with one; "-" for none."""
+    """Degrees and metres with two decimals, shares as per cent with one; "-" for None and NaN."""
     if value is None or not math.isfinite(value):
         return "-"
     return f"{value:.2f}" if figure.endswith(_UNITS) else f"{100 * value:.1f} %"
 
 
 def spread_text(figure: str, values: Sequence[float]) -> str:
-    """Mean and, of several seeds, the standard deviation of a sample.
-
-    The standard deviation is that of a sample (n - 1), and left out for one value, where NaN is "-".
-    At least one value is needed.
-    """
+    """Mean and, of two or more values, the sample standard deviation (n - 1)."""
     mean = shown_figure(figure, statistics.fmean(values))
     if len(values) < 2:
         return mean
@@ -47,7 +45,7 @@ def spread_text(figure: str, values: Sequence[float]) -> str:
 
 
 def markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A table whose columns are as wide as their widest cell."""
+    """A table with aligned columns."""
     cells = [list(head), *(list(row) for row in rows)]
     widths = [max(len(row[k]) for row in cells) for k in range(len(head))]
     lines = [
@@ -59,8 +57,8 @@ def markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def is_underfit(train_error: float, baseline_error: float) -> bool:
-    """The network hardly knows its own training views: no conclusion may be drawn from it.
+    """True if the error on training views is near that of a baseline that sees no picture.
 
-    Compared with a baseline that sees no picture. Report such a row as no result, not as a bad one.
+    Report such a network as no result, not as a bad one.
     """
     return train_error > UNDERFIT * baseline_error

@@ -1,9 +1,9 @@
-"""What other programs say of the same pictures, as files: judged as a run's own predictions. Effects: reads them.
+"""Predictions of other programs for the same pictures, scored like those of a run. Effects: reads files.
 
-A file a picture, named by the picture's id (`kitchen/0001`) or its last part: NAME_normal.png,
-NAME_semantic.png (NAME_nyu13.png of 13 classes), NAME_edges.png or NAME_depth.png as `predict` writes
-them, or NAME.npy: normals (H, W, 3) in OpenCV's axes (x right, y down, z forward), ids of classes, edges
-0..1, or metres.
+One file per picture, named by the picture's id (`kitchen/0001`) or its last part: NAME_normal.png,
+NAME_semantic.png (NAME_nyu13.png for 13 classes), NAME_edges.png or NAME_depth.png in the encoding of
+`predict`, or NAME.npy: normals (H, W, 3) in OpenCV's axes (x right, y down, z forward), class ids,
+edges 0..1, or metres.
 """
 
 from __future__ import annotations
@@ -18,43 +18,29 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.core.classes import NYU13_NAMES
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.resampling import resized_nearest
 from pbrs_farm.images import array_from_png
 from pbrs_farm.regular_files import naming_kind, read_given
 from pbrs_farm.study.judging.evaluation import JudgedViews
-from pbrs_farm.study.tasks.classes_task import class_names
+from pbrs_farm.study.photographs import middle_of_form
+from pbrs_farm.study.tasks.study_task import StudyTask
+from pbrs_farm.study.tasks.tasks import task_of
 from pbrs_farm.study.training_plan import TrainingPlan
 
-_KINDS: Final = {
-    "normals": "normal",
-    "segmentation": "semantic",
-    "boundaries": "edges",
-    "depth": "depth",
-}
-_MOST_VALUES: Final = 300_000_000  # of an array; more is refused
-
-
-def file_kind(plan: TrainingPlan) -> str:
-    """What the names of a plan's predictions end with: normal, semantic (NYU40), nyu13, edges, depth."""
-    is_grouped = plan.task == "segmentation" and class_names(plan) == NYU13_NAMES
-    return "nyu13" if is_grouped else _KINDS[plan.task]
+_MOST_VALUES: Final = 300_000_000  # maximum size of an array
 
 
 @dataclass(frozen=True, slots=True)
 class OthersPredictions:
-    """A folder of them. name: what a table calls them."""
+    """A folder of predictions, and its name in tables."""
 
     name: str
     folder: Path
 
 
 def others_predictions(word: str) -> OthersPredictions:
-    """`[NAME=]DIR`. Raises BadInput for what is no folder.
-
-    Without a NAME the folder's own. Which files are in it is asked later, a view at a time.
-    """
+    """Parse `[NAME=]DIR`, by default with the folder's name; BadInput if it is no folder."""
     label, equals, place = word.partition("=")
     folder = Path(place if equals else word)
     if not folder.is_dir():
@@ -65,62 +51,56 @@ def others_predictions(word: str) -> OthersPredictions:
 def predictions_in(
     others: OthersPredictions, views: JudgedViews, plan: TrainingPlan
 ) -> Iterator[NDArray[Any]] | None:
-    """A prediction of each view, of its truth's size, in order; None where there is a file for none.
+    """A prediction of each view at the size of its truth, in order; None if no view has a file.
 
-    A picture of another form than the truth is cut about its middle, as photographs are. Raises
-    BadInput for a view that alone has no file, and for a file that is none.
+    A picture of another aspect ratio is cropped about its middle, as photographs are. Raises
+    BadInput if only some views have a file, and for a damaged file.
     """
-    kind = file_kind(plan)
+    task = task_of(plan.task)
+    kind = task.file_kind(plan)
     files = _files_of(others.folder, views.ids, kind)
     if not any(files):
         return None
-    for at, file in zip(views.ids, files, strict=True):
+    for id, file in zip(views.ids, files, strict=True):
         if file is None:
-            text = f"no prediction of {at}: {_prediction_names(at, kind)[0]} and the like"
+            text = f"no prediction of {id}: {_prediction_names(id, kind)[0]} and the like"
             raise BadInput(others.folder, "", text, hint="all pictures of a place, or none")
     return (
-        _fitted(_read_prediction(file, plan.task), size)
+        _fitted(_read_prediction(file, task), size)
         for file, size in zip(files, views.sizes, strict=True)
         if file is not None
     )
 
 
 def _files_of(folder: Path, ids: Sequence[str], kind: str) -> list[Path | None]:
-    """The file of each view. The last part of an id names it where no other id ends so."""
-    ends = Counter(at.rpartition("/")[2] for at in ids)
-    found: list[Path | None] = []
-    for at in ids:
-        end = at.rpartition("/")[2]
-        names = _prediction_names(at, kind) + (
-            _prediction_names(end, kind) if ends[end] == 1 else []
-        )
-        found.append(next((folder / name for name in names if (folder / name).is_file()), None))
-    return found
+    """The file of each view; the last part of an id is enough if it is unique."""
+    ends = Counter(id.rpartition("/")[2] for id in ids)
+    files: list[Path | None] = []
+    for id in ids:
+        end = id.rpartition("/")[2]
+        names = [name for stem in dict.fromkeys((id, end)) if stem == id or ends[end] == 1
+                 for name in _prediction_names(stem, kind)]  # fmt: skip
+        files.append(next((folder / name for name in names if (folder / name).is_file()), None))
+    return files
 
 
-def _prediction_names(at: str, kind: str) -> list[str]:
-    # A photograph that is called NAME_rgb is predicted under that name.
-    return [f"{at}{more}{end}" for more in ("", "_rgb") for end in (f"_{kind}.png", ".npy")]
+def _prediction_names(stem: str, kind: str) -> list[str]:
+    # The prediction of a photograph NAME_rgb may have that name.
+    return [f"{stem}{more}{end}" for more in ("", "_rgb") for end in (f"_{kind}.png", ".npy")]
 
 
-def _read_prediction(path: Path, task: str) -> NDArray[Any]:
-    """A prediction as a task's scorer takes it."""
+def _read_prediction(path: Path, task: StudyTask) -> NDArray[Any]:
+    """A prediction as the task's scorer takes it."""
     data = read_given(path)
     if path.suffix == ".npy":
-        return _checked(_prediction_array(path, data), path, task)
+        return _checked(_array_of_npy(path, data), path, task)
     stored = array_from_png(data, str(path))
-    if task == "normals":
-        if stored.dtype != np.uint16 or stored.ndim != 3:
-            raise BadInput(path, "", "expected a picture of three channels of 16 bits")
-        # From the layer's axes, x right, y forward, z up, to OpenCV's.
-        x, y, z = np.moveaxis(stored.astype(np.float64) * 2 / 65535 - 1, -1, 0)
-        return _checked(np.stack([x, -z, y], -1), path, task)
-    # Edges are 255 x how likely, depth is in millimetres.
-    unit = {"boundaries": 255.0, "depth": 1000.0}.get(task)
-    return _checked(stored / unit if unit else stored, path, task)
+    if task.name == "normals" and (stored.dtype != np.uint16 or stored.ndim != 3):
+        raise BadInput(path, "", "expected a picture of three channels of 16 bits")
+    return _checked(task.restored(stored), path, task)
 
 
-def _prediction_array(path: Path, data: bytes) -> NDArray[Any]:
+def _array_of_npy(path: Path, data: bytes) -> NDArray[Any]:
     try:
         array = np.load(io.BytesIO(data), allow_pickle=False)
     except (ValueError, OSError, EOFError):
@@ -131,27 +111,24 @@ def _prediction_array(path: Path, data: bytes) -> NDArray[Any]:
     return array
 
 
-def _checked(array: NDArray[Any], path: Path, task: str) -> NDArray[Any]:
-    wanted = 3 if task == "normals" else 2
-    is_form = array.ndim == wanted and (wanted == 2 or array.shape[2] == 3)
+def _checked(array: NDArray[Any], path: Path, task: StudyTask) -> NDArray[Any]:
+    n_axes = 3 if task.name == "normals" else 2
+    is_form = array.ndim == n_axes and (n_axes == 2 or array.shape[2] == 3)
     if not is_form or not 0 < array.size <= _MOST_VALUES:
-        form = "(H, W, 3)" if wanted == 3 else "(H, W)"
+        form = "(H, W, 3)" if n_axes == 3 else "(H, W)"
         raise BadInput(path, "", f"expected {form}, got {array.shape}")
     if not np.isfinite(array).all():
         raise BadInput(path, "", "holds what is no finite number")
-    if task == "segmentation":
+    if task.name == "segmentation":
         return np.asarray(np.clip(array, 0, 255), np.uint8)
     values: NDArray[Any] = array.astype(np.float32)
-    if task == "normals":
+    if task.name == "normals":
         values = values / np.maximum(np.linalg.norm(values, axis=-1, keepdims=True), 1e-6)
     return values
 
 
 def _fitted(prediction: NDArray[Any], size: tuple[int, int]) -> NDArray[Any]:
-    """The middle of a prediction in the form of (height, width), at that size."""
-    height, width = prediction.shape[:2]
-    share = size[1] / size[0]
-    rows, columns = min(height, round(width / share)), min(width, round(height * share))
-    top, left = (height - rows) // 2, (width - columns) // 2
-    middle = prediction[top : top + max(rows, 1), left : left + max(columns, 1)]
-    return np.asarray(resized_nearest(middle, size[1], size[0]))
+    """The middle of a prediction at (height, width)."""
+    height, width = size
+    rows, columns = middle_of_form(*prediction.shape[:2], width, height)
+    return np.asarray(resized_nearest(prediction[rows, columns], width, height))

@@ -1,7 +1,7 @@
-"""A finished run as small as it can be handed on: half floats, their sha256, a model card. Effects: files.
+"""A finished run packed for sharing: half floats, their sha256, a model card. Effects: files.
 
-What is packed is a run itself: `predict`, `evaluate` and `--init` take it. The best ones
-ship with the package, below study/weights.
+A packed run is a run: `predict`, `evaluate` and `--init` take it. The best ones ship with the
+package, below study/weights.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Any, Final
 import numpy as np
 
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.study.judging.evaluation import Trained, open_run
+from pbrs_farm.study.judging.evaluation import Trained, open_run, trained_columns
 from pbrs_farm.study.judging.figure_text import markdown, shown_figure, title_of
 from pbrs_farm.study.training.checkpoint import read_tensors, write_tensor_file
 from pbrs_farm.study.training.run_folder import RunFolder, make_folder
@@ -31,24 +31,24 @@ _SAYS: Final = {
     "depth": "how far each pixel's surface is along the camera's axis",
     "boundaries": "how likely each pixel is an edge of an object",
 }
-_MOST_HOMES: Final = 12  # named on the card; of more, these and how many
+_MOST_HOMES: Final = 12  # number of homes named on the card
 
 
 def shipped_run(task: str) -> Path:
-    """The folder of the weights that come with the package; BadInput for a task without."""
+    """Folder of the package's own weights of a task; BadInput if there are none."""
     folder = SHIPPED / task
     if not (folder / "run.json").exists():
-        there = sorted(path.parent.name for path in SHIPPED.glob("*/run.json"))
-        hint = f"weights come for {', '.join(there)}" if there else "pbrs-farm predict RUN PHOTO..."
+        tasks = sorted(path.parent.name for path in SHIPPED.glob("*/run.json"))
+        hint = f"weights come for {', '.join(tasks)}" if tasks else "pbrs-farm predict RUN PHOTO..."
         raise BadInput("--task", task, "no weights of this task come with the package", hint=hint)
     return folder
 
 
 def pack_weights(root: Path, out: Path, *, made_by: Sequence[str] = ()) -> RunFolder:
-    """Write a finished run's weights as half floats, with what is known of them, into out.
+    """Write a finished run's weights as half floats into out, with their record and a card.
 
-    What `evaluate` left in RUN/evaluation is on the card, and made_by, the command lines that make
-    the run again. Raises BadInput for any other folder.
+    The card has the results in RUN/evaluation, and made_by, the command lines of the training.
+    Raises BadInput for any other folder.
     """
     run, packed = open_run(root), RunFolder(make_folder(out))
     tensors, position = read_tensors(run.folder.weights)
@@ -56,7 +56,7 @@ def pack_weights(root: Path, out: Path, *, made_by: Sequence[str] = ()) -> RunFo
     write_tensor_file(packed.weights, halves, {"position": json.dumps(asdict(position))})
     np.save(packed.baseline, run.baseline.astype(np.float16))
     packed.write("figures.json", run.figures)
-    # Where the views lay on this machine is nobody else's business.
+    # Omit local paths.
     names = [PurePosixPath(place).name for place in str(run.record["source"]).split(" + ")]
     digest = hashlib.sha256(packed.weights.read_bytes()).hexdigest()
     origin = {k: v for k, v in run.record["init_origin"].items() if k != "file"}
@@ -65,7 +65,7 @@ def pack_weights(root: Path, out: Path, *, made_by: Sequence[str] = ()) -> RunFo
     record |= {"made_by": list(made_by)} if made_by else {}
     packed.write("run.json", record | {"plan": plan_as_json(run.plan), "step": position.step})
     evaluations = _evaluations(root)
-    # Each view's own error is of no use without the views.
+    # Omit the errors of single views.
     packed.write("judged.json", [row | {"errors": {}} for row in evaluations])
     card = model_card(run, record | {"step": position.step}, evaluations)
     packed.write_text("README.md", card)
@@ -78,7 +78,7 @@ def _evaluations(root: Path) -> list[dict[str, Any]]:
 
 
 def model_card(run: Trained, record: Mapping[str, Any], evaluations: list[dict[str, Any]]) -> str:
-    """What the weights are, were trained on, are worth and are not worth: Markdown."""
+    """Description of the weights, their training, figures and limits: Markdown."""
     plan, task = run.plan, run.task
     size = f"{plan.width_px}x{plan.height_px}"
     homes = record["homes"]["train"]
@@ -87,7 +87,7 @@ def model_card(run: Trained, record: Mapping[str, Any], evaluations: list[dict[s
     machine = f"; {record['machine']}" if "machine" in record else ""
     commands = "\n".join(record.get("made_by", ()))
     chosen += f", chosen by the error on {stop.removeprefix('on_')}" if stop else ""
-    said = [
+    parts = [
         f"---\ntags: [{task.name}, indoor, synthetic-data]\nlibrary_name: pbrs-farm\n---",
         f"# {task.name}, plan {plan.name}",
         f"Says {_SAYS[task.name].format(n_classes=plan.n_classes)}, from one colour picture of a room{_TOLD_RAYS * plan.rays}. Network `{plan.network}`,"
@@ -111,11 +111,11 @@ def model_card(run: Trained, record: Mapping[str, Any], evaluations: list[dict[s
         "\n".join(f"- {line}" for line in _training_credits(record)) or "The run names none.",
         f"weights.safetensors, sha256 {record['weights_sha256']}",
     ]  # fmt: skip
-    return "\n\n".join(said) + "\n"
+    return "\n\n".join(parts) + "\n"
 
 
 def _seen(record: Mapping[str, Any], homes: Sequence[str]) -> str:
-    """What the weights saw, their first ones included."""
+    """Description of the pictures that trained the weights and their first weights."""
     n, first = record["views"]["train"], record["init_origin"].get("mode", "")
     if record["mode"] == NYU_LIGHT:
         return f"{n:,} photographs of NYU Depth v2 (Silberman et al., 2012), labelled there."
@@ -136,28 +136,22 @@ def _seen(record: Mapping[str, Any], homes: Sequence[str]) -> str:
 
 
 def _training_credits(record: Mapping[str, Any]) -> list[str]:
-    """Each credit once; headings between them left out."""
+    """Each credit line once, without headings."""
     lines = (str(line).removeprefix("- ") for line in record.get("credits", []))
     return list(dict.fromkeys(line for line in lines if not line.endswith(":")))
 
 
 def _figures(run: Trained, evaluations: list[dict[str, Any]]) -> str:
-    stored = run.figures
-    still = stored["baseline_name"]
-    parts = {"train": "training homes", "held_out": "held-out homes"}
-    columns = [
-        (f"{title} ({stored['views'][part]})", stored["network"][part], stored["baseline"][part])
-        for part, title in parts.items()
-        if part in stored["network"]
-    ]
-    columns += [
-        (f"{one['on']} ({one['n_views']})", one["figures"]["network"], one["figures"][still])
-        for one in evaluations
-    ]
+    """Table of figures with those of the baseline in brackets."""
+    baseline_name = run.figures["baseline_name"]
+    columns = trained_columns(run)
+    for row in evaluations:
+        figures, title = row["figures"], f"{row['on']} ({row['n_views']})"
+        columns.append((title, figures["network"], figures[baseline_name]))
     rows = [
         [title_of(name)]
-        + [f"{shown_figure(name, own[name])} ({shown_figure(name, base[name])})" for _, own, base in columns]
+        + [f"{shown_figure(name, net[name])} ({shown_figure(name, base[name])})" for _, net, base in columns]
         for name in run.task.figures
     ]  # fmt: skip
     text = markdown(["", *(title for title, _, _ in columns)], rows)
-    return f"{text}\n\nIn brackets: {still}, which looks at no picture."
+    return f"{text}\n\nIn brackets: {baseline_name}, which looks at no picture."

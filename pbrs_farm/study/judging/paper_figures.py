@@ -1,7 +1,7 @@
-"""The numbers of the paper's tables, by task and figure; no effects.
+"""The figures in the paper's tables, by task.
 
-Zhang et al. 2017, tables 1 to 3, NYUv2's test split. They stand beside ours and are never mixed
-with them: other pictures, other truth, 568,793 views and days of a GPU.
+Zhang et al. 2017, tables 1 to 3, NYUv2's test split. They are not comparable with ours: other
+pictures, other truth, 568,793 views and days of a GPU.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ _NAMES: Final = {"mlt_il_ol": "MLT-IL/OL", "mlt_ol": "MLT-OL", "opengl_il": "Ope
 
 @dataclass(frozen=True, slots=True)
 class PaperRow:
-    """A row of the paper: what it was trained on, and its figures in the order of Task.figures."""
+    """A row of the paper: its training sets, and its figures in the order of StudyTask.figures."""
 
     pretrained: str
     tuned: str
@@ -37,7 +37,7 @@ PAPER: Final[dict[str, tuple[PaperRow, ...]]] = {
         PaperRow("OpenGL-IL", "NYUv2", (23.38, 16.12, 0.3598, 0.6293, 0.7317)),
         PaperRow("MLT-IL/OL", "NYUv2", (21.74, 14.75, 0.3937, 0.6625, 0.7606)),
     ),
-    # Mean IoU alone is reported.
+    # The paper reports mean IoU only.
     "segmentation": (
         PaperRow("ImageNet (Yu et al.)", "NYUv2", (0.317,)),
         PaperRow("ImageNet + OpenGL", "NYUv2", (0.328,)),
@@ -55,28 +55,27 @@ PAPER: Final[dict[str, tuple[PaperRow, ...]]] = {
 
 
 def paper_row(task: str, mode: str, n_classes: int = _PAPER_CLASSES) -> PaperRow | None:
-    """The paper's row for a lighting mode without fine-tuning; where it has none, MLT's best.
+    """The paper's row for a light without fine-tuning, or else its best row with MLT.
 
-    None where the paper says nothing: of depth, and of other classes than NYU40.
+    None for tasks that are not in the paper: depth, and classes other than NYU40.
     """
     if task not in PAPER or n_classes != _PAPER_CLASSES:
         return None
     name = _NAMES.get(mode, "MLT-IL/OL")
     rows = PAPER[task]
-    same = [row for row in rows if row.pretrained == name and not row.tuned]
-    return same[0] if same else rows[-1]
+    return next((row for row in rows if row.pretrained == name and not row.tuned), rows[-1])
 
 
 def tuned_row(task: str, pretrained: str) -> PaperRow:
-    """The paper's row tuned on NYUv2 from a lighting mode; without one, trained on NYUv2 alone.
+    """The paper's row tuned on NYUv2 after a light; without a light, trained on NYUv2 alone.
 
-    Where the paper has no row of that very light, one of the same kind, MLT or OpenGL; KeyError for
-    a task that the paper does not have.
+    If the paper has no row for the light, one of the same kind, MLT or OpenGL; KeyError for a task
+    that is not in the paper.
     """
     name = _NAMES.get(pretrained)
     rows = PAPER[task]
     tuned = [row for row in rows if row.tuned and name is not None]
-    # Segmentation tells MLT from OpenGL, the other tasks their lights too.
+    # Rows of segmentation name the kind only, MLT or OpenGL.
     same = [row for row in tuned if row.pretrained == name]
     kind = "MLT" if name and name.startswith("MLT") else "OpenGL"
     return next(iter(same or [row for row in tuned if kind in row.pretrained]), rows[0])

@@ -1,12 +1,11 @@
-"""What a finished run sees in photographs: files and a page a folder. Effects: reads photographs, writes files.
+"""Predictions of a finished run for photographs: files and a page. Effects: reads photographs, writes files.
 
-A photograph keeps its proportions: the network gets it at about as many pixels as it trained on, and
-what it says is enlarged to the photograph's own size.
+Photographs keep their proportions: they are resized to about as many pixels as in training, and the
+output is enlarged to the size of the photograph.
 """
 
 from __future__ import annotations
 
-import base64
 import io
 import json
 import math
@@ -20,26 +19,25 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from pbrs_farm.core.arrays import F64, Srgb8Image
+from pbrs_farm.core.arrays import F32, F64, Srgb8Image
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.resampling import resized_by_area
 from pbrs_farm.core.shown_text import MAX_PLACE, shown
-from pbrs_farm.formats.layer_file import layer_bytes
+from pbrs_farm.gallery.gallery_page import data_url
 from pbrs_farm.images import decode_photo, jpeg_from_array, png_from_array
 from pbrs_farm.regular_files import read_given
 from pbrs_farm.study.judging.evaluation import Trained
-from pbrs_farm.study.judging.others_predictions import file_kind
 from pbrs_farm.study.real_frames import find_camera
 from pbrs_farm.study.tasks.classes_task import class_names
 from pbrs_farm.study.training.prediction import predict
 from pbrs_farm.study.training.run_folder import make_folder
 
 SUFFIXES: Final = (".jpg", ".jpeg", ".png", ".bmp", ".tga", ".gif")
-_MAX_PIXELS: Final = 100_000_000  # of a photograph; more is refused
-_MULTIPLE: Final = 32  # of pixels: what the networks halve five times
+_MAX_PIXELS: Final = 100_000_000  # maximum size of a photograph
+_MULTIPLE: Final = 32  # of the network's size, which is halved five times
 _BATCH: Final = 8
-_SHOWN_PX: Final = 960  # width of the page's pictures
-_LEAST_SHARE: Final = 0.005  # of a photograph that a class covers to be named
+_SHOWN_PX: Final = 960  # maximum width of the page's pictures
+_LEAST_SHARE: Final = 0.005  # minimum share of a photograph for a class in its row
 _ORIENTATION: Final = 0x0112  # EXIF's tag
 _EXIF_IFD: Final = 0x8769
 _FOCAL_35MM: Final = 0xA405
@@ -48,38 +46,32 @@ _FILM_DIAGONAL_MM: Final = math.hypot(36, 24)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Photograph:
-    """A picture as a person would look at it."""
+    """An upright picture."""
 
-    name: str  # of its files: the picture's own, without a suffix
+    name: str  # stem of its output files
     colour: Srgb8Image  # (H, W, 3)
     path: Path = Path()
-    focal_35mm: float = (
-        0.0  # mm, of a camera of 35 mm film that sees as much, by EXIF; 0 = not told
-    )
+    focal_35mm: float = 0.0  # EXIF's 35 mm equivalent focal length, mm; 0 = unknown
 
 
 def photograph_files(words: Sequence[Path]) -> list[Path]:
-    """The pictures that paths name: files as they are, of folders each picture, by name.
-
-    Raises BadInput for a path that is none, and for a folder without a picture.
-    """
+    """Files, and the pictures of folders by name; BadInput for a folder without a picture."""
     files: list[Path] = []
     for word in words:
         if not word.is_dir():
             files.append(word)
             continue
-        found = sorted(p for p in word.iterdir() if p.suffix.lower() in SUFFIXES)
-        if not found:
+        pictures = sorted(p for p in word.iterdir() if p.suffix.lower() in SUFFIXES)
+        if not pictures:
             raise BadInput(word, "", f"holds no picture ({', '.join(SUFFIXES)})")
-        files += found
+        files += pictures
     return files
 
 
 def read_photograph(path: Path, name: str = "") -> Photograph:
-    """The picture, turned as its EXIF orientation says. Raises BadInput naming the file.
+    """Read a picture and turn it by its EXIF orientation; name "" = the file's stem.
 
-    (H, W, 3) uint8 sRGB. BadInput too for more pixels than are read, before the network is asked.
-    Its name is the file's stem unless one is given.
+    Raises BadInput for a damaged file and for too many pixels.
     """
     data = read_given(path)
     colour = decode_photo(data, str(path))
@@ -91,10 +83,7 @@ def read_photograph(path: Path, name: str = "") -> Photograph:
 
 
 def upright(colour: Srgb8Image, orientation: int) -> Srgb8Image:
-    """The picture as EXIF's orientation 1..8 turns and mirrors it; any other leaves it.
-
-    colour is (H, W, 3); 5 to 8 swap height and width. A copy unless nothing changes.
-    """
+    """(H, W, 3) turned and mirrored by EXIF's orientation 1..8; other numbers change nothing."""
     if orientation in (5, 6, 7, 8):
         colour = colour.transpose(1, 0, 2)
     if orientation in (2, 3, 6, 7):
@@ -105,7 +94,7 @@ def upright(colour: Srgb8Image, orientation: int) -> Srgb8Image:
 
 
 def _exif(data: bytes) -> tuple[int, float]:
-    """Orientation, 1 where it is not told, and the focal length for 35 mm film, 0 likewise."""
+    """Orientation (default 1) and 35 mm equivalent focal length (default 0)."""
     try:
         exif = Image.open(io.BytesIO(data)).getexif()
         orientation = int(exif.get(_ORIENTATION, 1))
@@ -121,30 +110,29 @@ def _exif(data: bytes) -> tuple[int, float]:
 def camera_of_photograph(
     photograph: Photograph, told_deg: float, assumed_deg: float
 ) -> tuple[F64, str]:
-    """(4,) fx, fy, cx, cy of a photograph in its pixels, and what says so.
+    """(4,) fx, fy, cx, cy of a photograph in pixels, and their source.
 
-    The first that there is: told_deg, a horizontal field of view, 0 = none; an intrinsics file beside the
-    photograph or in the folder above; EXIF's focal length for 35 mm film, by the diagonal; assumed_deg.
+    In this order: told_deg, a horizontal field of view (0 = none); an intrinsics file beside the
+    photograph; EXIF's 35 mm equivalent focal length, by the diagonal; assumed_deg.
     """
     height, width = photograph.colour.shape[:2]
     folder = photograph.path.parent
-    beside = None if told_deg else find_camera(folder, folder)
-    if beside is not None:
-        return np.array(beside.K, np.float64), "intrinsics"
+    camera = None if told_deg else find_camera(folder, folder)
+    if camera is not None:
+        return np.array(camera.K, np.float64), "intrinsics"
     if told_deg:
-        said, f = "told", width / 2 / math.tan(math.radians(told_deg) / 2)
+        source, f = "told", width / 2 / math.tan(math.radians(told_deg) / 2)
     elif photograph.focal_35mm:
-        said, f = "EXIF", photograph.focal_35mm / _FILM_DIAGONAL_MM * math.hypot(width, height)
+        source, f = "EXIF", photograph.focal_35mm / _FILM_DIAGONAL_MM * math.hypot(width, height)
     else:
-        said, f = "assumed", width / 2 / math.tan(math.radians(assumed_deg) / 2)
-    return np.array([f, f, width / 2, height / 2]), said
+        source, f = "assumed", width / 2 / math.tan(math.radians(assumed_deg) / 2)
+    return np.array([f, f, width / 2, height / 2]), source
 
 
 def network_size(height: int, width: int, n_pixels: int) -> tuple[int, int]:
-    """(height, width) of a photograph for the network: its proportions, near n_pixels, even halves.
+    """(height, width) for the network: about the photograph's proportions and n_pixels.
 
-    Rounded to a multiple that all stages divide, so proportions hold only nearly. A long thin
-    picture keeps at least one multiple across.
+    Rounded to a multiple that all stages divide, and at least one multiple across.
     """
     scale = (n_pixels / (height * width)) ** 0.5
     rows, columns = (max(round(n * scale / _MULTIPLE), 1) * _MULTIPLE for n in (height, width))
@@ -155,59 +143,59 @@ def network_size(height: int, width: int, n_pixels: int) -> tuple[int, int]:
 def predict_photographs(
     run: Trained, files: Sequence[Path], out: Path, hfov_deg: float = 0.0
 ) -> Iterator[dict[str, Any]]:
-    """Write each photograph's prediction below out, and the page last; a row a photograph as it is done.
+    """Write predictions of photographs into out, and a page at the end; yields a row per photograph.
 
-    A picture that cannot be read is a row with an "error", and the rest goes on. The files are
-    docs/formats/layers.md's: normal.png (16 bits), semantic.png or nyu13.png (ids), depth.png (mm), or edges.png (255 x how likely
-    an edge is), each behind the photograph's name; NAME_shown.png is for eyes. hfov_deg: of all
-    photographs, for a network that is told rays; 0 = as each says. Its rows have "hfov_deg" and
-    "camera", what said so. Raises BadInput where out cannot be written to.
+    An unreadable picture gives a row with an "error", and the others continue. The files are
+    described in docs/formats/layers.md: NAME_normal.png (16 bits), NAME_semantic.png or
+    NAME_nyu13.png (ids), NAME_depth.png (mm) or NAME_edges.png (255 x strength); NAME_shown.png is a
+    picture of it. hfov_deg: horizontal field of view of all photographs, for a network with rays; 0 =
+    as each file says. Rows of such networks have "hfov_deg" and "camera", its source. Raises BadInput
+    if out is not writable.
     """
     make_folder(out)
     rows: list[dict[str, Any]] = []
     for batch in _batches(run, files):
         began = time.perf_counter()
-        photographs = [one for one in batch if isinstance(one, Photograph)]
-        cameras = _cameras(run, photographs, hfov_deg)
-        seen = _predicted(run, photographs, [camera for camera, _said in cameras])
-        facts = (_camera_facts(one, *c) for one, c in zip(photographs, cameras, strict=False))
-        rows += [
-            _written(run, one, next(seen), out) | next(facts, {})
-            if isinstance(one, Photograph)
-            else one
-            for one in batch
-        ]
+        photographs = [item for item in batch if isinstance(item, Photograph)]
+        done = _predicted_rows(run, photographs, out, hfov_deg)
+        batch_rows = [next(done) if isinstance(item, Photograph) else item for item in batch]
         seconds = (time.perf_counter() - began) / max(len(photographs), 1)
-        for row in rows[-len(batch) :]:
+        for row in batch_rows:
             if "error" not in row:
                 row["seconds"] = round(seconds, 3)
-            yield {k: v for k, v in row.items() if k != "tiles"}
-    table = [{k: v for k, v in row.items() if k != "tiles"} for row in rows]
-    (out / "predictions.json").write_text(json.dumps(table, indent=1) + "\n", "utf-8")
+            rows.append(row)
+            yield _without_tiles(row)
+    table = json.dumps([_without_tiles(row) for row in rows], indent=1)
+    (out / "predictions.json").write_text(table + "\n", "utf-8")
     (out / "index.html").write_text(_page(run, rows), "utf-8")
 
 
+def _without_tiles(row: dict[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in row.items() if key != "tiles"}
+
+
 def _batches(run: Trained, files: Sequence[Path]) -> Iterator[list[Photograph | dict[str, Any]]]:
-    """Photographs that the network gets at one size, in their order; a row for what is none."""
+    """Consecutive photographs of one network size, and rows of errors between them."""
     batch: list[Photograph | dict[str, Any]] = []
-    size: tuple[int, int] | None = None
+    batch_size: tuple[int, int] | None = None
     for path, name in zip(files, _output_names(files), strict=True):
+        size = batch_size
         try:
-            one: Photograph | dict[str, Any] = read_photograph(path, name)
+            item: Photograph | dict[str, Any] = read_photograph(path, name)
+            size = _size(run, item) if isinstance(item, Photograph) else size
         except BadInput as error:
-            one = {"photograph": shown(str(path), MAX_PLACE), "error": str(error)}
-        own = _size(run, one) if isinstance(one, Photograph) else size
-        if batch and (len(batch) == _BATCH or own != size):
+            item = {"photograph": shown(str(path), MAX_PLACE), "error": str(error)}
+        if batch and (len(batch) == _BATCH or size != batch_size):
             yield batch
             batch = []
-        batch.append(one)
-        size = own
+        batch.append(item)
+        batch_size = size
     if batch:
         yield batch
 
 
 def _output_names(files: Sequence[Path]) -> list[str]:
-    """A name a file, its own where no other has it."""
+    """A unique name per file: its stem, with a number if another file has that."""
     names: list[str] = []
     for path in files:
         name, k = path.stem, 2
@@ -222,61 +210,45 @@ def _size(run: Trained, photograph: Photograph) -> tuple[int, int]:
     return network_size(height, width, run.plan.width_px * run.plan.height_px)
 
 
-def _cameras(
-    run: Trained, photographs: Sequence[Photograph], hfov_deg: float
-) -> list[tuple[F64, str]]:
-    """Of a network that is told rays: the camera of each, and what says so; else none."""
-    if not run.plan.rays:
-        return []
-    return [camera_of_photograph(one, hfov_deg, run.plan.hfov_deg) for one in photographs]
-
-
-def _camera_facts(photograph: Photograph, camera: F64, said: str) -> dict[str, Any]:
-    half = photograph.colour.shape[1] / 2 / camera[0]
-    return {"hfov_deg": round(math.degrees(2 * math.atan(half)), 1), "camera": said}
-
-
-def _predicted(
-    run: Trained, photographs: Sequence[Photograph], cameras: Sequence[F64]
-) -> Iterator[NDArray[Any]]:
+def _predicted_rows(
+    run: Trained, photographs: Sequence[Photograph], out: Path, hfov_deg: float
+) -> Iterator[dict[str, Any]]:
+    """Write the predictions of photographs of one network size; their rows."""
     if not photographs:
         return
     height, width = _size(run, photographs[0])
     small = np.stack([resized_by_area(p.colour, width, height) for p in photographs])
     sizes = [(int(p.colour.shape[0]), int(p.colour.shape[1])) for p in photographs]
-    scaled = None
-    if cameras:
+    facts: list[dict[str, Any]] = [{} for _ in photographs]
+    scaled: F32 | None = None
+    if run.plan.rays:
+        cameras = [camera_of_photograph(p, hfov_deg, run.plan.hfov_deg) for p in photographs]
+        facts = [_camera_facts(p, *c) for p, c in zip(photographs, cameras, strict=True)]
         factors = np.array([[width / w, height / h] * 2 for h, w in sizes])
-        scaled = (np.stack(cameras) * factors).astype(np.float32)
-    yield from predict(run.network, small, run.task, run.plan, sizes, scaled)
+        scaled = (np.stack([K for K, _ in cameras]) * factors).astype(np.float32)
+    predictions = predict(run.network, small, run.task, run.plan, sizes, scaled)
+    for photograph, prediction, row in zip(photographs, predictions, facts, strict=True):
+        yield _written(run, photograph, prediction, out) | row
+
+
+def _camera_facts(photograph: Photograph, camera: F64, source: str) -> dict[str, Any]:
+    half = photograph.colour.shape[1] / 2 / camera[0]
+    return {"hfov_deg": round(math.degrees(2 * math.atan(half)), 1), "camera": source}
 
 
 def _written(
     run: Trained, photograph: Photograph, prediction: NDArray[Any], out: Path
 ) -> dict[str, Any]:
-    """The files of one photograph; its row."""
-    name, picture = photograph.name, run.task.picture(prediction)
-    kind = file_kind(run.plan)
+    """Write the files of one photograph; its row."""
+    name, task, plan = photograph.name, run.task, run.plan
+    picture, file = task.picture(prediction), f"{name}_{task.file_kind(plan)}.png"
     row: dict[str, Any] = {"photograph": name}
-    if run.task.name == "normals":
-        # From OpenCV's axes to the layer's: x right, y forward, z up.
-        axes = np.stack([prediction[..., 0], prediction[..., 2], -prediction[..., 1]], axis=-1)
-        stored = np.rint((axes.astype(np.float64) + 1) * 65535 / 2).astype(np.uint16)
-        data = layer_bytes(kind, stored)
-    elif run.task.name == "segmentation":
-        names = class_names(run.plan)
-        data = layer_bytes(kind, prediction.astype(np.uint8))
-        counts = np.bincount(prediction.ravel(), minlength=len(names)) / prediction.size
-        named = [k for k in np.argsort(-counts).tolist() if counts[k] >= _LEAST_SHARE and k]
-        row["classes"] = {names[k]: round(float(counts[k]), 4) for k in named}
-    elif run.task.name == "depth":
-        # Layers hold millimetres; what is farther than they can say is the farthest.
-        data = layer_bytes(kind, np.clip(np.rint(prediction * 1000), 1, 65535).astype(np.uint16))
-    else:
-        edges = np.rint(255 * np.clip(np.asarray(prediction, np.float64), 0, 1)).astype(np.uint8)
-        data = png_from_array(edges)
-    file = f"{name}_{kind}.png"
-    (out / file).write_bytes(data)
+    if task.name == "segmentation":
+        names = class_names(plan)
+        shares = np.bincount(prediction.ravel(), minlength=len(names)) / prediction.size
+        common = [k for k in np.argsort(-shares).tolist() if shares[k] >= _LEAST_SHARE and k]
+        row["classes"] = {names[k]: round(float(shares[k]), 4) for k in common}
+    (out / file).write_bytes(png_from_array(task.stored(prediction)))
     (out / f"{name}_shown.png").write_bytes(png_from_array(picture))
     row |= {"file": file, "size": [picture.shape[1], picture.shape[0]]}
     return row | {"tiles": [_url(photograph.colour), _url(picture)]}
@@ -286,19 +258,14 @@ def _url(picture: Srgb8Image) -> str:
     height, width = picture.shape[:2]
     shown_width = min(width, _SHOWN_PX)
     small = resized_by_area(picture, shown_width, max(round(height * shown_width / width), 1))
-    return "data:image/jpeg;base64," + base64.b64encode(jpeg_from_array(small, 88)).decode()
+    return data_url(jpeg_from_array(small, 88), "jpeg")
 
 
 def _page(run: Trained, rows: Sequence[dict[str, Any]]) -> str:
-    """HTML of every photograph beside what is seen in it; every picture is inside it."""
+    """HTML of every photograph beside its prediction, pictures included."""
     from pbrs_farm.gallery.html_page import page
 
     cards = [row | {"classes": row.get("classes", {})} for row in rows if "tiles" in row]
     failed = [row for row in rows if "error" in row]
-    return page(
-        "pbrs_farm.study.judging",
-        "photo_predictions.html",
-        run=run.record,
-        cards=cards,
-        failed=failed,
-    )
+    package, file = "pbrs_farm.study.judging", "photo_predictions.html"
+    return page(package, file, run=run.record, cards=cards, failed=failed)

@@ -1,1 +1,1 @@
-"""Views as torch datasets: from an output root or from shards, in an order that can be resumed."""
+"""Torch datasets of views from an output root or from shards, with a resumable order."""

@@ -1,4 +1,4 @@
-"""A torch IterableDataset of packed shards, with torch and numpy alone. Effects: reads the shards."""
+"""A torch IterableDataset of packed shards. Effects: reads the shards."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from pbrs_farm.views.view_sample import Sample, SampleRequest
 class ShardedViews(IterableDataset):  # type: ignore[misc]
     """The views of a split's shards, as dictionaries of tensors (view_loader.py).
 
-    Ranks and workers part the shards: in an epoch each view comes once, and all parts have equally
-    many (at most one view a part is left out, others each epoch). The order follows from seed,
-    epoch and the number of parts. shuffle False: in the shards' order, every view, none left out.
-    transform: as StoredViews has it, by seed, epoch, shard and the view's place in it.
-    Raises BadInput where shards are missing, truncated, or do not hold what request asks for.
+    Ranks and workers divide the shards: each view comes once per epoch, and all parts are equally
+    long (at most one view per part is dropped, another one each epoch). The order depends on seed,
+    epoch and the number of parts. shuffle False: every view in the order of the shards, none dropped.
+    transform: as in StoredViews; its random numbers depend on seed, epoch, shard and the position.
+    Raises BadInput if shards are missing, truncated or without a requested layer.
     """
 
     def __init__(
@@ -41,44 +41,44 @@ class ShardedViews(IterableDataset):  # type: ignore[misc]
         store = place if not isinstance(place, str | Path) else store_from_url(str(place))
         self.shards = ShardSet(store)
         self.shards.check(self.request)
-        self.own = self.shards.shards_of(split)
+        self.chosen = self.shards.shards_of(split)
         self.shuffle = shuffle
         self.seed = seed
         self.transform = transform
         self.rank, self.world = rank, world
         self.epoch = 0
-        self.n_skipped = 0  # batches of this epoch that were read before
+        self.n_skipped = 0  # batches of this epoch before the start
         self.batch_size = 1
 
     @property
     def n_views(self) -> int:
-        """The views of all ranks together."""
-        return sum(shard.n_views for shard in self.own)
+        """Number of views of all ranks together."""
+        return sum(shard.n_views for shard in self.chosen)
 
     def start_at(self, epoch: int, n_batches: int = 0, batch_size: int = 1) -> None:
-        """Begin with that epoch, behind the batches of it that were read before.
+        """Start in an epoch after some of its batches.
 
-        n_batches: those that a DataLoader of batch_size and as many workers as now handed over.
+        n_batches: counted with a DataLoader of batch_size and the present number of workers.
         """
         self.epoch, self.n_skipped, self.batch_size = epoch, n_batches, batch_size
 
     def samples(self) -> Iterator[Sample]:
-        """This worker's views as arrays, transformed; of the whole rank outside of a DataLoader."""
+        """Transformed views of this worker, or of the whole rank outside of a DataLoader."""
         info = get_worker_info()
         number, n_workers = (info.id, info.num_workers) if info is not None else (0, 1)
-        # A DataLoader takes a batch of each worker in turn: its first goes on where the turn was.
+        # A DataLoader takes one batch of each worker in turn and starts with its first worker.
         worker = (number + self.n_skipped) % n_workers
-        counts = [shard.n_views for shard in self.own]
+        counts = [shard.n_views for shard in self.chosen]
         parts = {"part": self.rank * n_workers + worker, "n_parts": self.world * n_workers}
         if self.shuffle:
             order = shard_order(counts, seed=self.seed, epoch=self.epoch, **parts)
         else:
             order = whole_order(counts, **parts)
         n_read = (self.n_skipped - worker + n_workers - 1) // n_workers * self.batch_size
-        for shard, at in order[max(n_read, 0) :].tolist():
-            sample = self.shards.read_at(self.own[shard], at, self.request)
+        for shard, position in order[max(n_read, 0) :].tolist():
+            sample = self.shards.read_at(self.chosen[shard], position, self.request)
             if self.transform is not None:
-                rng = np.random.default_rng((self.seed, self.epoch, shard, at))
+                rng = np.random.default_rng((self.seed, self.epoch, shard, position))
                 sample = self.transform(sample, rng)
             yield sample
 

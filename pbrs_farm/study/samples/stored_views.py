@@ -1,4 +1,4 @@
-"""A torch Dataset of the views of an output root or of shards, by number. Effects: reads them."""
+"""A torch Dataset of the views of an output root or of shards. Effects: reads them."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from pbrs_farm.views.views import Views
 
 Tensors = dict[str, Any]  # name -> tensor or text
 
-# Changes a sample by chance: (sample, its random numbers) -> sample.
+# Random augmentation: (sample, its generator) -> sample.
 Transform = Callable[[Sample, np.random.Generator], Sample]
 
 
@@ -26,31 +26,30 @@ def tensors_of_sample(sample: Sample) -> Tensors:
     """Tensors by the names of Sample's arrays, and id, house, room, mode, axes as text.
 
     colour (3, H, W) uint8; normal (3, H, W), depth (H, W) and K (3, 3) float32; valid and boundary
-    (H, W) bool; class40 (H, W) uint8; instance (H, W) int32, since torch hardly knows uint16.
+    (H, W) bool; class40 (H, W) uint8; instance (H, W) int32, since torch hardly supports uint16.
     """
     names = ("id", "house", "room", "mode", "axes")
     tensors: Tensors = {name: getattr(sample, name) for name in names}
     tensors["K"] = _tensor(sample.K)
     for name, array in sample.arrays().items():
-        # Channels come first, as torch's convolutions want them.
+        # Torch's convolutions need channels first.
         planes = array.transpose(2, 0, 1) if array.ndim == 3 else array
         tensors[name] = _tensor(planes.astype(np.int32) if name == "instance" else planes)
     return tensors
 
 
 def _tensor(array: NDArray[Any]) -> Any:
-    # Copy where the array is a view of something, or may not be written to.
-    is_own = array.flags.c_contiguous and array.flags.writeable
-    return torch.from_numpy(array if is_own else array.copy(order="C"))
+    # Copy read-only arrays and views of other arrays.
+    is_usable = array.flags.c_contiguous and array.flags.writeable
+    return torch.from_numpy(array if is_usable else array.copy(order="C"))
 
 
 class StoredViews(Dataset):  # type: ignore[misc]
-    """Views by number as dictionaries of tensors (view_loader.py).
+    """Views by index as dictionaries of tensors (view_loader.py).
 
-    place: what pbrs_farm.open takes, or Views. request: layers, mode, axes, size. Views without a
-    file that request needs are left out: `views.left_out` names them. transform: of the numpy
-    Sample, with random numbers that follow from seed, epoch and the view's number alone.
-    Raises BadInput where no view is left.
+    place: an argument of pbrs_farm.open, or Views. request: layers, mode, axes, size. Views without
+    a requested file are skipped and listed in `views.left_out`. transform: of the numpy Sample, with
+    a generator that depends on seed, epoch and the view's index. Raises BadInput if no view remains.
     """
 
     def __init__(
@@ -73,12 +72,12 @@ class StoredViews(Dataset):  # type: ignore[misc]
     def __len__(self) -> int:
         return len(self.views)
 
-    def sample(self, at: int) -> Sample:
-        """The view of that number as arrays, transformed."""
-        sample = self.views[at].sample(self.request)
+    def sample(self, index: int) -> Sample:
+        """The transformed arrays of a view."""
+        sample = self.views[index].sample(self.request)
         if self.transform is None:
             return sample
-        return self.transform(sample, np.random.default_rng((self.seed, self.epoch, at)))
+        return self.transform(sample, np.random.default_rng((self.seed, self.epoch, index)))
 
-    def __getitem__(self, at: int) -> Tensors:
-        return tensors_of_sample(self.sample(at))
+    def __getitem__(self, index: int) -> Tensors:
+        return tensors_of_sample(self.sample(index))

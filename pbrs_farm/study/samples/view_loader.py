@@ -1,8 +1,8 @@
-"""Batches of views, shuffled by seed and epoch, that go on where a state says. Effects: reads views."""
+"""Batches of views, shuffled by seed and epoch, with a state to resume from. Effects: reads views."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 from torch.utils.data import DataLoader
@@ -14,12 +14,12 @@ from pbrs_farm.study.samples.view_order import view_order
 
 
 class ViewLoader:
-    """Iterate over it once for the batches of an epoch; again for those of the next one.
+    """Each iteration yields the batches of one epoch.
 
-    Batches are full: what is left at an epoch's end is dropped. state_dict says how many batches
-    were handed over; a loader that is made alike and given that state hands over the rest of the
-    epoch, the same batches as if it had never stopped. workers: processes that read; 0 for none.
-    rank, world: this process' number and the number of processes of a training (DDP).
+    Batches are full: the rest of an epoch is dropped. state_dict counts the batches so far; a loader
+    with the same arguments and that state yields the rest of the epoch, the same batches as without
+    the stop. workers: reading processes; 0 for none. rank, world: number of this process and of all
+    processes of a training (DDP).
     """
 
     def __init__(
@@ -36,7 +36,7 @@ class ViewLoader:
         self._made = {"batch_size": batch_size, "workers": workers, "seed": seed, "world": world}
         self._rank = rank
         self._epoch = 0
-        self._n_batches = 0  # of this epoch, handed over
+        self._n_batches = 0  # of this epoch so far
         if isinstance(dataset, ShardedViews):
             dataset.seed, dataset.rank, dataset.world = seed, rank, world
             self._n_views = dataset.n_views
@@ -56,11 +56,11 @@ class ViewLoader:
 
     @property
     def epoch(self) -> int:
-        """The epoch that the next batch is of, from 0."""
+        """Epoch of the next batch, from 0."""
         return self._epoch
 
     def state_dict(self) -> dict[str, int]:
-        """How far it is, and how it was made."""
+        """Position and arguments."""
         return {
             "epoch": self._epoch,
             "n_batches": self._n_batches,
@@ -69,7 +69,7 @@ class ViewLoader:
         }
 
     def load_state_dict(self, state: dict[str, int]) -> None:
-        """Go on where state says; BadInput where its loader was made otherwise or had other views."""
+        """Resume from a state; BadInput if its loader had other arguments or other views."""
         for name, value in {**self._made, "n_views": self._n_views}.items():
             if state[name] != value:
                 text = f"was {state[name]} when the run stopped, is {value}"
@@ -79,8 +79,8 @@ class ViewLoader:
     def __iter__(self) -> Iterator[Tensors]:
         epoch = self._epoch
         for batch in self._rest_of_epoch():
-            # Count it before it is used: who has it has read it. Loops that know the length ask for
-            # no batch after the last one.
+            # Count the batch before it is used. Loops that know the length never ask for a batch
+            # after the last one.
             self._n_batches += 1
             if self._n_batches == len(self):
                 self._epoch, self._n_batches = epoch + 1, 0
@@ -90,10 +90,8 @@ class ViewLoader:
     def _rest_of_epoch(self) -> Any:
         dataset, made = self._dataset, self._made
         batch_size = made["batch_size"]
-        options: dict[str, Any] = {"num_workers": made["workers"]}
-        if made["workers"] and _is_remote(dataset):
-            # S3's client does not survive a fork.
-            options["multiprocessing_context"] = "spawn"
+        source = dataset.shards if isinstance(dataset, ShardedViews) else dataset.views.source
+        options = options_of_workers(made["workers"], [source.url])
         if isinstance(dataset, ShardedViews):
             dataset.start_at(self._epoch, self._n_batches, batch_size)
             return DataLoader(dataset, batch_size=batch_size, drop_last=True, **options)
@@ -105,6 +103,10 @@ class ViewLoader:
         return DataLoader(dataset, batch_sampler=batches, **options)
 
 
-def _is_remote(dataset: StoredViews | ShardedViews) -> bool:
-    source = dataset.shards if isinstance(dataset, ShardedViews) else dataset.views.source
-    return source.url.startswith("s3:")
+def options_of_workers(workers: int, urls: Iterable[str]) -> dict[str, Any]:
+    """Options of a DataLoader for reading with some processes from these stores."""
+    options: dict[str, Any] = {"num_workers": workers}
+    if workers and any(url.startswith("s3:") for url in urls):
+        # S3's client does not survive a fork.
+        options["multiprocessing_context"] = "spawn"
+    return options

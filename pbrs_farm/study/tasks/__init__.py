@@ -1,1 +1,1 @@
-"""What each of the three tasks is: its target, loss, prediction, score and baseline."""
+"""The tasks: targets, losses, figures and baselines."""

@@ -1,22 +1,23 @@
-"""Random changes to a batch that leave its labels true: mirror, enlarge, turn, hue, light; no effects."""
+"""Augmentation of a batch with its labels: mirror, rotate, zoom, hue, light, noise."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import pi, sqrt, tan
 
 import torch
 from torch import Tensor
 from torch.nn import functional
 
-from pbrs_farm.study.pixel_rays import mirrored_rays, places_of_rays, rays_at
+from pbrs_farm.study.pixel_rays import mirrored_rays, places_of_rays, rays_at, rays_of_cameras
 from pbrs_farm.study.tasks.study_task import Batch, StudyTask
 from pbrs_farm.study.training_plan import TrainingPlan
 
 
 def augment(batch: Batch, task: StudyTask, plan: TrainingPlan, dice: torch.Generator) -> Batch:
-    """The batch, colour (B, 3, H, W) float 0..1 in it, changed by what dice (on the CPU) draw.
+    """Augment a batch with colour (B, 3, H, W) float 0..1 by random numbers of dice (on the CPU).
 
-    rays (B, H, W, 2), where they are in it, stay those of the pixels (pixel_rays.py).
+    rays (B, H, W, 2), if in the batch, follow the pixels (pixel_rays.py).
     """
     n, device = len(batch["colour"]), batch["colour"].device
 
@@ -45,9 +46,9 @@ def augment(batch: Batch, task: StudyTask, plan: TrainingPlan, dice: torch.Gener
 
 
 def rotate_hue(colour: Tensor, angles: Tensor) -> Tensor:
-    """Colours (B, 3, H, W) turned about the grey axis by angles (B,), radians: other paint, same light."""
+    """Colours (B, 3, H, W) rotated about the grey axis by angles (B,), radians."""
     cos, sin = torch.cos(angles), torch.sin(angles)
-    # Rodrigues' formula about (1, 1, 1) / sqrt(3): three numbers that go round.
+    # Rodrigues' formula about (1, 1, 1) / sqrt(3): a circulant matrix of three numbers.
     same = cos + (1 - cos) / 3
     next_, last = (1 - cos) / 3 - sin / sqrt(3), (1 - cos) / 3 + sin / sqrt(3)
     rows = torch.stack([same, next_, last], 1)
@@ -55,9 +56,8 @@ def rotate_hue(colour: Tensor, angles: Tensor) -> Tensor:
     return torch.einsum("bij,bjhw->bihw", turn, colour).clamp(0, 1)
 
 
-def _relit(colour: Tensor, plan: TrainingPlan, drawn: object) -> Tensor:
-    """Another exposure, tone and white balance."""
-    assert callable(drawn)
+def _relit(colour: Tensor, plan: TrainingPlan, drawn: Callable[..., Tensor]) -> Tensor:
+    """Colours with another exposure, tone and white balance."""
     if plan.gain == plan.gamma == plan.tint == 0:
         return colour
     gain = 1 + plan.gain * (2 * drawn(1, 1, 1) - 1)
@@ -67,9 +67,9 @@ def _relit(colour: Tensor, plan: TrainingPlan, drawn: object) -> Tensor:
 
 
 def _enlarge(batch: Batch, shares: Tensor, shifts: Tensor) -> Batch:
-    """A part of each view at full size: shares (B,) of its width, shifts (B, 2) -1..1 within it.
+    """A crop of each view at full size: shares (B,) of its width, shifts (B, 2) -1..1 within it.
 
-    Directions stay, as if seen by a longer lens.
+    Directions are unchanged, as with a longer lens.
     """
     n, _, height, width = batch["colour"].shape
     theta = torch.zeros((n, 2, 3), device=shares.device)
@@ -81,72 +81,54 @@ def _enlarge(batch: Batch, shares: Tensor, shifts: Tensor) -> Batch:
 
 
 def rotate_cameras(batch: Batch, task: StudyTask, angles: Tensor, hfov_deg: float) -> Batch:
-    """The views as cameras would see them that are pitched up and rolled clockwise by angles (B, 2).
+    """The views of cameras that are pitched up and rolled clockwise by angles (B, 2), radians.
 
-    A turned camera's picture is a homography of the old one, whatever the depth; normals turn with
-    the camera. angles: radians. hfov_deg: of the views, where their rays do not say it. What the old picture does not show has the
-    border's colour and no label.
+    The picture of a rotated camera is a homography of the old one for any depth; normals rotate with
+    the camera. hfov_deg: field of view of views without rays. Pixels outside the old picture have the
+    colour of its border and no label.
     """
-    height, width = batch["colour"].shape[2:]
+    n, _, height, width = batch["colour"].shape
     rotation = _rotations(angles)
     if "rays" in batch:
-        return _turned_by_rays(batch, task, rotation)
-    # Rays through the new pixels, in units of the old picture's half width.
-    half = tan(hfov_deg * pi / 360)
-    x = ((torch.arange(width, device=angles.device) + 0.5) * 2 / width - 1) * half
-    y = (
-        ((torch.arange(height, device=angles.device) + 0.5) * 2 / height - 1)
-        * half
-        * height
-        / width
-    )
-    rays = torch.stack(
-        [x.expand(height, -1), y[:, None].expand(-1, width), x.new_ones(height, width)], -1
-    )
-    old = torch.einsum("bji,hwj->bhwi", rotation, rays)  # by the inverse of what turns directions
-    plane = old[..., :2] / old[..., 2:].clamp(min=1e-3) / half
-    grid = plane * plane.new_tensor([1.0, width / height])
-    return task.turned(_sample_at(batch, grid), rotation)
-
-
-def _turned_by_rays(batch: Batch, task: StudyTask, rotation: Tensor) -> Batch:
-    """rotate_cameras of views that know their rays: a turned camera has those of before."""
-    rays = batch["rays"]
+        rays = batch["rays"]
+    else:
+        f = width / 2 / tan(hfov_deg * pi / 360)
+        camera = angles.new_tensor([f, f, width / 2, height / 2])
+        rays = rays_of_cameras(camera.expand(n, 4), height, width)
     directions = torch.cat([rays, torch.ones_like(rays[..., :1])], -1)
-    old = torch.einsum("bji,bhwj->bhwi", rotation, directions)
+    old = torch.einsum("bji,bhwj->bhwi", rotation, directions)  # by the inverse rotation
     grid = places_of_rays(rays, old[..., :2] / old[..., 2:].clamp(min=1e-3))
-    return task.turned(_sample_at(batch, grid) | {"rays": rays}, rotation)
+    turned = task.turned(_sample_at(batch, grid), rotation)
+    return turned | ({"rays": rays} if "rays" in batch else {})
 
 
 def _rotations(angles: Tensor) -> Tensor:
-    """(B, 3, 3) that take directions of the old camera's axes (x right, y down) to the turned one's."""
+    """(B, 3, 3) from the axes of the old camera (x right, y down) to those of the rotated one."""
     cos, sin = torch.cos(angles), torch.sin(angles)
     one, zero = torch.ones_like(cos[:, 0]), torch.zeros_like(cos[:, 0])
-    # A camera that looks up sees what was ahead lower: z goes to y.
+    # Pitch up moves z to y.
     pitch = [one, zero, zero, zero, cos[:, 0], sin[:, 0], zero, -sin[:, 0], cos[:, 0]]
-    # One that rolls clockwise sees the world turn the other way.
+    # A clockwise roll rotates the picture anticlockwise.
     roll = [cos[:, 1], sin[:, 1], zero, -sin[:, 1], cos[:, 1], zero, zero, zero, one]
     pitched, rolled = (torch.stack(rows, 1).view(-1, 3, 3) for rows in (pitch, roll))
     return rolled @ pitched
 
 
 def _sample_at(batch: Batch, grid: Tensor) -> Batch:
-    """The batch at places of its pictures: grid (B, H, W, 2), -1..1 from edge to edge.
+    """Resample the batch at grid (B, H, W, 2), -1..1 from edge to edge.
 
-    Colour is interpolated, labels are the nearest pixel's, 0 outside.
+    Colour is interpolated, labels take the nearest pixel, or 0 outside.
     """
     n, _, height, width = batch["colour"].shape
     colour = functional.grid_sample(
         batch["colour"], grid, mode="bilinear", padding_mode="border", align_corners=False
     )
-    # Turn the grid into rows and columns of labels.
     columns = ((grid[..., 0] + 1) * width / 2 - 0.5).round().long().clamp(0, width - 1)
     rows = ((grid[..., 1] + 1) * height / 2 - 0.5).round().long().clamp(0, height - 1)
     views = torch.arange(n, device=grid.device).view(-1, 1, 1)
     rays = {"rays": rays_at(batch["rays"], grid)} if "rays" in batch else {}
     pictures = {"colour": colour, **rays}
     labels = {name: x[views, rows, columns] for name, x in batch.items() if name not in pictures}
-    # Beyond the picture nothing is known.
     outside = (grid.abs() > 1).any(-1)
     if outside.any():
         for label in labels.values():

@@ -1,16 +1,14 @@
-"""A training's state as one safetensors file: weights, optimiser, generator, position. Effects: files.
+"""State of a training in one safetensors file: weights, optimiser, generator, position. Effects: files.
 
-The file is written beside and moved over the older one: a process killed meanwhile leaves the
-older one whole.
+A new file replaces the older one in one step, so that a killed process leaves a complete file.
 """
 
 from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
 import torch
 from safetensors import SafetensorError, safe_open
@@ -22,7 +20,7 @@ from pbrs_farm.regular_files import naming_kind
 
 
 def write_tensor_file(path: Path, tensors: Mapping[str, Tensor], metadata: dict[str, str]) -> None:
-    """Write tensors and words about them; the file is whole or not at all."""
+    """Write tensors and metadata; the file is complete or unchanged."""
     plain = {name: tensor.detach().to("cpu").contiguous() for name, tensor in tensors.items()}
     beside = path.with_suffix(".part")
     save_file(plain, beside, metadata)
@@ -30,8 +28,8 @@ def write_tensor_file(path: Path, tensors: Mapping[str, Tensor], metadata: dict[
 
 
 def read_tensor_file(path: Path) -> tuple[dict[str, Tensor], dict[str, str]]:
-    """All tensors of a file, on the CPU, and its words. Raises OSError, ValueError where it is none."""
-    with path.open("rb"):  # the library does not say why a file cannot be opened
+    """Tensors of a file, on the CPU, and its metadata. Raises OSError or ValueError."""
+    with path.open("rb"):  # the library gives no reason for a file that it cannot open
         pass
     try:
         with safe_open(path, framework="pt") as file:
@@ -43,7 +41,7 @@ def read_tensor_file(path: Path) -> tuple[dict[str, Tensor], dict[str, str]]:
 
 @dataclass(frozen=True, slots=True)
 class Position:
-    """Where a training stands, and of which plan, task and views it is."""
+    """Step of a training, and its task, plan, views and seed."""
 
     step: int  # steps done
     task: str
@@ -56,7 +54,7 @@ def save_checkpoint(
     path: Path, network: nn.Module, optimiser: torch.optim.Optimizer, position: Position,
     average: nn.Module | None = None,
 ) -> None:  # fmt: skip
-    """Write all that a training needs to go on to the same weights; average: their running mean."""
+    """Write the whole state of a training; average: running mean of the weights."""
     tensors = {f"model.{name}": tensor for name, tensor in network.state_dict().items()}
     if average is not None:
         tensors |= {f"average.{name}": tensor for name, tensor in average.state_dict().items()}
@@ -69,7 +67,7 @@ def save_checkpoint(
 
 
 def save_weights(path: Path, network: nn.Module, position: Position) -> None:
-    """Write the weights alone: what evaluation and fine-tuning read."""
+    """Write the weights only, for evaluation and fine-tuning."""
     named = {f"model.{name}": tensor for name, tensor in network.state_dict().items()}
     _write_whole(path, named, position)
 
@@ -78,10 +76,9 @@ def load_checkpoint(
     path: Path, network: nn.Module, optimiser: torch.optim.Optimizer | None = None,
     average: nn.Module | None = None,
 ) -> Position:  # fmt: skip
-    """Take the state from a file into the network and, where given, the optimiser (with torch's
-    generator) and the running mean.
+    """Load the state into the network and, if given, the optimiser with torch's generator and the mean.
 
-    Raises BadInput where the file is damaged or of another network.
+    Raises BadInput if the file is damaged or of another network.
     """
     tensors, position = read_tensors(path)
     _into(network, _below(tensors, "model."), path)
@@ -99,14 +96,13 @@ def load_checkpoint(
 
 
 def read_tensors(path: Path) -> tuple[dict[str, Tensor], Position]:
-    """All tensors of a safetensors file, on the CPU, and the position it holds.
+    """Tensors of a checkpoint, on the CPU, and its position; BadInput for any other file.
 
-    Raises BadInput where the file is missing, damaged or no checkpoint of ours. Nothing is executed:
-    safetensors holds no code.
+    Nothing is executed: safetensors has no code.
     """
     try:
-        tensors, words = read_tensor_file(path)
-        return tensors, Position(**json.loads(words["position"]))
+        tensors, metadata = read_tensor_file(path)
+        return tensors, Position(**json.loads(metadata["position"]))
     except FileNotFoundError:
         raise BadInput(path, "", "no such file") from None
     except (OSError, KeyError, TypeError, ValueError):
@@ -115,10 +111,10 @@ def read_tensors(path: Path) -> tuple[dict[str, Tensor], Position]:
 
 
 def _into(network: nn.Module, weights: dict[str, Tensor], path: Path) -> None:
-    own = network.state_dict()
-    wrong = [n for n in own if n not in weights or weights[n].shape != own[n].shape]
-    if wrong or len(own) != len(weights):
-        name = (wrong or sorted(set(weights) - set(own)))[0]
+    state = network.state_dict()
+    wrong = [n for n in state if n not in weights or weights[n].shape != state[n].shape]
+    if wrong or len(state) != len(weights):
+        name = (wrong or sorted(set(weights) - set(state)))[0]
         raise BadInput(path, name, "a checkpoint of another network, task or plan")
     network.load_state_dict(weights)
 
@@ -128,5 +124,5 @@ def _below(tensors: Mapping[str, Tensor], prefix: str) -> dict[str, Tensor]:
 
 
 def _write_whole(path: Path, tensors: dict[str, Tensor], position: Position) -> None:
-    row: dict[str, Any] = {name: getattr(position, name) for name in position.__slots__}
-    write_tensor_file(path, tensors, {"position": json.dumps(row, sort_keys=True)})
+    text = json.dumps(asdict(position), sort_keys=True)
+    write_tensor_file(path, tensors, {"position": text})

@@ -1,6 +1,6 @@
-"""Metrics of a training sent to TensorBoard or Weights & Biases as they are made. Effects: theirs.
+"""Metrics of a training in TensorBoard or Weights & Biases. Effects: theirs.
 
-A row of metrics.jsonl is a point of each of its values' curves, at the row's step.
+Each row of metrics.jsonl adds a point to the curve of each value, at the row's step.
 """
 
 from __future__ import annotations
@@ -18,31 +18,31 @@ from pbrs_farm.study.training.training_loop import Observer, share_of_process
 
 @contextmanager
 def loggers(names: Sequence[str], out: Path, config: dict[str, Any]) -> Iterator[Observer]:
-    """An observer for `train` that hands each row to every program that is named (tensorboard, wandb); closed behind it.
+    """Context with an observer for `train` that sends each row to these programs (tensorboard, wandb).
 
-    out: the run's folder, which a run is called by; TensorBoard's events go below out/tensorboard,
-    W&B's files below out/wandb. config: what W&B shows of the plan. W&B's own environment holds
-    (WANDB_MODE=offline, WANDB_PROJECT). Raises MachineFailed where a package is missing.
+    out: folder and name of the run; events of TensorBoard are in out/tensorboard, files of W&B in
+    out/wandb. config: the plan, for W&B. W&B's environment applies (WANDB_MODE=offline,
+    WANDB_PROJECT). Raises MachineFailed if a package is missing.
 
     Example:
         >>> with loggers(["tensorboard"], job.out, {}) as observe:  # doctest: +SKIP
         ...     train(job, views, observe=observe)
     """
-    # Of several processes of torchrun the first one tells.
+    # Only the first process of torchrun logs.
     names = names if share_of_process().is_first else ()
     check_installed(names)
     with ExitStack() as stack:
-        heard = [stack.enter_context(_OPENED[name](out, config)) for name in names]
+        observers = [stack.enter_context(_OPENED[name](out, config)) for name in names]
 
         def observe(row: dict[str, float]) -> None:
-            for one in heard:
-                one(row)
+            for observer in observers:
+                observer(row)
 
         yield observe
 
 
 def check_installed(names: Sequence[str]) -> None:
-    """Raise MachineFailed for the first of these programs whose package is missing."""
+    """Raise MachineFailed if the package of one of these programs is missing."""
     for name in names:
         if find_spec(name) is None:
             raise MachineFailed(f"--log {name}: not installed", hint=install_command(name))
@@ -55,8 +55,8 @@ def _tensorboard(out: Path, config: dict[str, Any]) -> Iterator[Observer]:
     with SummaryWriter(str(out / "tensorboard")) as writer:
 
         def observe(row: dict[str, float]) -> None:
-            for name, value in _values(row).items():
-                writer.add_scalar(name, value, int(row["step"]))
+            for name in row.keys() - {"step"}:
+                writer.add_scalar(name, row[name], int(row["step"]))
 
         yield observe
 
@@ -67,13 +67,9 @@ def _wandb(out: Path, config: dict[str, Any]) -> Iterator[Observer]:
 
     out.mkdir(parents=True, exist_ok=True)
     with wandb.init(name=out.name, dir=str(out), config=config) as run:
-        # Losses and errors of one step come in two rows: W&B's own count goes on between them.
+        # Losses and errors of one step come in two rows; W&B would count them as two steps.
         run.define_metric("*", step_metric="step")
         yield run.log
-
-
-def _values(row: dict[str, float]) -> dict[str, float]:
-    return {name: value for name, value in row.items() if name != "step"}
 
 
 _OPENED: Final = {"tensorboard": _tensorboard, "wandb": _wandb}

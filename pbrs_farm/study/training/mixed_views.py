@@ -1,14 +1,14 @@
-"""Views that train with a share of each batch from photographs; no effects of its own.
+"""Views with a share of each batch from photographs.
 
-Which views and which photographs a step takes is a function of the step and the seed alone, as
-without a mixture: a killed run goes on to the same weights.
+The views and photographs of a step depend on the step and the seed only, so that a killed run
+resumes to the same weights.
 """
 
 from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import floor
 
 import numpy as np
@@ -19,91 +19,79 @@ from pbrs_farm.study.training_plan import TrainingPlan
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class MixedViews:
-    """Views, and sets of photographs with the share of each batch that they have."""
+class MixedViews(TrainingViews):
+    """Views, and sets of photographs, each with its share of a batch.
+
+    All but `digest` and `batches` is that of the views alone.
+    """
 
     views: TrainingViews
     photographs: tuple[tuple[ViewArrays, float], ...]
+    ids: tuple[str, ...] = field(init=False)
 
-    @property
-    def ids(self) -> tuple[str, ...]:
-        """Of the views."""
-        return self.views.ids
-
-    @property
-    def homes(self) -> tuple[str, ...]:
-        """Of the views."""
-        return self.views.homes
-
-    def __len__(self) -> int:
-        return len(self.views)
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "ids", self.views.ids)
 
     def digest(self) -> str:
-        """First 16 hex of the sha256 over the sets' own and their shares."""
+        """First 16 hex digits of the sha256 over the digests of the sets and their shares."""
         parts = [self.views.digest()]
         parts += [f"{photographs.digest()} {share}" for photographs, share in self.photographs]
         return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:16]
 
     def some(self, most: int) -> TrainingViews:
-        """At most so many views, without photographs."""
         return self.views.some(most)
 
     def decoded(self, most: int) -> ViewArrays:
-        """At most so many views in memory, without photographs."""
         return self.views.decoded(most)
 
     def order(self, batch: int, seed: int) -> BatchOrder:
-        """That of the views alone."""
         return self.views.order(batch, seed)
 
     def read(self, rows: Iterable[NDArray[np.intp]]) -> Iterator[BatchRead]:
-        """Views alone."""
         return self.views.read(rows)
 
     def batches(
-        self, steps: range, plan: TrainingPlan, seed: int, own: slice
+        self, steps: range, plan: TrainingPlan, seed: int, rows: slice
     ) -> Iterator[BatchRead]:
-        """The batch of each step, photographs first; own: which rows of it."""
+        """The batch of each step, photographs first; rows: those of this process."""
         sets = [*(photographs for photographs, _ in self.photographs), self.views]
-        orders = [one.order(plan.batch, seed + 1 + k) for k, one in enumerate(sets[:-1])]
+        orders = [views.order(plan.batch, seed + 1 + k) for k, views in enumerate(sets[:-1])]
         orders.append(self.views.order(plan.batch, seed))
-        # A set is asked for the steps that take something of it, in their order.
         reads = [
-            one.read(self._own_rows(steps, order, plan, own, k))
-            for k, (one, order) in enumerate(zip(sets, orders, strict=True))
+            views.read(self._rows_of_set(k, steps, order, plan, rows))
+            for k, (views, order) in enumerate(zip(sets, orders, strict=True))
         ]
         for step in steps:
-            n_own = [len(part) for part in self._parts(step, plan, own)]
-            yield _joined([next(read) for read, n in zip(reads, n_own, strict=True) if n])
+            counts = [len(part) for part in self._parts(step, plan, rows)]
+            yield _joined([next(read) for read, n in zip(reads, counts, strict=True) if n])
 
-    def _own_rows(
-        self, steps: range, order: BatchOrder, plan: TrainingPlan, own: slice, k: int
+    def _rows_of_set(
+        self, k: int, steps: range, order: BatchOrder, plan: TrainingPlan, rows: slice
     ) -> Iterator[NDArray[np.intp]]:
+        """Indices into the k-th set, for the steps that have any."""
         for step in steps:
-            part = self._parts(step, plan, own)[k]
+            part = self._parts(step, plan, rows)[k]
             if len(part):
-                first = self._taken(step, plan.batch)[k]
-                rows = order.between(first, self._taken(step + 1, plan.batch)[k])
-                yield rows[part]
+                first, end = (self._taken(s, plan.batch)[k] for s in (step, step + 1))
+                yield order.between(first, end)[part]
 
-    def _parts(self, step: int, plan: TrainingPlan, own: slice) -> list[NDArray[np.intp]]:
-        """Which of each set's rows of a step this process has, by their place among the set's."""
+    def _parts(self, step: int, plan: TrainingPlan, rows: slice) -> list[NDArray[np.intp]]:
+        """The rows of this process within each set's share of the batch."""
         before, after = self._taken(step, plan.batch), self._taken(step + 1, plan.batch)
         counts = [b - a for a, b in zip(before, after, strict=True)]
-        of_set = np.repeat(np.arange(len(counts)), counts)[own]
-        at = np.concatenate([np.arange(n) for n in counts])[own]
-        return [at[of_set == k] for k in range(len(counts))]
+        of_set = np.repeat(np.arange(len(counts)), counts)[rows]
+        positions = np.concatenate([np.arange(n) for n in counts])[rows]
+        return [positions[of_set == k] for k in range(len(counts))]
 
     def _taken(self, step: int, batch: int) -> list[int]:
-        """How many of each set the steps before this one have taken: shares hold over many steps."""
-        # A little is added, so that .2 of five rows is one, whatever its last bit says.
+        """Number of items of each set in the steps before this one; shares hold in the long run."""
+        # The small term keeps .2 of five rows at one, whatever the rounding.
         of_photographs = [floor(step * batch * share + 1e-9) for _, share in self.photographs]
         return [*of_photographs, step * batch - sum(of_photographs)]
 
 
 def _joined(reads: Sequence[BatchRead]) -> BatchRead:
     """The rows of several reads as one batch."""
-    ids = [at for own, _ in reads for at in own]
-    return ids, {
-        name: np.concatenate([arrays[name] for _, arrays in reads]) for name in reads[-1][1]
-    }
+    ids = [id for part, _ in reads for id in part]
+    names = reads[-1][1]
+    return ids, {name: np.concatenate([arrays[name] for _, arrays in reads]) for name in names}

@@ -1,4 +1,4 @@
-"""Optimisers as a plan names them, with the rates of layers apart; no effects."""
+"""Optimisers of a plan, with separate rates for some layers."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from pbrs_farm.study.training_plan import TrainingPlan
 
 
 def optimiser_of(network: nn.Module, plan: TrainingPlan) -> torch.optim.Optimizer:
-    """The optimiser; groups carry "scale", what their rate is of the plan's."""
+    """The optimiser; "scale" of a group is its rate as a multiple of the plan's."""
     groups = _released_groups(network, plan) if plan.released_rates else _groups(network, plan)
     if plan.optimiser == "rmsprop":
         return torch.optim.RMSprop(groups, lr=plan.rate, alpha=plan.alpha, eps=plan.epsilon)
@@ -23,13 +23,13 @@ def optimiser_of(network: nn.Module, plan: TrainingPlan) -> torch.optim.Optimize
 
 
 def set_rate(optimiser: torch.optim.Optimizer, rate: float) -> None:
-    """Give every group its share of the rate."""
+    """Set the rate of every group."""
     for group in optimiser.param_groups:
         group["lr"] = rate * group["scale"]
 
 
 def _groups(network: nn.Module, plan: TrainingPlan) -> list[dict[str, Any]]:
-    """Weights decay; biases and the two numbers of each normalisation do not."""
+    """Two groups: weights with decay; biases and normalisation without."""
     named = [p for p in network.parameters() if p.requires_grad]
     return [
         {"params": [p for p in named if p.ndim > 1], "weight_decay": plan.weight_decay, "scale": 1},
@@ -38,7 +38,7 @@ def _groups(network: nn.Module, plan: TrainingPlan) -> list[dict[str, Any]]:
 
 
 def _released_groups(network: nn.Module, plan: TrainingPlan) -> list[dict[str, Any]]:
-    """HED's released rates: biases twice their weights', without decay."""
+    """HED's released rates; biases have twice the rate of their weights and no decay."""
     if not isinstance(network, EdgeHed):
         return _groups(network, plan)
     *early, last = network.stages
@@ -59,17 +59,17 @@ def _released_groups(network: nn.Module, plan: TrainingPlan) -> list[dict[str, A
 
 
 def running_mean(network: nn.Module, plan: TrainingPlan) -> AveragedModel | None:
-    """The exponential mean over steps of weights and of what normalisation knows; None without one.
+    """Exponential mean over steps of weights and normalisation statistics; None without plan.average.
 
-    A step keeps plan.average of it, and less in the first steps ((1 + n) / (10 + n) after n of them),
-    so that random first weights are soon forgotten.
+    The decay is plan.average, but (1 + n) / (10 + n) in the first steps, after n of them, so that
+    random first weights fade quickly.
     """
     if not plan.average:
         return None
 
     def mean(older: Tensor, newer: Tensor, n_averaged: Tensor | int) -> Tensor:
         n = int(n_averaged)
-        kept = min(plan.average, (1 + n) / (10 + n))
-        return kept * older + (1 - kept) * newer
+        decay = min(plan.average, (1 + n) / (10 + n))
+        return decay * older + (1 - decay) * newer
 
     return AveragedModel(network, avg_fn=mean, use_buffers=True)

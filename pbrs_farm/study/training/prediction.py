@@ -1,4 +1,4 @@
-"""A network's predictions of views, and what they score; torch, no other effects."""
+"""Predictions of a network and their figures, and its export to ONNX. Effects: write_onnx writes."""
 
 from __future__ import annotations
 
@@ -24,19 +24,19 @@ from pbrs_farm.study.tasks.study_task import Arrays, StudyTask
 from pbrs_farm.study.training.training_views import ViewArrays
 from pbrs_farm.study.training_plan import TrainingPlan
 
-_BATCH = 16
+_BATCH = 16  # pictures per forward pass
 
 
 @dataclass(frozen=True, slots=True)
 class Judged:
-    """Figures over all views, and each view's own error in their order (NaN without truth)."""
+    """Figures over all views, and the error of each view in order (NaN without truth)."""
 
     figures: dict[str, float]
     errors: tuple[float, ...]
 
 
 def device_of(plan: TrainingPlan) -> torch.device:
-    """Where the plan runs; MachineFailed where it asks for a GPU and there is none."""
+    """Device of the plan; MachineFailed if the plan needs a GPU and torch finds none."""
     has_gpu = torch.cuda.is_available()
     if plan.device == "cuda" and not has_gpu:
         text = f"plan {plan.name} asks for a GPU, and torch {torch.__version__} finds none"
@@ -45,10 +45,7 @@ def device_of(plan: TrainingPlan) -> torch.device:
 
 
 def move_to_device(network: nn.Module, plan: TrainingPlan) -> nn.Module:
-    """The network on the plan's device, in channels-last memory format.
-
-    The module itself is moved (as `nn.Module.to`) and returned.
-    """
+    """Move the network itself to the plan's device and memory format; the network."""
     network = network.to(device_of(plan))
     return network.to(memory_format=torch.channels_last) if plan.channels_last else network
 
@@ -57,10 +54,10 @@ def predict(
     network: nn.Module, colour: NDArray[np.uint8], task: StudyTask, plan: TrainingPlan,
     sizes: Sequence[tuple[int, int]] = (), cameras: F32 | None = None,
 ) -> Iterator[NDArray[Any]]:  # fmt: skip
-    """A prediction of each picture of colour (N, H, W, 3), in order. The network's mode is restored.
+    """Predictions of the pictures in colour (N, H, W, 3), in order. The network's mode is restored.
 
-    sizes: (height, width) of each prediction, that outputs are interpolated to; none = as colour.
-    cameras: (N, 4) fx, fy, cx, cy at colour's size, of a plan with `rays`: BadInput without.
+    sizes: (height, width) of each prediction, by default that of colour.
+    cameras: (N, 4) fx, fy, cx, cy at colour's size, required by plans with `rays`.
     """
     if plan.rays and cameras is None:
         text = "the network is told each pixel's ray, and these pictures have no camera"
@@ -69,77 +66,76 @@ def predict(
     network.eval()
     device = next(network.parameters()).device
     try:
-        for at in range(0, len(colour), _BATCH):
-            pictures = torch.from_numpy(colour[at : at + _BATCH]).to(device)
+        for first in range(0, len(colour), _BATCH):
+            batch = slice(first, first + _BATCH)
+            pictures = torch.from_numpy(colour[batch]).to(device)
             rays = None
             if plan.rays and cameras is not None:
-                own = torch.from_numpy(cameras[at : at + _BATCH]).to(device)
-                rays = rays_of_cameras(own, *colour.shape[1:3])
+                batch_cameras = torch.from_numpy(cameras[batch]).to(device)
+                rays = rays_of_cameras(batch_cameras, *colour.shape[1:3])
             with torch.no_grad(), torch.autocast(device.type, torch.bfloat16, enabled=plan.bf16):
                 output = network_output(network, as_colour(pictures), plan, rays).float()
-            wanted = sizes[at : at + _BATCH]
-            if all(size == tuple(output.shape[-2:]) for size in wanted):
+            if all(size == tuple(output.shape[-2:]) for size in sizes[batch]):
                 yield from task.predictions(output)
                 continue
-            # Enlarge one by one: photographs may differ in size.
-            for one, size in zip(output, wanted, strict=True):
-                large = functional.interpolate(
-                    one[None], size, mode="bilinear", align_corners=False
-                )
-                yield from task.predictions(large)
+            # Photographs differ in size: enlarge each map alone.
+            for single, size in zip(output, sizes[batch], strict=True):
+                yield from task.predictions(_enlarged(single[None], size))
     finally:
         network.train(was_training)
+
+
+def _enlarged(x: torch.Tensor, size: tuple[int, int]) -> torch.Tensor:
+    return functional.interpolate(x, size, mode="bilinear", align_corners=False)
 
 
 def network_output(
     network: nn.Module, colour: torch.Tensor, plan: TrainingPlan, rays: torch.Tensor | None = None
 ) -> torch.Tensor:
-    """The network's map of colour (B, 3, H, W) 0..1, at that size; enlarged between where the plan says.
+    """Output of the network for colour (B, 3, H, W) 0..1 at that size; plan.enlarge applies.
 
-    rays: (B, H, W, 2) of each pixel, of a plan with `rays`.
+    rays: (B, H, W, 2) of each pixel, in plans with `rays`.
     """
-    size = colour.shape[-2:]
+    height, width = colour.shape[-2:]
     colour = encode_colour(colour, plan.encoding)
     if rays is not None:
         colour = torch.cat([colour, ray_channels(rays)], 1)
     if plan.enlarge == 1:
         return network(colour)
-    large = functional.interpolate(
-        colour, scale_factor=plan.enlarge, mode="bilinear", align_corners=False
-    )
-    return functional.adaptive_avg_pool2d(network(large), size)
+    large = _enlarged(colour, (plan.enlarge * height, plan.enlarge * width))
+    return functional.adaptive_avg_pool2d(network(large), (height, width))
 
 
 class _Whole(nn.Module):  # type: ignore[misc]
-    """What network_output is, as a module: colour (1, 3, H, W) 0..1, rays (1, H, W, 2) -> (1, C, H, W)."""
+    """network_output as a module: colour (1, 3, H, W) 0..1, rays (1, H, W, 2) -> (1, C, H, W)."""
 
     def __init__(self, network: nn.Module, plan: TrainingPlan) -> None:
         super().__init__()
         self.network, self.plan = network, plan
 
     def forward(self, colour: torch.Tensor, rays: torch.Tensor | None = None) -> torch.Tensor:
-        """The map at the picture's size."""
+        """Output at the size of the picture."""
         return network_output(self.network, colour, self.plan, rays)
 
 
 def write_onnx(network: nn.Module, plan: TrainingPlan, path: Path) -> None:
     """Write the network as ONNX: input colour (1, 3, H, W) float 0..1 at the plan's size, output map.
 
-    The colour's encoding is inside. The map is (1, C, H, W): a normal (x right, y down, z forward, of
-    no particular length), a score a class (channel 0 is class 1), edges, or the logarithm of metres.
-    A plan with `rays` has a second input of that name, (1, H, W, 2): x and y of each pixel's direction
-    (x, y, 1), x right, y down. Raises MachineFailed without the packages that export.
+    The encoding of colour is included. The map is (1, C, H, W): a normal (x right, y down, z forward,
+    of any length), a score per class (channel 0 is class 1), edges, or the logarithm of metres. Plans
+    with `rays` have a second input of that name, (1, H, W, 2): x and y of each pixel's direction
+    (x, y, 1), x right, y down. Raises MachineFailed without onnx and onnxscript.
     """
     missing = [name for name in ("onnx", "onnxscript") if find_spec(name) is None]
     if missing:
         raise MachineFailed(f"ONNX needs {missing[0]}", hint=install_command("study"))
     whole = _Whole(network, plan).cpu().float().eval()
-    given = [torch.zeros(1, 3, plan.height_px, plan.width_px)]
-    given += [torch.zeros(1, plan.height_px, plan.width_px, 2)] if plan.rays else []
+    inputs = [torch.zeros(1, 3, plan.height_px, plan.width_px)]
+    inputs += [torch.zeros(1, plan.height_px, plan.width_px, 2)] if plan.rays else []
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of what the exporter itself will do otherwise one day
+        warnings.simplefilter("ignore")  # deprecations within the exporter
         program = torch.onnx.export(
-            whole, tuple(given), dynamo=True, input_names=["colour", "rays"][: len(given)],
+            whole, tuple(inputs), dynamo=True, input_names=["colour", "rays"][: len(inputs)],
             output_names=["map"],
             verbose=False,
         )  # fmt: skip
@@ -154,15 +150,9 @@ def as_colour(pictures: torch.Tensor) -> torch.Tensor:
 def judge_views(
     network: nn.Module, views: ViewArrays, task: StudyTask, plan: TrainingPlan
 ) -> Judged:
-    """How good the network is on views."""
+    """Figures of the network on views."""
     predictions = predict(network, views.colour, task, plan, cameras=views.cameras)
-    return score_predictions(predictions, (views.target(k) for k in range(len(views))), task, plan)
-
-
-def judge_baseline(baseline: F32, views: ViewArrays, task: StudyTask, plan: TrainingPlan) -> Judged:
-    """How good the same prediction for every view is."""
-    targets = (views.target(k) for k in range(len(views)))
-    return score_predictions((baseline for _ in views.ids), targets, task, plan)
+    return score_predictions(predictions, views.all_targets(), task, plan)
 
 
 def score_predictions(
@@ -171,7 +161,7 @@ def score_predictions(
     task: StudyTask,
     plan: TrainingPlan,
 ) -> Judged:
-    """How good predictions are, each of the size of its truth."""
+    """Figures of predictions, each at the size of its truth."""
     scorer = task.scorer(plan)
     errors = tuple(scorer.add(p, truth) for p, truth in zip(predictions, truths, strict=True))
     return Judged(scorer.figures(), errors)

@@ -1,4 +1,4 @@
-"""One training from views to figures, finished or to be gone on with. Effects: the run's folder."""
+"""A training from views to figures, resumed if it was killed. Effects: the run's folder."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import os
 import platform
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 import torch
@@ -16,7 +16,7 @@ from pbrs_farm.core.errors import PbrsError
 from pbrs_farm.study.networks.initial_weights import start_from
 from pbrs_farm.study.networks.network_choice import n_weights, network_of
 from pbrs_farm.study.tasks.tasks import task_of
-from pbrs_farm.study.training.prediction import device_of, judge_baseline, judge_views
+from pbrs_farm.study.training.prediction import device_of, judge_views, score_predictions
 from pbrs_farm.study.training.run_folder import FAILED, FINISHED, RunFolder
 from pbrs_farm.study.training.training_curves import curves_svg, smooth_curve
 from pbrs_farm.study.training.training_loop import (
@@ -30,38 +30,38 @@ from pbrs_farm.study.training.training_loop import (
 from pbrs_farm.study.training.training_views import TrainingViews, ViewArrays
 from pbrs_farm.study.training_plan import TrainingPlan, plan_as_json
 
-_CURVE_THRESHOLDS = 9
+CURVE_THRESHOLDS: Final = 9  # number of thresholds for boundaries during training
 
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """What is trained, from what, and where it goes."""
+    """Arguments of a training."""
 
     plan: TrainingPlan
     out: Path
     seed: int = 0
     mode: str = "mlt_il_ol"  # lighting of the pictures
-    source: str = ""  # where the views come from, in words
-    init: str = "none"  # none, vgg16.pth, hed, or a run's folder
-    stop_on: str = ""  # the judge that chooses the weights; "" = those of the last step
-    facts: dict[str, Any] = field(default_factory=dict)  # more of the record
+    source: str = ""  # places of the views
+    init: str = "none"  # an argument of start_from
+    stop_on: str = ""  # error whose minimum selects the weights; "" = last step
+    facts: dict[str, Any] = field(default_factory=dict)  # more fields of the record
 
 
 def train(
     job: Job, views: TrainingViews, held_out: ViewArrays | None = None,
     observe: Observer = lambda _row: None, also: Judge = lambda _network: {},
 ) -> dict[str, Any]:  # fmt: skip
-    """Train, judge, and say so in the folder; the figures. A finished run is not trained again.
+    """Train and write weights, figures and curves; the figures. A finished run is not trained again.
 
-    also: errors by name that are asked for each plan.judge_every steps beside our own. Raises what
-    the loop raises; the folder then says that the run failed, and why.
+    also: further errors by name, evaluated each plan.judge_every steps. Errors of the loop are raised
+    and written to the record.
     """
     folder, plan = RunFolder(job.out), job.plan
     device_of(plan)
     share = share_of_process()
     if plan.threads > 0:
         torch.set_num_threads(plan.threads)
-    # Draw the weights, then lay over them what the run starts from.
+    # Draw random weights, then replace those that job.init has.
     task = task_of(plan.task)
     torch.manual_seed(job.seed)
     network = network_of(plan.network, task.n_out(plan), rays=plan.rays)
@@ -95,18 +95,16 @@ def train(
 def _faster(
     folder: RunFolder, network: torch.nn.Module, views: TrainingViews, plan: TrainingPlan, share: Share
 ) -> tuple[TrainingPlan, dict[str, Any]]:  # fmt: skip
-    """The plan with bfloat16 where that was asked for and is the faster, and what was measured.
+    """The plan with bfloat16 only if that is faster here, and the measured times.
 
-    A run that goes on keeps what it began with. GPUs and several processes follow the plan.
+    A resumed run keeps its arithmetic. GPUs and several processes follow the plan.
     """
     if not plan.bf16 or share.of > 1 or device_of(plan).type != "cpu":
         return plan, {}
-    older = folder.record() if (folder.root / "run.json").exists() else {}
-    seconds = (
-        older.get("seconds_a_step")
-        if older
-        else seconds_a_step(network, views, task_of(plan.task), plan)
-    )
+    if (folder.root / "run.json").exists():
+        seconds = folder.record().get("seconds_a_step")
+    else:
+        seconds = seconds_a_step(network, views, task_of(plan.task), plan)
     if seconds is None:
         return plan, {}
     return replace(plan, bf16=seconds["bfloat16"] < seconds["float32"]), {"seconds_a_step": seconds}
@@ -115,8 +113,8 @@ def _faster(
 def _record(
     job: Job, views: TrainingViews, held_out: ViewArrays | None, origin: dict[str, str]
 ) -> dict[str, Any]:
-    held = held_out.homes if held_out else ()
-    # How often it is asked changes what is chosen.
+    held_out_homes = list(held_out.homes) if held_out else []
+    # The selected weights depend on the interval.
     stop = f"{job.stop_on}, each {job.plan.judge_every} steps" if job.stop_on else ""
     return {
         **({"stop_on": stop} if stop else {}),
@@ -128,7 +126,7 @@ def _record(
         "init": job.init,
         "init_origin": origin,
         "views": {"train": len(views), "held_out": len(held_out) if held_out else 0},
-        "homes": {"train": list(views.homes), "held_out": list(held)},
+        "homes": {"train": list(views.homes), "held_out": held_out_homes},
         "views_digest": views.digest(),
         "truth": task_of(job.plan.task).truth,
         "versions": {
@@ -142,7 +140,7 @@ def _record(
 
 
 def _machine(plan: TrainingPlan) -> str:
-    """What does the work: the GPU's name, or the processor's kind; and how many cores there are."""
+    """Name of the GPU, or kind of the processor, and the number of cores."""
     device = device_of(plan)
     name = torch.cuda.get_device_name(device) if device.type == "cuda" else platform.machine()
     return f"{name}, {os.cpu_count()} cores"
@@ -151,8 +149,8 @@ def _machine(plan: TrainingPlan) -> str:
 def _judge_of_curve(
     views: TrainingViews, held_out: ViewArrays | None, plan: TrainingPlan, also: Judge
 ) -> Judge:
-    """Errors on a few training and held-out views; of lines at fewer thresholds, for speed."""
-    task = task_of(plan.task, _CURVE_THRESHOLDS)
+    """Function from a network to its errors on a few training and held-out views."""
+    task = task_of(plan.task, CURVE_THRESHOLDS)
     parts: dict[str, ViewArrays] = {}
 
     def judge(network: torch.nn.Module) -> dict[str, float]:
@@ -160,11 +158,11 @@ def _judge_of_curve(
             parts["train_error"] = views.decoded(plan.judge_views)
             if held_out:
                 parts["held_out_error"] = held_out.some(plan.judge_views)
-        own = {
+        errors = {
             name: task.error(judge_views(network, part, task, plan).figures)
             for name, part in parts.items()
         }
-        return own | also(network)
+        return errors | also(network)
 
     return judge
 
@@ -173,25 +171,25 @@ def _judge(
     network: torch.nn.Module, views: TrainingViews, held_out: ViewArrays | None, plan: TrainingPlan,
     folder: RunFolder,
 ) -> dict[str, Any]:  # fmt: skip
-    """Figures on training and held-out views, of the network and of the baseline."""
+    """Figures of the network and of the baseline on training and held-out views."""
     task = task_of(plan.task)
-    seen = views.decoded(plan.final_views)
-    # The baseline knows every training view that is in memory.
-    known = views if isinstance(views, ViewArrays) else seen
-    name, baseline = task.baseline([known.target(k) for k in range(len(known))], plan)
-    np.save(folder.baseline, baseline)
-    parts = {"train": seen}
+    parts = {"train": views.decoded(plan.final_views)}
     if held_out:
         parts["held_out"] = held_out.some(plan.final_views)
+    # The baseline uses all training views in memory.
+    known_views = views if isinstance(views, ViewArrays) else parts["train"]
+    name, baseline = task.baseline(known_views.all_targets(), plan)
+    np.save(folder.baseline, baseline)
+
+    def of_baseline(part: ViewArrays) -> dict[str, float]:
+        constant = (baseline for _ in part.ids)
+        return score_predictions(constant, part.all_targets(), task, plan).figures
+
     return {
         "baseline_name": name,
-        "views": {at: len(part) for at, part in parts.items()},
-        "network": {
-            at: judge_views(network, part, task, plan).figures for at, part in parts.items()
-        },
-        "baseline": {
-            at: judge_baseline(baseline, part, task, plan).figures for at, part in parts.items()
-        },
+        "views": {key: len(part) for key, part in parts.items()},
+        "network": {k: judge_views(network, p, task, plan).figures for k, p in parts.items()},
+        "baseline": {key: of_baseline(part) for key, part in parts.items()},
     }
 
 

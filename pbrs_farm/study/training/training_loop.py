@@ -1,7 +1,7 @@
 """The training loop: batches, loss, optimiser, checkpoints. Effects: the run's folder.
 
-Everything random is drawn from the seed and the step, so that a run which was killed goes on to the
-same weights. Under torchrun each process takes its share of every batch (DDP).
+All random numbers depend on the seed and the step, so that a killed run resumes to the same weights.
+Under torchrun each process takes its share of every batch (DDP).
 """
 
 from __future__ import annotations
@@ -33,33 +33,33 @@ from pbrs_farm.study.training.run_folder import RunFolder, plan_digest
 from pbrs_farm.study.training.training_views import CAMERA, BatchRead, TrainingViews
 from pbrs_farm.study.training_plan import TrainingPlan, rate_at
 
-_TIMED_STEPS: Final = 2  # of each arithmetic; the first makes what others find made
+_TIMED_STEPS: Final = 2  # steps timed for each arithmetic; the first one warms up
 Observer = Callable[[dict[str, float]], None]
-Judge = Callable[[nn.Module], dict[str, float]]  # errors of the network as it is, by name
+Judge = Callable[[nn.Module], dict[str, float]]  # errors of the present network by name
 
 
 class LossFailed(PbrsError):
-    """The loss is no finite number any more."""
+    """The loss became infinite or NaN."""
 
 
 @dataclass(frozen=True, slots=True)
 class Share:
-    """Which process of how many this one is."""
+    """Number of this process, and of all processes."""
 
     rank: int = 0
     of: int = 1
 
     @property
     def is_first(self) -> bool:
-        """The one that writes files."""
+        """True for the process that writes files."""
         return self.rank == 0
 
 
 def share_of_process() -> Share:
-    """As torchrun's environment says; begins the process group where there are several."""
+    """Share from torchrun's environment; initialises the group of several processes."""
     share = Share(int(os.environ.get("RANK", "0")), int(os.environ.get("WORLD_SIZE", "1")))
     if share.of > 1 and not torch.distributed.is_initialized():
-        # NCCL joins GPUs, Gloo processes without one.
+        # NCCL for GPUs, Gloo otherwise.
         on_gpu = torch.cuda.is_available()
         if on_gpu:
             torch.cuda.set_device(int(os.environ.get("LOCAL_RANK", "0")))
@@ -71,35 +71,34 @@ def train_network(
     network: nn.Module, views: TrainingViews, task: StudyTask, plan: TrainingPlan, *, seed: int,
     folder: RunFolder, observe: Observer, judge: Judge, share: Share, stop_on: str = "",
 ) -> nn.Module:  # fmt: skip
-    """Train from the folder's checkpoint, or from the network's own weights; writes weights last.
+    """Train from the folder's checkpoint, or from the network's weights; writes the weights at the end.
 
-    observe: hears each row of the metrics. judge: asked each plan.judge_every steps; what it says
-    becomes such a row. stop_on: the
-    name of one of its errors; the weights are then those of the step where it was least. With
-    plan.average the running mean of the weights is judged, written and given back. Raises
-    LossFailed, naming the view, when the loss is no number; BadInput when the checkpoint is of
-    something else.
+    observe: called with each row of the metrics. judge: evaluated each plan.judge_every steps, a row
+    of its errors. stop_on: name of one of these errors; the weights are then those of its minimum.
+    With plan.average the running mean of the weights is evaluated, written and returned. Raises
+    LossFailed, naming the view, if the loss is not finite; BadInput for a checkpoint of another
+    training.
     """
     if plan.batch % share.of:
         raise BadInput("batch", str(plan.batch), f"cannot be shared by {share.of} processes")
     network = move_to_device(network, plan)
     optimiser = optimiser_of(network, plan)
-    # What a checkpoint must agree with to be gone on from.
-    where = Position(0, task.name, plan_digest(plan), views.digest(), seed)
+    # A checkpoint must agree with this to resume.
+    start = Position(0, task.name, plan_digest(plan), views.digest(), seed)
     average = running_mean(network, plan)
-    first = _resumed(folder, network, optimiser, where, average)
+    first = _resumed(folder, network, optimiser, start, average)
     judged: nn.Module = network if average is None else average.module
     if share.is_first:
-        # Rows of steps after the checkpoint go: these steps are run again.
+        # Drop rows after the checkpoint: their steps are repeated.
         folder.keep_metrics_until(first)
     model = nn.parallel.DistributedDataParallel(network) if share.of > 1 else network
     loop = _Loop(model, optimiser, task, plan, seed, share)
 
     started, loss_sum, n_summed = time.monotonic(), 0.0, 0
-    # Each process takes its own rows of the one batch.
-    own = slice(share.rank, None, share.of)
+    # Each process takes its rows of the common batch.
+    rows = slice(share.rank, None, share.of)
     steps = range(first, plan.steps)
-    for step, read in zip(steps, views.batches(steps, plan, seed, own), strict=True):
+    for step, read in zip(steps, views.batches(steps, plan, seed, rows), strict=True):
         loss_sum, n_summed = loss_sum + loop.step(step, read), n_summed + 1
         done = step + 1
         if average is not None and done % plan.accumulate == 0:
@@ -117,13 +116,15 @@ def train_network(
             folder.add_metrics({"step": done} | errors)
             observe({"step": done} | errors)
             if stop_on and (errors[stop_on] < least or least == inf):
-                save_weights(folder.best, judged, _at(where, done))
+                save_weights(folder.best, judged, replace(start, step=done))
             started += time.monotonic() - judging
-        # A checkpoint holds no gradients, so it waits until none are accumulated.
+        # A checkpoint has no gradients, so wait until none are accumulated.
         if done % plan.checkpoint_every == 0 and done % plan.accumulate == 0 and done < plan.steps:
-            save_checkpoint(folder.checkpoint, network, optimiser, _at(where, done), average)
+            save_checkpoint(
+                folder.checkpoint, network, optimiser, replace(start, step=done), average
+            )
     if share.is_first:
-        best = load_checkpoint(folder.best, judged) if stop_on else _at(where, plan.steps)
+        best = load_checkpoint(folder.best, judged) if stop_on else replace(start, step=plan.steps)
         save_weights(folder.weights, judged, best)
     return judged
 
@@ -137,13 +138,14 @@ def _is_judged(plan: TrainingPlan, done: int, stop_on: str) -> bool:
 def seconds_a_step(
     network: nn.Module, views: TrainingViews, task: StudyTask, plan: TrainingPlan
 ) -> dict[str, float]:
-    """Wall seconds of a step forth and back in each arithmetic, the network itself left as it is."""
+    """Wall seconds of a training step of a copy of the network in each arithmetic."""
     read = next(iter(views.batches(range(1), plan, 0, slice(None))))
     seconds = {}
     for name, bf16 in (("float32", False), ("bfloat16", True)):
         model = move_to_device(copy.deepcopy(network), plan)
-        each = replace(plan, bf16=bf16)
-        loop = _Loop(model, optimiser_of(model, each), task, each, 0, Share())
+        timed_plan = replace(plan, bf16=bf16)
+        optimiser = optimiser_of(model, timed_plan)
+        loop = _Loop(model, optimiser, task, timed_plan, 0, Share())
         times = []
         for _ in range(_TIMED_STEPS):
             began = time.perf_counter()
@@ -156,7 +158,7 @@ def seconds_a_step(
 def _row_since(
     plan: TrainingPlan, step: int, loss_sum: float, n_summed: int, seconds: float
 ) -> dict[str, float]:
-    """A row of the metrics: means since the last one of the loss, and views a second."""
+    """A row of the metrics: mean loss and views per second since the last row."""
     return {
         "step": step + 1,
         "loss": loss_sum / n_summed,
@@ -165,19 +167,15 @@ def _row_since(
     }
 
 
-def _at(position: Position, step: int) -> Position:
-    return Position(step, position.task, position.plan_digest, position.views_digest, position.seed)
-
-
 def _resumed(
-    folder: RunFolder, network: nn.Module, optimiser: torch.optim.Optimizer, where: Position,
+    folder: RunFolder, network: nn.Module, optimiser: torch.optim.Optimizer, start: Position,
     average: nn.Module | None,
 ) -> int:  # fmt: skip
-    """Take up the checkpoint, if there is one; the number of steps that are done. Writes nothing."""
+    """Load the checkpoint, if any; the number of steps done."""
     if not folder.checkpoint.exists():
         return 0
     position = load_checkpoint(folder.checkpoint, network, optimiser, average)
-    if _at(position, 0) != where:
+    if replace(position, step=0) != start:
         raise BadInput(folder.checkpoint, "", "a checkpoint of another task, plan, seed or views")
     return position.step
 
@@ -192,12 +190,11 @@ class _Loop:
     share: Share
 
     def step(self, step: int, read: BatchRead) -> float:
-        """One batch forth and back; its loss."""
+        """Forward and backward pass of a batch; its loss."""
         plan = self.plan
         device = device_of(plan)
-        # Draw what is random from the seed and the step alone.
-        chance = (self.seed * 1_000_003 + step) * 1024 + self.share.rank
-        torch.manual_seed(chance)
+        random_seed = (self.seed * 1_000_003 + step) * 1024 + self.share.rank
+        torch.manual_seed(random_seed)
         ids, arrays = read
         batch: Batch = {
             name: torch.from_numpy(array).to(device, non_blocking=True)
@@ -206,13 +203,13 @@ class _Loop:
         batch["colour"] = as_colour(batch["colour"])
         if plan.rays:
             batch["rays"] = rays_of_cameras(batch.pop(CAMERA), *batch["colour"].shape[2:])
-        batch = augment(batch, self.task, plan, torch.Generator().manual_seed(chance))
+        batch = augment(batch, self.task, plan, torch.Generator().manual_seed(random_seed))
 
         with torch.autocast(device.type, torch.bfloat16, enabled=plan.bf16):
             output = network_output(self.model, batch["colour"], plan, batch.get("rays"))
         losses = self.task.loss(output, batch, plan)
         self._stop_at_nan(losses, ids, step)
-        # Gradients add up over plan.accumulate batches before the weights move.
+        # The weights change after plan.accumulate batches.
         loss = losses.mean()
         (loss / plan.accumulate).backward()
         if (step + 1) % plan.accumulate == 0:
@@ -230,7 +227,7 @@ class _Loop:
         finite = torch.isfinite(losses.detach())
         if bool(finite.all()):
             return
-        bad = [at for at, good in zip(ids, finite.tolist(), strict=True) if not good]
+        bad = [id for id, good in zip(ids, finite.tolist(), strict=True) if not good]
         raise LossFailed(
             f"the loss is not a finite number at step {step + 1}, at view {bad[0]}"
             f" ({len(bad)} of {len(ids)} views of the step)",

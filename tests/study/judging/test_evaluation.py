@@ -21,7 +21,7 @@ from pbrs_farm.study.judging.figure_text import is_underfit, markdown, shown_fig
 from pbrs_farm.study.judging.judged_places import open_judged_place, open_judged_places
 from pbrs_farm.study.judging.others_predictions import OthersPredictions, predictions_in
 from pbrs_farm.study.judging.paper_figures import PAPER, paper_row
-from pbrs_farm.study.photographs import crop_to_plan
+from pbrs_farm.study.photographs import crop_to_size
 from pbrs_farm.study.real_frames import camera_of
 from pbrs_farm.study.sun_rgbd_labels import classes_of_scene
 from pbrs_farm.study.tasks.tasks import task_of
@@ -465,7 +465,7 @@ def test_a_table_of_what_the_paper_does_not_know_has_no_number_of_it(
 
 
 def test_a_photograph_of_another_form_is_cut_in_its_middle() -> None:
-    colour, rows, columns = crop_to_plan(np.zeros((100, 300, 3), np.uint8), small_plan())
+    colour, rows, columns = crop_to_size(np.zeros((100, 300, 3), np.uint8), (40, 32))
     assert colour.shape == (32, 40, 3)
     assert (rows, columns) == (slice(0, 100), slice(87, 212))
 

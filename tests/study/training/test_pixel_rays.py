@@ -19,11 +19,12 @@ from pbrs_farm.study.judging.evaluation import open_run
 from pbrs_farm.study.judging.packed_weights import model_card
 from pbrs_farm.study.networks.initial_weights import start_from
 from pbrs_farm.study.networks.network_choice import network_of
-from pbrs_farm.study.photographs import camera_of_crop, crop_to_plan
+from pbrs_farm.study.photographs import camera_of_crop, crop_to_size
 from pbrs_farm.study.pixel_rays import places_of_rays, ray_channels, rays_at, rays_of_cameras
 from pbrs_farm.study.tasks.tasks import task_of
 from pbrs_farm.study.training.augmentation import augment
 from pbrs_farm.study.training.prediction import predict
+from pbrs_farm.study.training.training_views import camera_numbers
 from pbrs_farm.study.training_plan import TrainingPlan
 from tests.study.networks.lite_package import write_lite_package
 from tests.study.training.made_views import TINY, small_plan
@@ -110,10 +111,10 @@ def test_an_enlarged_part_is_as_exact_as_its_colour_between_pixels() -> None:
 
 
 def test_a_crop_of_a_photograph_keeps_its_rays() -> None:
-    plan = small_plan(width_px="40", height_px="32")
+    size = 40, 32
     K = np.array([[500.0, 0, 310], [0, 510.0, 250], [0, 0, 1]])
-    _colour, rows, columns = crop_to_plan(np.zeros((480, 640, 3), np.uint8), plan)
-    camera = torch.from_numpy(camera_of_crop(K, rows, columns, plan))[None]
+    _colour, rows, columns = crop_to_size(np.zeros((480, 640, 3), np.uint8), size)
+    camera = torch.from_numpy(camera_numbers(camera_of_crop(K, rows, columns, size)))[None]
     rays = rays_of_cameras(camera, 32, 40)
     # The crop is 600 x 480 from column 20 on, each pixel 15 x 15 of the photograph's.
     assert (rows, columns) == (slice(0, 480), slice(20, 620))
