@@ -1,4 +1,4 @@
-"""Verbs of the study: train, evaluate, predict, ablation, compare. Effects: read views, write runs; they need torch."""
+"""Commands of the study: train, evaluate, predict, ablation, compare; with torch. Effects: read views, write runs."""
 
 from __future__ import annotations
 
@@ -180,15 +180,15 @@ def _train(args: argparse.Namespace) -> int:
     plan, source = _plan(args, args.task), _source(args)
     source = replace(source, mix=tuple(mix_of(word) for word in args.mix))
     init = str(shipped_run(args.task)) if args.init == "shipped" else args.init
-    # What is missing here is told before views are read.
+    # Report missing packages before reading views.
     device_of(plan)
     check_installed(args.log)
     views, held_out = training_views(source, plan), held_out_views(source, plan)
     n_held = len(held_out) if held_out else 0
     lacking = left_out(source, plan)
     if lacking:
-        at, why = next(iter(lacking.items()))
-        echo(f"{counted(len(lacking), 'view')} left out, {at}: {why}")
+        view, why = next(iter(lacking.items()))
+        echo(f"{counted(len(lacking), 'view')} left out, {view}: {why}")
     how = "" if isinstance(views, ViewArrays) else ", read anew for each step"
     homes = f"{counted(len(views), 'view')} of {counted(len(views.homes), 'home')}"
     echo(f"{homes}{how}, {n_held} of others held out")
@@ -197,10 +197,10 @@ def _train(args: argparse.Namespace) -> int:
         share = f", {row['share']:g} of each batch" if "share" in row else ""
         echo(f"{counted(len(row['pictures']), 'photograph')} of {row['name']}{share}")
     trained_on = frozenset(views.homes) | digests_of(photographs)
-    held = frozenset(held_out.homes) if held_out else None
+    held_out_homes = frozenset(held_out.homes) if held_out else None
     judged_on = open_judged_places(
-        args.on, plan, mode=source.modes[0], trained_on=trained_on, known_held_out=held,
-        most=plan.final_views,
+        args.on, plan, mode=source.modes[0], trained_on=trained_on,
+        known_held_out=held_out_homes, most=plan.final_views,
     )  # fmt: skip
     credits = (*credits_of(source, views.homes), *credits_of_init(init))
     stop_on = _stop_on(args.stop_on, [on.name for on in judged_on], plan)
@@ -208,18 +208,18 @@ def _train(args: argparse.Namespace) -> int:
         plan, args.out, args.seed, source.light, source.name, init, stop_on=stop_on,
         facts={"credits": list(dict.fromkeys(credits)), **facts_of(photographs, plan)},
     )  # fmt: skip
-    # Tell about twenty times a run, at steps that are logged anyway.
+    # Print about twenty of the logged steps.
     every = max(plan.steps // 20 // plan.log_every, 1) * plan.log_every
 
     with loggers(args.log, args.out, plan_as_json(plan)) as log:
 
-        def tell(row: dict[str, float]) -> None:
+        def observe(row: dict[str, float]) -> None:
             log(row)
-            is_told = row["step"] % every == 0 or row["step"] == plan.steps
-            if is_told and "loss" in row:
+            is_shown = row["step"] % every == 0 or row["step"] == plan.steps
+            if is_shown and "loss" in row:
                 echo(f"step {row['step']:>7,} loss {row['loss']:.4f} {row['views_s']:.1f} views/s")
 
-        figures = train(job, views, held_out, tell, judge_of_places(judged_on, plan))
+        figures = train(job, views, held_out, observe, judge_of_places(judged_on, plan))
     if figures:
         _print_run(args.out)
         if args.export:
@@ -227,12 +227,12 @@ def _train(args: argparse.Namespace) -> int:
     return 0
 
 
-def _stop_on(name: str, known: list[str], plan: TrainingPlan) -> str:
-    """The error that chooses the weights, as metrics call it; "" where the last step does."""
+def _stop_on(name: str, places: list[str], plan: TrainingPlan) -> str:
+    """Name in the metrics of the error that selects the weights; "" for the last step."""
     if not name:
         return ""
-    if name not in known:
-        hint = f"of {', '.join(known)}" if known else f"--on {name}=PLACE"
+    if name not in places:
+        hint = f"of {', '.join(places)}" if places else f"--on {name}=PLACE"
         raise BadInput("--stop-on", name, "no --on has this name", hint=hint)
     if not plan.judge_every:
         raise BadInput("--stop-on", name, "nothing is judged", hint="--set judge_every=200")
@@ -281,18 +281,18 @@ def _evaluate(args: argparse.Namespace) -> int:
     out = args.out or folder / "evaluation"
     if args.on:
         make_folder(out)  # before anything is judged
-    trained_on = frozenset(run.record["homes"]["train"])
-    trained_on |= digests_of(run.record.get("photographs", ()))
-    held = frozenset(run.record["homes"]["held_out"]) or None
-    # Homes are looked at in the run's own light, photographs have none of the four.
-    light = run.record["mode"].split("+")[0]
+    record = run.record
+    trained_on = frozenset(record["homes"]["train"]) | digests_of(record.get("photographs", ()))
+    # Use the light of the run, unless it trained on photographs.
+    light = record["mode"].split("+")[0]
     mode = "mlt_il_ol" if light in (NYU_LIGHT, PHOTO_LIGHT) else light
     places = open_judged_places(
-        args.on, run.plan, mode=mode, trained_on=trained_on, most=args.views, known_held_out=held
-    )
+        args.on, run.plan, mode=mode, trained_on=trained_on, most=args.views,
+        known_held_out=frozenset(record["homes"]["held_out"]) or None,
+    )  # fmt: skip
     evaluations = [evaluate(run, place) for place in places]
-    for one in others:
-        evaluations = _with_column(run, evaluations, one)
+    for predictions in others:
+        evaluations = _with_column(run, evaluations, predictions)
     rows = report(run, evaluations)
     if args.json:
         echo_json(rows)
@@ -308,14 +308,12 @@ def _evaluate(args: argparse.Namespace) -> int:
 
 
 def _judged_run(args: argparse.Namespace) -> Path:
-    """The run that `evaluate` names, or that comes with the package for --task."""
+    """The run of `evaluate RUN`, or the package's own weights of --task."""
     from pbrs_farm.study.judging.packed_weights import shipped_run
 
     if (args.run is None) == (args.task is None):
-        hint = "pbrs-farm evaluate RUN, or --task normals"
-        raise BadInput(
-            "evaluate", str(args.run or ""), "either a run or a task is named", hint=hint
-        )
+        text, hint = "either a run or a task is named", "pbrs-farm evaluate RUN, or --task normals"
+        raise BadInput("evaluate", str(args.run or ""), text, hint=hint)
     if args.task and args.on and not args.out:
         raise BadInput("--task", args.task, "--out must say where the page goes", hint="--out DIR")
     return shipped_run(args.task) if args.task else args.run
@@ -324,17 +322,17 @@ def _judged_run(args: argparse.Namespace) -> Path:
 def _with_column(
     run: Trained, evaluations: list[Evaluation], others: OthersPredictions
 ) -> list[Evaluation]:
-    """Each evaluation with a column of others' predictions, where there are some of its views."""
+    """The evaluations, with a column of others' predictions for those with files."""
     from pbrs_farm.study.judging.evaluation import with_others
     from pbrs_farm.study.judging.others_predictions import predictions_in
 
-    found = [predictions_in(others, one.views, run.plan) for one in evaluations]
-    if not any(each is not None for each in found):
+    columns = [predictions_in(others, evaluation.views, run.plan) for evaluation in evaluations]
+    if all(predictions is None for predictions in columns):
         text = "holds no prediction of any view that is judged"
         raise BadInput(others.folder, "", text, hint="--on names what is judged")
     return [
-        one if each is None else with_others(run, one, others.name, each)
-        for one, each in zip(evaluations, found, strict=True)
+        with_others(run, evaluation, others.name, predictions) if predictions else evaluation
+        for evaluation, predictions in zip(evaluations, columns, strict=True)
     ]
 
 
@@ -364,8 +362,10 @@ def _predict(args: argparse.Namespace) -> int:
         elif "error" in row:
             echo(row["error"])
         else:
-            seen = f", {row['hfov_deg']} degrees wide ({row['camera']})" if "camera" in row else ""
-            echo(f"{row['file']}: {row['seconds']:.2f} s{seen}")
+            camera = (
+                f", {row['hfov_deg']} degrees wide ({row['camera']})" if "camera" in row else ""
+            )
+            echo(f"{row['file']}: {row['seconds']:.2f} s{camera}")
     if not args.json:
         echo(f"{counted(len(files) - n_failed, 'photograph')}; {args.out / 'index.html'}")
     return int(n_failed > 0)
@@ -390,15 +390,15 @@ def _ablation(args: argparse.Namespace) -> int:
     check_exact(args.task, exact=args.exact)
     plan, common = _plan(args, args.task), TrainingSource((), (), _hold_out(args), most=args.views)
     make_folder(args.out)
-    # A set of training views a row; all rows share plan, seeds and held-out homes.
+    # Rows share the plan, the seeds and the held-out homes.
     sets = training_sets(args.root, args.modes, replace(common, all_there=False))
     for note in hold_out_notes(sets):
         echo(note)
     if args.objects:
         objects = TrainingSource((args.objects,), ("mlt_il_ol",), frozenset(), True, args.views)
         sets = (*sets, TrainingSet("objects", objects))
-    # No row may be judged on homes that any of the rows trains on.
-    trained_on = homes_that_train([each.source for each in sets])
+    # No row is tested on a training home of any row.
+    trained_on = homes_that_train([row.source for row in sets])
     judged_on = open_judged_places(
         args.on, plan, mode="mlt_il_ol", trained_on=trained_on, hold_out=common.hold_out
     )
@@ -424,7 +424,7 @@ def _compare(args: argparse.Namespace) -> int:
     from pbrs_farm.study.training.run_folder import make_folder
 
     at_least("--views", args.views, 0)
-    # What is missing here is told before pictures are read.
+    # Report missing packages before reading pictures.
     network, size = imagenet_features(), size_of_views(args.root)
     make_folder(args.out)
     photographs = read_photographs(args.photographs, size, most=args.views)
@@ -436,15 +436,15 @@ def _compare(args: argparse.Namespace) -> int:
     if args.json:
         echo_json(comparison.report)
         return 0
-    far, found = comparison.report["appearance"], comparison.report["histograms"]
-    value, low, high = (far["kernel_distance"][key] for key in ("value", "low", "high"))
+    appearance, histograms = comparison.report["appearance"], comparison.report["histograms"]
+    value, low, high = (appearance["kernel_distance"][key] for key in ("value", "low", "high"))
     sizes = (
         f"{counted(len(ours.pictures), 'view')}, {counted(len(photographs.pictures), 'photograph')}"
     )
     echo(f"{sizes}, {size[0]}x{size[1]} pixels")
-    darker = f"the photographs a stop darker: {far['photographs_a_stop_darker']:.1f}"
+    darker = f"the photographs a stop darker: {appearance['photographs_a_stop_darker']:.1f}"
     echo(f"kernel distance {value:.1f} [{low:.1f}, {high:.1f}] in thousandths; {darker}")
-    for row in found.values():
+    for row in histograms.values():
         value, low, high = (row["shared"][key] for key in ("value", "low", "high"))
         halves = "" if row["halves"] is None else f"; halves of the photographs {row['halves']:.3f}"
         echo(f"{row['title']}: {value:.3f} [{low:.3f}, {high:.3f}] shared{halves}")

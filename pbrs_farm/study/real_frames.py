@@ -58,7 +58,7 @@ class PhotoCamera:
 
 
 def real_pairs(folder: Path, plan: TrainingPlan) -> tuple[PhotoFiles, ...]:
-    """The pairs below a folder with truth of the plan's task; BadInput if there are none.
+    """The pairs below a folder with truth of the plan's task; BadInput without any.
 
     Classes exist for pairs in ScanNet's layout with labels, and for pairs of SUN RGB-D that are in
     its toolbox.
@@ -140,7 +140,7 @@ def _is_of_sun_rgbd(pair: PhotoFiles) -> bool:
 def camera_of(folder: Path, top: Path) -> PhotoCamera:
     """The camera of a folder of pictures: the nearest intrinsics file from it up to top.
 
-    Raises BadInput if there is none, or for a damaged one.
+    Raises BadInput if it is missing or damaged.
     """
     camera = find_camera(folder, top)
     if camera is not None:

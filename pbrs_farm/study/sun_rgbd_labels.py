@@ -1,7 +1,7 @@
-"""Classes of SUN RGB-D's photographs, which its toolbox keeps apart from them. Effects: reads files.
+"""Classes of SUN RGB-D's photographs from its toolbox. Effects: reads files.
 
-SUNRGBDtoolbox/Metadata/SUNRGBD2Dseg.mat (MATLAB 7.3) has 37 classes a pixel, NYU40's first; the row
-of a scene is that of its rgbpath in SUNRGBDMeta.mat (MATLAB 5) beside it.
+SUNRGBDtoolbox/Metadata/SUNRGBD2Dseg.mat (MATLAB 7.3) has 37 classes, the first of NYU40; the row of a
+scene is that of its rgbpath in SUNRGBDMeta.mat (MATLAB 5) beside it.
 """
 
 from __future__ import annotations
@@ -18,25 +18,22 @@ from pbrs_farm.core.errors import BadInput
 from pbrs_farm.curate.photographs import h5py_for_mats
 
 CLASSES: Final = "SUNRGBDtoolbox/Metadata/SUNRGBD2Dseg.mat"
-"""Where the classes lie, in a folder above the scenes."""
+"""File of the classes, in a folder above the scenes."""
 _SCENES: Final = "SUNRGBDMeta.mat"
 _N_CLASSES: Final = 37
 
 
 def has_classes(scene: Path) -> bool:
-    """Whether a toolbox in a folder above has classes of the scene.
-
-    BadInput where its list of scenes is missing or cannot be read.
-    """
-    return _place_of(scene) is not None
+    """True if a toolbox in a folder above has classes of the scene; BadInput for a damaged one."""
+    return _file_and_row(scene) is not None
 
 
 def classes_of_scene(scene: Path) -> NDArray[np.uint8]:
-    """(H, W) NYU40 ids 0..37 of the scene's picture, 0 = none; BadInput where they cannot be read."""
-    found = _place_of(scene)
-    if found is None:
+    """(H, W) NYU40 ids 0..37 of the scene's picture, 0 = none; BadInput if they are missing or damaged."""
+    file_and_row = _file_and_row(scene)
+    if file_and_row is None:
         raise BadInput(scene, "", f"no classes of this scene in {CLASSES} above it")
-    path, row = found
+    path, row = file_and_row
     h5py = h5py_for_mats()
     try:
         with h5py.File(path, "r") as file:
@@ -51,8 +48,8 @@ def classes_of_scene(scene: Path) -> NDArray[np.uint8]:
     return stored.astype(np.uint8)
 
 
-def _place_of(scene: Path) -> tuple[Path, int] | None:
-    # The file of classes above the scene, and the scene's row in it.
+def _file_and_row(scene: Path) -> tuple[Path, int] | None:
+    """The file of classes above a scene, and the row of the scene; None without either."""
     scene = scene.absolute()
     path = next((p / CLASSES for p in scene.parents if (p / CLASSES).is_file()), None)
     if path is None:
@@ -73,7 +70,7 @@ def _rows_of_scenes(path: Path) -> Mapping[str, int]:
     try:
         scenes = loadmat(path, squeeze_me=True, struct_as_record=False)["SUNRGBDMeta"]
         paths = [str(scene.rgbpath) for scene in np.atleast_1d(scenes)]
-    except Exception:  # noqa: BLE001  scipy raises of many kinds for a file that is none
+    except Exception:  # noqa: BLE001  scipy raises many kinds of errors for another file
         raise BadInput(path, "SUNRGBDMeta", "not the MATLAB 5 file that was expected") from None
     # Each is /n/fs/sun3d/data/SUNRGBD/<scene>/image/NAME.jpg.
     parts = [[part for part in path.split("/") if part] for path in paths]

@@ -1,1 +1,1 @@
-"""How good a trained network is, on homes and on photographs, beside a baseline and the paper."""
+"""Figures of a trained network on homes and photographs, beside a baseline and the paper."""

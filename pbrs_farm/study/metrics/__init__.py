@@ -1,1 +1,1 @@
-"""How good a prediction is: normals, classes, boundaries; numpy and scipy alone, no effects."""
+"""Figures of predictions: normals, depth, classes, boundaries; numpy and scipy only."""

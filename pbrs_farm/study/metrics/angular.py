@@ -1,4 +1,4 @@
-"""The error of surface normals in degrees, pooled over the pixels of any number of views; no effects."""
+"""Angular error of surface normals in degrees, over the pixels of any number of views."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F64, Mask
 
-THRESHOLDS_DEG: Final = (11.25, 22.5, 30.0, 5.0, 7.5)  # of the shares that papers report
-_BIN_DEG: Final = 0.01  # of the histogram that medians are read from
+THRESHOLDS_DEG: Final = (11.25, 22.5, 30.0, 5.0, 7.5)  # degrees, for shares of pixels
+_BIN_DEG: Final = 0.01  # bin width of the histogram for medians
 _N_BINS: Final = round(180 / _BIN_DEG) + 1
 
 
 def angles_deg(predicted: NDArray[Any], truth: NDArray[Any]) -> F64:
-    """(...) degrees 0..180 between the vectors of two arrays (..., 3), of any length.
+    """(...) degrees 0..180 between the vectors of two arrays (..., 3) of any length.
 
-    A vector of no length stands at 90 degrees to everything. Raises ValueError for NaN.
+    The angle with a zero vector is 90 degrees. Raises ValueError for NaN.
     """
     a, b = np.asarray(predicted, np.float64), np.asarray(truth, np.float64)
     if not (np.isfinite(a).all() and np.isfinite(b).all()):
@@ -30,10 +30,10 @@ def angles_deg(predicted: NDArray[Any], truth: NDArray[Any]) -> F64:
 
 @dataclass(frozen=True, slots=True)
 class NormalScore:
-    """What the field reports of normals: degrees, and shares 0..1 of pixels below a threshold."""
+    """Figures of normals: degrees, and shares 0..1 of pixels below a threshold."""
 
     mean_deg: float
-    median_deg: float  # of pixels, not of views
+    median_deg: float  # over pixels, not views
     below_11_25: float
     below_22_5: float
     below_30: float
@@ -44,7 +44,7 @@ class NormalScore:
 
 
 class AngularErrors:
-    """Errors of views that come one by one: sums, counts and a histogram, no pixels."""
+    """Accumulated errors of views: sums, counts and a histogram."""
 
     def __init__(self) -> None:
         self._histogram = np.zeros(_N_BINS, np.int64)
@@ -53,10 +53,10 @@ class AngularErrors:
         self._sum_of_squares = 0.0
 
     def add(self, predicted: NDArray[Any], truth: NDArray[Any], valid: Mask) -> float:
-        """Count the pixels (H, W) where valid; the view's own mean in degrees, NaN without any.
+        """Add the valid pixels of a view; its mean error in degrees, NaN without any.
 
-        predicted and truth are (H, W, 3) unit vectors in one frame, valid (H, W) bool. Pixels
-        count, not views: a view with more valid pixels weighs more.
+        predicted and truth are (H, W, 3) unit vectors in one frame, valid (H, W) bool. Views with
+        more valid pixels have more weight.
         """
         errors = angles_deg(predicted[valid], truth[valid])
         self._histogram += np.bincount(
@@ -68,31 +68,13 @@ class AngularErrors:
         return float(errors.mean()) if errors.size else float("nan")
 
     def score(self) -> NormalScore:
-        """Over all pixels so far; the median to 0.005 degrees. All NaN without a pixel.
-
-        Mean, median and RMS in degrees, and shares below the thresholds of the literature (11.25,
-        22.5 and 30 degrees among them; Fouhey et al. 2013).
-        """
+        """Figures over all pixels so far, the median to 0.005 degrees; NaN without a pixel."""
         n = int(self._histogram.sum())
         if n == 0:
-            nan = float("nan")
-            return NormalScore(nan, nan, nan, nan, nan, nan, nan, nan, 0)
-        # Read the two middle pixels off the histogram: they are one where n is odd.
-        seen = np.cumsum(self._histogram)
-        middle = np.searchsorted(seen, [(n - 1) // 2, n // 2], side="right")
-        below_11_25, below_22_5, below_30, below_5, below_7_5 = (
-            float(count / n) for count in self._below
-        )
+            return NormalScore(*[float("nan")] * 8, n_pixels=0)
+        # The bins of the two middle pixels, which are one if n is odd.
+        middle = np.searchsorted(np.cumsum(self._histogram), [(n - 1) // 2, n // 2], side="right")
         median_deg = float(middle.mean() * _BIN_DEG)
+        shares = (float(count / n) for count in self._below)
         rms_deg = float(np.sqrt(self._sum_of_squares / n))
-        return NormalScore(
-            self._sum / n,
-            median_deg,
-            below_11_25,
-            below_22_5,
-            below_30,
-            below_5,
-            below_7_5,
-            rms_deg,
-            n,
-        )
+        return NormalScore(self._sum / n, median_deg, *shares, rms_deg=rms_deg, n_pixels=n)

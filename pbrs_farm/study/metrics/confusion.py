@@ -1,4 +1,4 @@
-"""Semantic segmentation from one confusion matrix over all pixels (Long et al. 2015); no effects."""
+"""Semantic segmentation from one confusion matrix over all pixels (Long et al. 2015)."""
 
 from __future__ import annotations
 
@@ -11,26 +11,26 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True, slots=True)
 class ClassScore:
-    """What the field reports of segmentation, as shares 0..1."""
+    """Figures of segmentation, shares 0..1."""
 
     pixel_accuracy: float
-    mean_accuracy: float  # over the classes that the truth holds
-    mean_iou: float  # over the classes that truth or prediction hold
-    weighted_iou: float  # each class by its share of the truth
+    mean_accuracy: float  # over the classes in the truth
+    mean_iou: float  # over the classes in truth or prediction
+    weighted_iou: float  # classes weighted by their share of the truth
     n_pixels: int
 
 
 class Confusion:
-    """Pixels by true class (row) and predicted class (column); class 0 of the truth is left out."""
+    """Pixels by true class (row) and predicted class (column); class 0 of the truth is ignored."""
 
     def __init__(self, n_classes: int) -> None:
         """n_classes: ids 1..n_classes exist, in truth and in prediction."""
         self.counts = np.zeros((n_classes, n_classes), np.int64)
 
     def add(self, predicted: NDArray[Any], truth: NDArray[Any]) -> float:
-        """Count a view's pixels with a label; its own pixel accuracy, NaN without any.
+        """Count the labelled pixels of a view; its pixel accuracy, NaN without any.
 
-        Raises ValueError for a label beyond n_classes, and for a prediction that is no class.
+        Raises ValueError for a label or a prediction outside 1..n_classes.
         """
         n = len(self.counts)
         labelled = truth > 0
@@ -38,29 +38,27 @@ class Confusion:
             truth[labelled].astype(np.int64) - 1,
             predicted[labelled].astype(np.int64) - 1,
         )
-        for what, ids in (("label", rows), ("prediction", columns)):
+        for kind, ids in (("label", rows), ("prediction", columns)):
             if ids.size and (ids.min() < 0 or ids.max() >= n):
                 wrong = next(i for i in (int(ids.max()), int(ids.min())) if not 0 <= i < n)
-                raise ValueError(f"the {what} {wrong + 1} is none of the classes 1 to {n}")
+                raise ValueError(f"the {kind} {wrong + 1} is none of the classes 1 to {n}")
         self.counts += np.bincount(rows * n + columns, minlength=n * n).reshape(n, n)
         return float((rows == columns).mean()) if rows.size else float("nan")
 
     def iou(self) -> NDArray[np.float64]:
-        """(n_classes,) intersection over union; NaN where neither truth nor prediction has one."""
+        """(n_classes,) intersection over union; NaN for classes in neither truth nor prediction."""
         hits = np.diag(self.counts)
         return _shares(hits, self.counts.sum(0) + self.counts.sum(1) - hits)
 
     def score(self) -> ClassScore:
-        """Over all pixels so far; all NaN without a pixel.
+        """Figures over all pixels so far; NaN without a pixel.
 
-        Classes without a pixel of truth do not enter the mean accuracy, and those that neither
-        truth nor prediction has do not enter the mean IoU. Weighted by the truth's frequency: Long
-        et al. 2015.
+        The mean accuracy is over classes in the truth, the mean IoU over classes in truth or
+        prediction.
         """
         n = int(self.counts.sum())
         if n == 0:
-            nan = float("nan")
-            return ClassScore(nan, nan, nan, nan, n_pixels=0)
+            return ClassScore(*[float("nan")] * 4, n_pixels=0)
         hits, truth, iou = np.diag(self.counts), self.counts.sum(1), self.iou()
         return ClassScore(
             pixel_accuracy=float(hits.sum() / n),
@@ -71,5 +69,5 @@ class Confusion:
         )
 
 
-def _shares(part: NDArray[np.int64], whole: NDArray[np.int64]) -> NDArray[np.float64]:
-    return np.where(whole > 0, part / np.maximum(whole, 1), np.nan)
+def _shares(part: NDArray[np.int64], total: NDArray[np.int64]) -> NDArray[np.float64]:
+    return np.where(total > 0, part / np.maximum(total, 1), np.nan)

@@ -1,4 +1,4 @@
-"""The error of depth as papers report it, over any number of views; no effects."""
+"""Errors of depth over any number of views."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import Mask
 
-_RATIO = 1.25  # of the share that papers call delta 1
+_RATIO = 1.25  # threshold of delta 1
 
 
 @dataclass(frozen=True, slots=True)
 class DepthScore:
-    """Shares 0..1, and metres."""
+    """Figures of depth: shares 0..1, and metres."""
 
     scale_invariant: float  # mean over views of the standard deviation of ln(predicted / true)
     abs_rel: float  # mean over pixels of |predicted - true| / true
@@ -25,7 +25,7 @@ class DepthScore:
 
 
 class DepthErrors:
-    """Errors of views that come one by one (Eigen et al. 2014, section 4)."""
+    """Accumulated errors of views (Eigen et al. 2014, section 4)."""
 
     def __init__(self) -> None:
         self._spreads: list[float] = []
@@ -33,9 +33,9 @@ class DepthErrors:
         self._relative = self._squares = 0.0
 
     def add(self, predicted: NDArray[Any], truth: NDArray[Any], valid: Mask) -> float:
-        """Count the pixels (H, W) where valid, metres; the view's own spread of ln, NaN without any.
+        """Add the valid pixels (H, W), metres, of a view; its scale-invariant error, NaN without any.
 
-        A picture does not tell whether a room is a doll's: the spread is the same at every scale.
+        The standard deviation of ln(predicted / true) is the same at every scale of the prediction.
         """
         p, t = (np.asarray(depth[valid], np.float64) for depth in (predicted, truth))
         if not p.size:
@@ -49,14 +49,12 @@ class DepthErrors:
         return self._spreads[-1]
 
     def score(self) -> DepthScore:
-        """Over all so far; all NaN without a pixel.
+        """Figures so far; NaN without a pixel.
 
-        The scale-invariant error is the mean of the views' own (Eigen et al. 2014); all other
-        figures are over pixels, so larger views weigh more.
+        The scale-invariant error is a mean over views, the other figures are over pixels.
         """
         if not self._n:
-            nan = float("nan")
-            return DepthScore(nan, nan, nan, nan, 0)
+            return DepthScore(*[float("nan")] * 4, n_pixels=0)
         return DepthScore(
             scale_invariant=float(np.mean(self._spreads)),
             abs_rel=self._relative / self._n,

@@ -1,7 +1,7 @@
-"""Boundaries against the truth: ODS, OIS, AP and R50 over any number of views; no effects.
+"""Scores of boundaries: ODS, OIS, AP and R50 over any number of views.
 
-Conventions of the BSDS benchmark as Dollar and Zitnick 2015 use it: one truth a picture, counts at
-each threshold summed over all pictures, F interpolated between thresholds.
+Conventions of the BSDS benchmark as in Dollar and Zitnick 2015: one truth per picture, counts at each
+threshold summed over all pictures, F interpolated between thresholds.
 """
 
 from __future__ import annotations
@@ -18,23 +18,24 @@ from scipy.spatial import cKDTree
 from pbrs_farm.core.arrays import F64, Mask
 from pbrs_farm.study.metrics.edge_thinning import suppress_non_maxima, thin_edges
 
-N_THRESHOLDS: Final = 33  # a third of the benchmark's, which is EXACT_THRESHOLDS
+N_THRESHOLDS: Final = 33  # a third of the benchmark's EXACT_THRESHOLDS
 EXACT_THRESHOLDS: Final = 99
-MAX_DISTANCE: Final = 0.011  # of the diagonal, on NYUv2 (0.0075 on BSDS)
-_STEPS: Final = 100  # between two thresholds, where the best F is looked for
+MAX_DISTANCE: Final = (
+    0.011  # maximum distance of a match, of the diagonal, for NYUv2 (0.0075 for BSDS)
+)
+_STEPS: Final = 100  # number of interpolated points between two thresholds
 
 
 def n_matched(predicted: Mask, truth: Mask, max_distance_px: float) -> int:
-    """The most pairs of edge pixels, one of each map, no pixel twice, none farther apart than that.
+    """Size of a maximum matching of edge pixels within a distance.
 
     The benchmark's min-cost assignment (Martin et al. 2004) gives an unpaired pixel a hundred
-    times the cost of the farthest pair: it pairs as many pixels as possible. Their number is what
-    precision and recall need, and a maximum matching has the same.
+    times the cost of the farthest pair, so it matches as many pixels as possible too. Precision and
+    recall need only their number.
     """
-    ours, theirs = _pixels(predicted), _pixels(truth)
+    ours, theirs = (np.argwhere(edges).astype(np.float64) for edges in (predicted, truth))
     if not len(ours) or not len(theirs):
         return 0
-    # Join every two pixels that are near enough.
     near: list[list[int]] = list(
         cKDTree(ours).query_ball_point(theirs, max_distance_px + 1e-9, return_sorted=False)  # type: ignore[arg-type]
     )
@@ -42,9 +43,9 @@ def n_matched(predicted: Mask, truth: Mask, max_distance_px: float) -> int:
     if not degrees.any():
         return 0
     pairs = np.concatenate([np.asarray(row, np.intp) for row in near if row])
-    # Let one unit flow from a source through each of theirs, a pair, one of ours, to a sink: the
-    # largest flow is the largest matching. Dinic's algorithm takes 0.05 s where scipy's own
-    # matching of 8,000 pixels to 8,400 ran for minutes.
+    # The maximum flow from a source through the pixels of the truth and of the prediction to a sink
+    # is the maximum matching. Dinic's algorithm takes 0.05 s; scipy's matching of 8,000 pixels with
+    # 8,400 took minutes.
     of_theirs = np.arange(1, len(theirs) + 1)
     of_ours = np.arange(len(theirs) + 1, len(theirs) + 1 + len(ours))
     sink = len(theirs) + len(ours) + 1
@@ -55,15 +56,11 @@ def n_matched(predicted: Mask, truth: Mask, max_distance_px: float) -> int:
     return int(maximum_flow(graph, 0, sink, method="dinic").flow_value)
 
 
-def _pixels(edges: Mask) -> NDArray[np.float64]:
-    return np.argwhere(edges).astype(np.float64)
-
-
 @dataclass(frozen=True, slots=True)
 class EdgeScore:
-    """What the field reports of boundaries, as shares 0..1."""
+    """Figures of boundaries, shares 0..1."""
 
-    ods: float  # best F at one threshold for all pictures
+    ods: float  # best F with one threshold for all pictures
     ois: float  # F with each picture's own best threshold
     ap: float
     r50: float  # recall at half precision
@@ -87,7 +84,7 @@ def edge_counts(
     strength: NDArray[Any], truth: Mask, n_thresholds: int = N_THRESHOLDS,
     max_distance: float = MAX_DISTANCE,
 ) -> EdgeCounts:  # fmt: skip
-    """Counts of one picture: strength (H, W) 0..1 as the network gives it, truth (H, W) lines.
+    """Counts of one picture: strength (H, W) 0..1 of the network, truth (H, W) lines.
 
     Maxima of strength are cut at n_thresholds equal steps inside 0..1 and thinned; max_distance is
     a share of the picture's diagonal.
@@ -98,7 +95,7 @@ def edge_counts(
     before: Mask | None = None
     for k, threshold in enumerate(_thresholds(n_thresholds)):
         cut = maxima >= threshold
-        # Keep the counts where no pixel fell below this threshold.
+        # Repeat the counts if this threshold removes no pixel.
         if before is not None and np.array_equal(cut, before):
             matched[k], predicted[k] = matched[k - 1], predicted[k - 1]
             continue
@@ -108,25 +105,18 @@ def edge_counts(
 
 
 class EdgeScores:
-    """Counts of pictures that come one by one."""
+    """Accumulated counts of pictures."""
 
     def __init__(self) -> None:
         self._views: list[EdgeCounts] = []
 
     def add(self, counts: EdgeCounts) -> float:
-        """Take a picture; its own best F.
-
-        Counts are kept for each picture, as OIS takes the best threshold of each one.
-        """
+        """Add the counts of a picture; its best F."""
         self._views.append(counts)
         return float(counts.f().max())
 
     def score(self) -> EdgeScore:
-        """Over all pictures so far; all NaN without one.
-
-        ODS by one threshold for all pictures, OIS by the best of each, AP over thresholds, and
-        recall at half precision (Arbelaez et al. 2011).
-        """
+        """Figures over all pictures so far (Arbelaez et al. 2011); NaN without one."""
         if not self._views:
             nan = float("nan")
             return EdgeScore(nan, nan, nan, nan, n_views=0)
@@ -166,7 +156,7 @@ def _f(precision: F64, recall: F64) -> F64:
 
 
 def _best_f(precision: F64, recall: F64) -> float:
-    """The best F on straight lines between neighbouring thresholds."""
+    """The best F, interpolated linearly between thresholds."""
     if len(precision) == 1:
         return float(_f(precision, recall)[0])
     share = np.linspace(0, 1, _STEPS)[:, None]
@@ -175,19 +165,16 @@ def _best_f(precision: F64, recall: F64) -> float:
 
 
 def _average_precision(precision: F64, recall: F64) -> float:
-    """Precision at recalls 0, 0.01 .. 1 where the curve reaches, summed and divided by 100.
-
-    101 points are divided by 100, as every table has it.
-    """
+    """Sum of the precision at recalls 0, 0.01 .. 1 on the curve, divided by 100 as in the benchmark."""
     recalls, first = np.unique(recall, return_index=True)
     if len(recalls) < 2:
         return 0.0
-    at = np.linspace(0, 1, 101)
-    inside = (at >= recalls[0]) & (at <= recalls[-1])
-    return float(np.interp(at[inside], recalls, precision[first]).sum() / 100)
+    points = np.linspace(0, 1, 101)
+    points = points[(points >= recalls[0]) & (points <= recalls[-1])]
+    return float(np.interp(points, recalls, precision[first]).sum() / 100)
 
 
 def _recall_at_half(precision: F64, recall: F64) -> float:
-    """Recall where precision is a half, or at the least precision where it is always above."""
+    """Recall at a precision of one half, or at the least precision if that is higher."""
     precisions, first = np.unique(precision, return_index=True)
     return float(np.interp(max(float(precisions[0]), 0.5), precisions, recall[first]))

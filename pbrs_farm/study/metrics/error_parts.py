@@ -1,4 +1,4 @@
-"""Errors of normals by kind of surface, depth and luma: a mean hides that only floors were learned; no effects."""
+"""Errors of normals by kind of surface, depth and luma, since a mean may hide that only floors are right."""
 
 from __future__ import annotations
 
@@ -9,33 +9,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import Mask
+from pbrs_farm.core.frames import LUMINANCE
 from pbrs_farm.core.resampling import resized_nearest
 from pbrs_farm.study.metrics.angular import angles_deg
 
-_LEVEL_DEG: Final = 45.0  # of elevation, from which on a surface faces up or down
-_UPRIGHT_DEG: Final = 25.0  # of elevation, up to which it is upright
-_FRONTAL_DEG: Final = (
-    30.0  # of azimuth from the camera's axis, up to which an upright one is frontal
-)
+_LEVEL_DEG: Final = 45.0  # minimum elevation of upward and downward surfaces
+_UPRIGHT_DEG: Final = 25.0  # maximum elevation of upright surfaces
+_FRONTAL_DEG: Final = 30.0  # maximum azimuth of frontal surfaces from the camera's axis
 _NEAR_M, _FAR_M = 2.0, 4.0
-_DARK, _BRIGHT = 0.25, 0.6  # of luma 0..1 as the picture is stored
-_LUMA: Final = (0.2126, 0.7152, 0.0722)  # Rec. 709
+_DARK, _BRIGHT = 0.25, 0.6  # bounds of luma 0..1 of the encoded picture
 
 PARTS: Final = (
     "up", "frontal", "oblique", "slanted", "down",
     f"nearer than {_NEAR_M:g} m", f"{_NEAR_M:g} to {_FAR_M:g} m", f"farther than {_FAR_M:g} m",
     f"luma below {_DARK:g}", f"luma {_DARK:g} to {_BRIGHT:g}", f"luma above {_BRIGHT:g}",
 )  # fmt: skip
-"""Kinds of surface, then depths, then lumas: each pixel is in one of each, of depth where it is known."""
+"""Kinds of surface, ranges of depth and ranges of luma; each pixel has one of each, unless its depth is unknown."""
 
 
 def surface_kinds(normal: NDArray[Any]) -> dict[str, Mask]:
-    """Which pixels of normals (..., 3), x right, y down and z forward, are of which kind.
+    """Masks of normals (..., 3), x right, y down and z forward, by kind of surface.
 
     By elevation above the camera's horizon: from 45 degrees "up" (floors, table tops) or "down"
-    (ceilings), within 25 an upright surface, "frontal" where it faces the camera within 30 degrees
-    to the side, else "oblique"; the rest is "slanted". A camera that looks down sees walls tilted by
-    as much. The masks part the pixels; a normal of no length is oblique.
+    (ceilings); up to 25 degrees "frontal" within an azimuth of 30 degrees from the camera, else
+    "oblique"; others "slanted". A pitched camera tilts the walls by its pitch. Each pixel is in one
+    mask; zero vectors are oblique.
     """
     n = np.asarray(normal, np.float64)
     length = np.maximum(np.linalg.norm(n, axis=-1), 1e-12)
@@ -51,7 +49,7 @@ def surface_kinds(normal: NDArray[Any]) -> dict[str, Mask]:
 
 
 class ErrorParts:
-    """Sums of views that come one by one: the mean angle of each part of PARTS."""
+    """Accumulated errors of each part of PARTS."""
 
     def __init__(self) -> None:
         self._sum = dict.fromkeys(PARTS, 0.0)
@@ -60,15 +58,15 @@ class ErrorParts:
     def add(
         self, predicted: NDArray[Any], truth: Mapping[str, NDArray[Any]], colour: NDArray[np.uint8]
     ) -> None:
-        """Count a view's valid pixels.
+        """Add the valid pixels of a view.
 
-        predicted: (H, W, 3). truth: normal (H, W, 3), valid (H, W) and, where it is known, depth
-        (H, W) metres, 0 = unknown. colour: sRGB of any size; each pixel takes the nearest.
+        predicted: (H, W, 3). truth: normal (H, W, 3), valid (H, W) and optionally depth (H, W)
+        metres, 0 = unknown. colour: sRGB of any size, resized by the nearest pixel.
         """
         valid = truth["valid"]
         height, width = valid.shape
         errors = angles_deg(predicted[valid], truth["normal"][valid])
-        luma = (resized_nearest(colour, width, height)[valid] @ np.array(_LUMA)) / 255
+        luma = (resized_nearest(colour, width, height)[valid] @ LUMINANCE) / 255
         masks = list(surface_kinds(truth["normal"][valid]).values())
         if "depth" in truth:
             depth = truth["depth"][valid]
@@ -81,10 +79,10 @@ class ErrorParts:
             self._n[part] += int(mask.sum())
 
     def means_deg(self) -> dict[str, float]:
-        """The mean angle of each part that has pixels."""
+        """The mean angle of each part with pixels."""
         return {part: self._sum[part] / n for part, n in self._n.items() if n}
 
     def shares(self) -> dict[str, float]:
-        """The share of all pixels that each part has."""
+        """The share of all pixels in each part."""
         total = max(sum(self._n[part] for part in PARTS[:5]), 1)
         return {part: n / total for part, n in self._n.items()}

@@ -1,1 +1,1 @@
-"""The networks of the study, the paper's and small ones, and where they start from; needs torch."""
+"""The networks of the study, the paper's and small ones, and their first weights."""

@@ -1,7 +1,7 @@
-"""Segmentation as the paper has it: VGG-16 with dilated convolutions (Yu and Koltun 2016); no effects.
+"""The paper's network for segmentation: VGG-16 with dilated convolutions (Yu and Koltun 2016).
 
-The last two poolings are left out and what follows is dilated instead; the picture is padded by
-reflection, so that the 7x7 layer dilated by 4 sees no zeros. Scores stand at an eighth of the size.
+Dilation replaces the last two poolings; the map is padded by reflection, so that the 7x7 layer
+dilated by 4 sees no zeros. Scores have an eighth of the resolution.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from torch.nn import functional
 
 from pbrs_farm.study.networks.vgg import STAGES, TINY_STAGES, vgg_stages
 
-STRIDE: Final = 8  # pixels of the picture a score stands for
+STRIDE: Final = 8  # pixels of the picture per score
 _DILATIONS: Final = (1, 1, 1, 1, 2)  # of the five stages
 _CONTEXT: Final = (1, 1, 2, 4, 8, 16, 1)  # dilations of the context module; a 1x1 layer ends it
 
@@ -24,8 +24,8 @@ class DilatedVgg(nn.Module):  # type: ignore[misc]
     """(B, n_in, H, W) colour -> (B, n_classes, H, W) scores, upsampled bilinearly.
 
     head: "full" 7x7 dilated by 4 with 4096 channels, the paper's (134 million weights), or "small"
-    3x3 dilated by 12 with 256. tiny: an eighth of the width. context: the module of 8 layers that
-    starts as the identity.
+    3x3 dilated by 12 with 256. tiny: an eighth of the width. context: a module of 8 layers,
+    initially the identity.
     """
 
     def __init__(
@@ -38,7 +38,7 @@ class DilatedVgg(nn.Module):  # type: ignore[misc]
         width = table[-1][0]
         kernel, dilation, n_hidden = (7, 4, 4096) if head == "full" else (3, 12, 256)
         n_hidden = n_hidden // 2 if tiny else n_hidden
-        self.reach = dilation * (kernel - 1) // 2  # cells of padding the first layer needs
+        self.reach = dilation * (kernel - 1) // 2  # padding of the first layer, cells
         self.head = nn.Sequential(
             nn.Conv2d(width, n_hidden, kernel, dilation=dilation), nn.ReLU(inplace=True),
             nn.Dropout(0.5), nn.Conv2d(n_hidden, n_hidden, 1), nn.ReLU(inplace=True),
@@ -61,7 +61,7 @@ class DilatedVgg(nn.Module):  # type: ignore[misc]
 
 
 def _reflected(x: Tensor, by: int) -> Tensor:
-    """x with a border of its own reflection, in as many steps as small maps need."""
+    """x padded by reflection, in several steps for small maps."""
     while by > 0:
         step = min(by, min(x.shape[-2:]) - 1)
         x = functional.pad(x, (step,) * 4, mode="reflect")
@@ -70,7 +70,7 @@ def _reflected(x: Tensor, by: int) -> Tensor:
 
 
 def _context(n: int) -> nn.Sequential:
-    """Eight layers that pass scores on unchanged until they have learnt otherwise."""
+    """Eight layers, initially the identity."""
     layers: list[nn.Module] = []
     for dilation in _CONTEXT:
         conv = nn.Conv2d(n, n, 3, padding=dilation, dilation=dilation)

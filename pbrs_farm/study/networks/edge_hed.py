@@ -1,6 +1,6 @@
-"""Boundaries as the paper has them: holistically-nested edge detection (Xie and Tu 2015); no effects.
+"""The paper's network for boundaries: holistically-nested edge detection (Xie and Tu 2015).
 
-VGG-16 with a score of edges after each stage, upsampled to the picture, and a fused one.
+VGG-16 with edge scores after each stage, upsampled to the picture, and their fusion.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ N_SIDES: Final = 5
 # The paper's result is the mean of the side outputs 2 to 4 (section 4.3).
 PAPER_SIDES: Final = slice(1, 4)
 
-# Learning rates against the rest's, as released: conv5, side scores, the fusing layer.
+# Learning rates as multiples of the plan's, as released: conv5, side scores, fusing layer.
 RATE_OF_STAGE_5, RATE_OF_SIDES, RATE_OF_FUSE = 100.0, 0.01, 0.001
 
 
@@ -32,7 +32,7 @@ class EdgeHed(nn.Module):  # type: ignore[misc]
         self.sides = nn.ModuleList(nn.Conv2d(width, 1, 1) for width, _ in table)
         self.fuse = nn.Conv2d(N_SIDES, 1, 1)
         start_he(self.stages)
-        # Sides start at nothing and are fused by equal shares, as released.
+        # As released: sides start at zero, with equal weights in the fusion.
         for side in self.sides:
             nn.init.zeros_(side.weight)
             nn.init.zeros_(side.bias)
@@ -55,9 +55,5 @@ class EdgeHed(nn.Module):  # type: ignore[misc]
 
 
 def edges_of_sides(scores: Tensor) -> Tensor:
-    """(B, H, W) edges 0..1 of (B, 6, H, W) scores: the mean of sides 2 to 4, as the paper takes it.
-
-    scores as the network gives them, before the sigmoid: five sides and their fusion; the first,
-    the last and the fusion are left out. The network: Xie and Tu 2015.
-    """
+    """(B, H, W) edges 0..1: the mean of sides 2 to 4 of scores (B, 6, H, W) before the sigmoid."""
     return torch.sigmoid(scores[:, PAPER_SIDES]).mean(1)

@@ -1,8 +1,8 @@
-"""A U-Net on EfficientNet-Lite0, whose encoder can start from ImageNet; no effects.
+"""A U-Net on EfficientNet-Lite0, whose encoder can start from ImageNet.
 
-The encoder is EfficientNet (Tan and Le 2019) without squeeze and excitation and with ReLU6, as its
-Lite variants are: 3.0 million of 4.3 million weights. The decoder is ours: two blocks of attention at a 32nd of the
-picture's size, where cells know their place, then a block a stage with a skip connection.
+The encoder is EfficientNet (Tan and Le 2019) without squeeze and excitation and with ReLU6, as in its
+Lite variants: 3.0 of 4.3 million weights. The decoder is ours: two blocks of attention at a 32nd of
+the resolution, with positions of the cells, then a block per stage with a skip connection.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ _STAGES: Final = (
     (4, 5, 2, 6, 192), (1, 3, 1, 6, 320),
 )  # fmt: skip
 _STEM: Final = 32
-_EPSILON: Final = 1e-3  # of normalisation, as it was trained
-N_FEATURES: Final = 1280  # of what its classifier looks at
-_AFTER: Final = (0, 1, 2, 4)  # stages whose outputs are skip connections: a 2nd to a 16th
-_DEEPEST: Final = 160  # channels of the cells that attend
+_EPSILON: Final = 1e-3  # of batch normalisation
+N_FEATURES: Final = 1280  # number of inputs of the classifier
+_AFTER: Final = (0, 1, 2, 4)  # stages with skip connections, at a 2nd to a 16th of the resolution
+_DEEPEST: Final = 160  # channels at the attention
 _UP: Final = (128, 96, 64, 48)  # of the decoder, from coarse to fine
 
 
@@ -48,7 +48,7 @@ class EfficientUnet(nn.Module):  # type: ignore[misc]
         self.head = nn.Conv2d(_UP[-1], n_out * FOLD**2, 3, padding=1)
 
     def forward(self, x: Tensor) -> Tensor:
-        """The map, of no particular length."""
+        """Output before normalisation."""
         x, skips = self.encoder(x)
         x = attended(self.narrow(x), self.place, self.attention)
         return functional.pixel_shuffle(self.head(decode(self.up, x, skips)), FOLD)
@@ -70,7 +70,7 @@ class LiteEncoder(nn.Module):  # type: ignore[misc]
         self.stages = nn.ModuleList(stages)
 
     def forward(self, x: Tensor) -> tuple[Tensor, list[Tensor]]:
-        """Bottleneck features, and what `decode` takes beside them."""
+        """Bottleneck features and skip connections."""
         x = self.stem(x)
         skips: list[Tensor] = []
         for k, stage in enumerate(self.stages):
@@ -81,7 +81,7 @@ class LiteEncoder(nn.Module):  # type: ignore[misc]
 
 
 class LiteFeatures(nn.Module):  # type: ignore[misc]
-    """(B, 3, H, W) -> (B, 1280) features, 0 to 6: what EfficientNet-Lite0's classifier looks at."""
+    """(B, 3, H, W) -> (B, 1280) features, 0 to 6: the input of EfficientNet-Lite0's classifier."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -94,7 +94,7 @@ class LiteFeatures(nn.Module):  # type: ignore[misc]
 
 
 class _Inverted(nn.Module):  # type: ignore[misc]
-    """An inverted residual (Sandler et al. 2018): wider, filtered a channel alone, narrower."""
+    """Inverted residual block (Sandler et al. 2018): expand, depthwise filter, project."""
 
     def __init__(self, n_in: int, n_out: int, kernel: int, stride: int, expansion: int) -> None:
         super().__init__()
@@ -112,14 +112,14 @@ class _Inverted(nn.Module):  # type: ignore[misc]
 def _unit(
     n_in: int, n_out: int, kernel: int, *, stride: int = 1, groups: int = 1, is_last: bool = False
 ) -> nn.Sequential:
-    """Convolution, normalisation and, but for the last of a block, ReLU6."""
+    """Convolution, normalisation and, except at the end of a block, ReLU6."""
     conv = _SameConv(n_in, n_out, kernel, stride=stride, groups=groups, bias=False)
     norm = nn.BatchNorm2d(n_out, eps=_EPSILON)
     return nn.Sequential(conv, norm, *([] if is_last else [nn.ReLU6(inplace=True)]))
 
 
 class _SameConv(nn.Conv2d):  # type: ignore[misc]
-    """A convolution that pads as TensorFlow's "same": at a stride of 2 more at the end than before it."""
+    """A convolution with the padding "same" of TensorFlow: with stride 2, more at the end."""
 
     def forward(self, x: Tensor) -> Tensor:
         pads: list[int] = []

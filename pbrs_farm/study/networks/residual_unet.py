@@ -1,8 +1,8 @@
-"""A U-Net of residual blocks with attention at its deepest stage, for two cores; no effects.
+"""A U-Net of residual blocks with attention at its deepest stage, for two cores.
 
-Our own, about 2.3 million weights. Which way a bare wall faces follows from corners and edges far
-from it, so that at a 32nd of the picture's size every cell attends to every other (Vaswani et
-al. 2017), each knowing where it lies. Blocks are those of He et al. 2016, section 3.
+Our own, about 2.3 million weights. The orientation of a bare wall follows from distant corners and
+edges, so at a 32nd of the resolution every cell attends to every other (Vaswani et al. 2017), with
+its position. Blocks are those of He et al. 2016, section 3.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class ResidualUnet(nn.Module):  # type: ignore[misc]
         self.head = nn.Conv2d(widths[0], n_out * FOLD**2, 3, padding=1)
 
     def forward(self, x: Tensor) -> Tensor:
-        """The map, of no particular length."""
+        """Output before normalisation."""
         x = functional.pixel_unshuffle(x, FOLD)
         x = self.stem(torch.cat([x, rows_and_columns(x)], 1))
         x, skips = encode(self.down, x)
@@ -44,9 +44,9 @@ class ResidualUnet(nn.Module):  # type: ignore[misc]
 
 
 def attended(x: Tensor, place: nn.Linear, blocks: nn.ModuleList) -> Tensor:
-    """Features (B, C, H, W) after every cell has attended to every other, each with its place in the picture.
+    """Features (B, C, H, W) after attention between all cells.
 
-    place: rows and columns to C channels. blocks: `Attention` of C channels.
+    place: layer from rows and columns to C channels. blocks: `Attention` of C channels.
     """
     cells = x.flatten(2).mT + place(rows_and_columns(x).flatten(2).mT)
     for block in blocks:
@@ -55,13 +55,12 @@ def attended(x: Tensor, place: nn.Linear, blocks: nn.ModuleList) -> Tensor:
 
 
 class Residual(nn.Module):  # type: ignore[misc]
-    """Two convolutions beside a short cut."""
+    """Two convolutions with a short cut."""
 
     def __init__(self, n_in: int, n_out: int) -> None:
         super().__init__()
         self.first, self.second = _convolution(n_in, n_out), _convolution(n_out, n_out)
-        same = n_in == n_out
-        self.short_cut = nn.Identity() if same else nn.Conv2d(n_in, n_out, 1, bias=False)
+        self.short_cut = nn.Identity() if n_in == n_out else nn.Conv2d(n_in, n_out, 1, bias=False)
 
     def forward(self, x: Tensor) -> Tensor:
         y = self.second(functional.relu(self.first(x)))

@@ -1,8 +1,8 @@
-"""A network for two cores: a U-Net on blocks of 2x2 pixels that knows where in the picture it is; no effects.
+"""A network for two cores: a U-Net on blocks of 2x2 pixels with their positions.
 
-Our own, about 1.2 million weights. Full resolution costs most on a processor, so pixels are folded
-into channels first and unfolded last; half of what is known of a room's normals is where they lie
-in the picture, so rows and columns are two channels more.
+Our own, about 1.2 million weights. Full resolution is the most expensive on a processor, so pixels
+are folded into channels first and unfolded last; normals in a room depend strongly on the position
+in the picture, so rows and columns are two more channels.
 """
 
 from __future__ import annotations
@@ -34,20 +34,20 @@ class SmallUnet(nn.Module):  # type: ignore[misc]
         self.head = nn.Conv2d(widths[0], n_out * FOLD**2, 3, padding=1)
 
     def forward(self, x: Tensor) -> Tensor:
-        """The map, of no particular length."""
+        """Output before normalisation."""
         x = functional.pixel_unshuffle(x, FOLD)
         x = self.stem(torch.cat([x, rows_and_columns(x)], 1))
-        # Encode; give the bottleneck the mean over the whole picture; decode.
+        # The bottleneck also gets the mean over the whole picture.
         x, skips = encode(self.down, x)
         x = x + self.context(x.mean((2, 3)))[..., None, None]
         return functional.pixel_shuffle(self.head(decode(self.up, x, skips)), FOLD)
 
 
 def encode(stages: nn.ModuleList, x: Tensor) -> tuple[Tensor, list[Tensor]]:
-    """Bottleneck features of x, and the skip connections from fine to coarse.
+    """Bottleneck features of x (B, C, H, W), and the skip connections from fine to coarse.
 
-    x: (B, C, H, W). Each stage sees its input averaged over 2x2 pixels (rounded up at an odd edge);
-    what it was given is kept at its own size for `decode`.
+    Each stage gets its input averaged over 2x2 pixels (rounded up at an odd edge); the skip
+    connection is the input itself.
     """
     skips: list[Tensor] = []
     for stage in stages:
@@ -57,10 +57,9 @@ def encode(stages: nn.ModuleList, x: Tensor) -> tuple[Tensor, list[Tensor]]:
 
 
 def decode(stages: nn.ModuleList, x: Tensor, skips: list[Tensor]) -> Tensor:
-    """Features at full size, of bottleneck features and the skip connections of `encode`.
+    """Features at full size from the bottleneck features and skip connections of `encode`.
 
-    Each stage takes the features below it, upsampled bilinearly to the size of its skip connection,
-    and that connection beside them.
+    Each stage gets the coarser features, upsampled bilinearly, beside its skip connection.
     """
     for stage, skip in zip(stages, reversed(skips), strict=True):
         size = skip.shape[-2:]
@@ -78,11 +77,7 @@ def _block(n_in: int, n_out: int) -> nn.Sequential:
 
 
 def rows_and_columns(x: Tensor) -> Tensor:
-    """(B, 2, H, W): -1 to 1 down the rows, and along the columns.
-
-    Of the type and device of x, which is (B, C, H, W). Corners are -1 and 1 exactly, whatever the
-    size.
-    """
+    """(B, 2, H, W) positions, -1 to 1 along rows and columns, for x (B, C, H, W)."""
     batch, _, height, width = x.shape
     rows = torch.linspace(-1, 1, height, dtype=x.dtype, device=x.device)
     columns = torch.linspace(-1, 1, width, dtype=x.dtype, device=x.device)

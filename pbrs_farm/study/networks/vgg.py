@@ -1,4 +1,4 @@
-"""The 13 convolutions of VGG-16 (Simonyan and Zisserman 2015), which three networks begin with; no effects."""
+"""The 13 convolutions of VGG-16 (Simonyan and Zisserman 2015), the encoder of three networks."""
 
 from __future__ import annotations
 
@@ -6,17 +6,17 @@ import itertools
 from collections.abc import Sequence
 from typing import Final
 
-from torch import Tensor, nn
+from torch import nn
 
-# Width and number of the convolutions of each stage; a pooling by 2 stands between stages.
+# Width and number of the convolutions of each stage; a pooling by 2 separates stages.
 STAGES: Final = ((64, 2), (128, 2), (256, 3), (512, 3), (512, 3))
 
-# The same shape at an eighth of the width and fewer convolutions: minutes on two cores.
+# About an eighth of the width, and fewer convolutions: trains in minutes on two cores.
 TINY_STAGES: Final = ((16, 1), (32, 2), (64, 2), (96, 2), (96, 2))
 
 
 def unit(n_in: int, n_out: int, *, batch_norm: bool, dilation: int = 1) -> list[nn.Module]:
-    """Convolution 3x3, batch normalisation if asked for, ReLU."""
+    """Convolution 3x3, optional batch normalisation, ReLU."""
     conv = nn.Conv2d(n_in, n_out, 3, padding=dilation, dilation=dilation)
     norm = [nn.BatchNorm2d(n_out)] if batch_norm else []
     return [conv, *norm, nn.ReLU(inplace=True)]
@@ -42,7 +42,7 @@ def vgg_stages(
     dilations: Sequence[int] = (1, 1, 1, 1, 1),
     n_in: int = 3,
 ) -> nn.ModuleList:
-    """The five stages, poolings left out."""
+    """The five stages without poolings."""
     inputs = [n_in] + [width for width, _ in table[:-1]]
     return nn.ModuleList(
         stage(n_in, width, n_convs, batch_norm=batch_norm, dilation=dilation)
@@ -51,21 +51,13 @@ def vgg_stages(
 
 
 def convolutions(module: nn.Module) -> list[nn.Conv2d]:
-    """All convolutions inside a module, in the order they are applied."""
+    """All convolutions of a module in order."""
     return [m for m in module.modules() if isinstance(m, nn.Conv2d)]
 
 
 def start_he(module: nn.Module) -> None:
-    """Draw weights for ReLU layers (He et al. 2015); biases 0."""
+    """Initialise weights for ReLU layers (He et al. 2015) and biases with 0."""
     for conv in convolutions(module):
         nn.init.kaiming_normal_(conv.weight, nonlinearity="relu")
         if conv.bias is not None:
             nn.init.zeros_(conv.bias)
-
-
-def cropped_to(x: Tensor, like: Tensor) -> Tensor:
-    """x without what it has more at the right and the bottom: transposed layers round up.
-
-    x and like are (B, C, H, W); x must be at least as large. Channels may differ.
-    """
-    return x[..., : like.shape[-2], : like.shape[-1]]

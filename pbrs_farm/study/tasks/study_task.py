@@ -38,7 +38,7 @@ class StudyTask(ABC):
 
     name: str
     layers: tuple[str, ...]  # requested of each view
-    targets_of_pixels: tuple[str, ...]  # the batch's arrays (B, H, W, ...) that are trained on
+    targets_of_pixels: tuple[str, ...]  # arrays (B, H, W, ...) of targets in a batch
     figures: tuple[str, ...]  # columns of a table; runs are ranked by the first
     error_name: str  # description of `error`, with its unit
     error_scale: float = 100  # factor of an error in texts: 1, or 100 for shares
@@ -51,7 +51,7 @@ class StudyTask(ABC):
 
     @abstractmethod
     def targets(self, sample: Sample, plan: TrainingPlan) -> Arrays:
-        """Training targets of a view; BadInput if the view has none."""
+        """Training targets of a view; BadInput for a view without them."""
 
     @abstractmethod
     def loss(self, output: Tensor, batch: Batch, plan: TrainingPlan) -> Tensor:

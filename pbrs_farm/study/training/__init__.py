@@ -1,1 +1,1 @@
-"""A plain training loop that can be killed and goes on to the same weights; needs torch and numpy alone."""
+"""A training loop that resumes to the same weights after a kill."""

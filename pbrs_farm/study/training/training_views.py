@@ -188,7 +188,7 @@ def arrays_of_samples(samples: Iterable[Sample], task: StudyTask, plan: Training
 
 
 def arrays_of_sample(sample: Sample, task: StudyTask, plan: TrainingPlan) -> Arrays:
-    """Colour and targets of one view by name; BadInput if it has none."""
+    """Colour and targets of one view by name; BadInput for a view without targets."""
     if sample.colour is None or sample.size != (plan.width_px, plan.height_px):
         size = f"{plan.width_px}x{plan.height_px}"
         raise BadInput(sample.id, "colour", f"expected {size} pixels, got {sample.size}")

@@ -82,7 +82,7 @@ class TrainingSource:
 def training_views(source: TrainingSource, plan: TrainingPlan) -> TrainingViews:
     """Training views in memory, or streamed if they exceed plan.memory_gb; mixed with source.mix.
 
-    Raises BadInput if there are none.
+    Raises BadInput without any.
     """
     views = _rendered_or_real(source, plan)
     if not source.mix:
@@ -124,7 +124,7 @@ def _rendered_or_real(source: TrainingSource, plan: TrainingPlan) -> TrainingVie
 def held_out_views(source: TrainingSource, plan: TrainingPlan, most: int = 0) -> ViewArrays | None:
     """At most so many views of the held-out homes within plan.memory_gb; of NYUv2 the test pictures.
 
-    None if there are none.
+    None without held-out views.
     """
     if source.is_nyu:
         return _nyu_views(source, plan, "test", most)
