@@ -1,4 +1,4 @@
-"""NYUv2's .mat, built in code: judged on, tuned on, and what is refused."""
+"""NYUv2's .mat, built in code: tests, tuning, and refused files."""
 
 from __future__ import annotations
 
@@ -46,16 +46,16 @@ def test_pictures_are_cut_to_the_crop_and_the_test_split(task: str, mat: Path) -
     assert "2 test pictures" in views.truth
     # The crop is 561x427: wider than 4:3 by a few pixels of height.
     assert views.sizes == [(421, 561)] * 2
-    seen = task_of(task).prediction_of(views.truths[0])
+    prediction = task_of(task).prediction_of(views.truths[0])
     if task == "normals":
         assert views.truths[0]["valid"].mean() > 0.9
-        np.testing.assert_allclose(seen[200, 200], [0, 0, -1], atol=1e-3)
+        np.testing.assert_allclose(prediction[200, 200], [0, 0, -1], atol=1e-3)
     elif task == "segmentation":
-        assert (seen == 5).all()
+        assert (prediction == 5).all()
     elif task == "depth":
-        np.testing.assert_allclose(seen, 2.5)
+        np.testing.assert_allclose(prediction, 2.5)
     else:
-        assert (np.nonzero(seen.any(0))[0] == 279).all()
+        assert (np.nonzero(prediction.any(0))[0] == 279).all()
 
 
 @pytest.mark.parametrize("task", ["normals", "segmentation", "boundaries", "depth"])
@@ -93,11 +93,11 @@ def test_a_run_is_tuned_on_it_and_judged_beside_the_papers_tuned_row(
     assert record["views"] == {"train": 1, "held_out": 2}
     capsys.readouterr()
     assert main(["evaluate", tuned, "--on", str(mat), "--on", f"home={root}"]) == 0
-    said = capsys.readouterr().out
-    assert "paper: MLT-IL/OL, then NYUv2, on NYUv2" in said
-    assert "21.74" in said
-    assert "NYUv2 (2)" in said
-    assert "home (2)" in said
+    text = capsys.readouterr().out
+    assert "paper: MLT-IL/OL, then NYUv2, on NYUv2" in text
+    assert "21.74" in text
+    assert "NYUv2 (2)" in text
+    assert "home (2)" in text
     # Without splits.mat nobody knows which pictures trained.
     (mat.parent / "splits.mat").unlink()
     assert main(["evaluate", tuned, "--on", str(mat)]) == 1

@@ -1,4 +1,4 @@
-"""Normals of depth against planes that are known."""
+"""Normals of depth against known planes."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ def test_a_planes_normal_is_found_everywhere(normal: tuple[float, ...]) -> None:
     unit = np.array(normal) / np.linalg.norm(normal)
     depth = _depth_of_plane(unit, 2.0)
     depth = np.where((depth > 0.3) & (depth < 8), depth, 0)
-    found, trusted = normals_of_depth(depth, K)
+    fitted, trusted = normals_of_depth(depth, K)
     assert trusted[20:100, 20:140].mean() > 0.7
-    assert angles_deg(found[trusted], np.broadcast_to(unit, found.shape)[trusted]).max() < 0.05
+    assert angles_deg(fitted[trusted], np.broadcast_to(unit, fitted.shape)[trusted]).max() < 0.05
 
 
 def test_noise_of_a_depth_camera_tilts_normals_by_few_degrees() -> None:
@@ -37,17 +37,18 @@ def test_noise_of_a_depth_camera_tilts_normals_by_few_degrees() -> None:
     unit /= np.linalg.norm(unit)
     depth = _depth_of_plane(unit, 2.5)
     noisy = 1 / (1 / depth + np.random.default_rng(0).normal(0, 0.0008, depth.shape))
-    found, trusted = normals_of_depth(noisy, K)
+    normal, trusted = normals_of_depth(noisy, K)
     assert trusted.mean() > 0.8
-    assert angles_deg(found[trusted], np.broadcast_to(unit, found.shape)[trusted]).mean() < 10
+    assert angles_deg(normal[trusted], np.broadcast_to(unit, normal.shape)[trusted]).mean() < 10
 
 
 def test_two_planes_at_a_step_do_not_mix() -> None:
     depth = np.full((120, 160), 3.0)
     depth[:, 80:] = 2.0
-    found, trusted = normals_of_depth(depth, K)
+    normal, trusted = normals_of_depth(depth, K)
     assert (
-        angles_deg(found[trusted], np.broadcast_to([0, 0, -1.0], found.shape)[trusted]).max() < 0.01
+        angles_deg(normal[trusted], np.broadcast_to([0, 0, -1.0], normal.shape)[trusted]).max()
+        < 0.01
     )
 
 
@@ -55,7 +56,7 @@ def test_nothing_is_trusted_where_depth_is_unknown_or_rough() -> None:
     depth = np.full((120, 160), 2.0)
     depth[40:80, 40:80] = 0
     depth[:, 120:] = 2 + np.random.default_rng(1).normal(0, 0.06, (120, 40))
-    found, trusted = normals_of_depth(depth, K)
+    normal, trusted = normals_of_depth(depth, K)
     assert not trusted[40:80, 40:80].any()
     assert trusted[:, 126:154].mean() < 0.1
-    assert (found[~trusted] == 0).all()
+    assert (normal[~trusted] == 0).all()

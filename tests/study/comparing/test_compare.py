@@ -1,4 +1,4 @@
-"""`compare`: a root beside photographs and beside itself, the page, and what it refuses."""
+"""`compare`: a root with photographs and with itself, the page, and refused input."""
 
 from __future__ import annotations
 
@@ -38,33 +38,33 @@ def lite(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 def _compared(root: Path, photographs: Path, out: Path, *words: str) -> dict[str, Any]:
     assert main(["compare", str(root), str(photographs), "--out", str(out), *words]) == 0
-    found: dict[str, Any] = json.loads((out / "compare.json").read_text())
-    return found
+    report: dict[str, Any] = json.loads((out / "compare.json").read_text())
+    return report
 
 
 def _photographs(folder: Path, light: float = 1) -> Path:
     """Pictures of four other homes as photographs, with their depth and camera."""
     folder.mkdir()
-    other = folder.with_suffix(".root")
-    fill(FolderStore(other), {f"home-{k}-00000000": 3 for k in range(8)}, SIZE)
-    frames = [frame for frame in open_views(other) if frame.ref.house >= "home-4"]
+    source = folder.with_suffix(".root")
+    fill(FolderStore(source), {f"home-{k}-00000000": 3 for k in range(8)}, SIZE)
+    frames = [frame for frame in open_views(source) if frame.ref.house >= "home-4"]
     for frame in frames:
         name = frame.id.replace("/", "_")
         rgb = np.rint(light * frame.colour.astype(float)).astype(np.uint8)
         (folder / f"{name}_rgb.png").write_bytes(png_from_array(rgb))
         (folder / f"{name}_depth.png").write_bytes(png_from_array(frame.layer("depth")))
-    fx, fy, cx, cy = (frame.k[at] for at in ((0, 0), (1, 1), (0, 2), (1, 2)))
+    fx, fy, cx, cy = (frame.k[index] for index in ((0, 0), (1, 1), (0, 2), (1, 2)))
     (folder / "intrinsics.json").write_text(json.dumps({"fx": fx, "fy": fy, "cx": cx, "cy": cy}))
     return folder
 
 
 def test_a_root_is_at_no_distance_from_itself(root: Path, tmp_path: Path) -> None:
-    found = _compared(root, root, tmp_path / "out")
-    assert found["appearance"]["kernel_distance"]["value"] == pytest.approx(0, abs=1e-6)
+    report = _compared(root, root, tmp_path / "out")
+    assert report["appearance"]["kernel_distance"]["value"] == pytest.approx(0, abs=1e-6)
     for name in ("colour", "depth", "classes"):
-        assert found["histograms"][name]["shared"]["value"] == pytest.approx(1), name
-    assert found["views"]["groups"] == found["photographs"]["groups"] == 4
-    assert all(row["view"] == row["photograph"] for row in found["unlike"])
+        assert report["histograms"][name]["shared"]["value"] == pytest.approx(1), name
+    assert report["views"]["groups"] == report["photographs"]["groups"] == 4
+    assert all(row["view"] == row["photograph"] for row in report["unlike"])
 
 
 def test_darker_photographs_are_farther(root: Path, tmp_path: Path) -> None:
@@ -94,10 +94,10 @@ def test_photographs_without_depth_compare_appearance_alone(root: Path, tmp_path
         rgb = np.random.default_rng(k).integers(0, 256, (70, 90, 3)).astype(np.uint8)
         # A name that ends as a pair's would, without any depth.
         (folder / f"room{k}/chair_image.jpg").write_bytes(jpeg_from_array(rgb))
-    found = _compared(root, folder, tmp_path / "out", "--views", "3")
-    assert found["photographs"]["pictures"] == found["views"]["pictures"] == 3
-    assert found["histograms"].keys() == {"colour"}
-    assert "no depth" in found["notes"][0]
+    report = _compared(root, folder, tmp_path / "out", "--views", "3")
+    assert report["photographs"]["pictures"] == report["views"]["pictures"] == 3
+    assert report["histograms"].keys() == {"colour"}
+    assert "no depth" in report["notes"][0]
     page = (tmp_path / "out/index.html").read_text()
     assert "nearest photograph" in page
     assert "<script" not in page
@@ -113,11 +113,11 @@ def test_pictures_that_cannot_be_compared_are_named_and_left_out(
         rgb = rng.integers(0, 256, (*size, 3)).astype(np.uint8)
         (folder / f"{name}.jpg").write_bytes(jpeg_from_array(rgb))
     (folder / "torn.jpg").write_bytes(b"\xff\xd8 torn")
-    found = _compared(root, folder, tmp_path / "out")
-    assert found["photographs"]["pictures"] == 2
-    told = capsys.readouterr().err
-    assert "torn.jpg" in told
-    assert "small.jpg: 60x40 pixels" in told
+    report = _compared(root, folder, tmp_path / "out")
+    assert report["photographs"]["pictures"] == 2
+    message = capsys.readouterr().err
+    assert "torn.jpg" in message
+    assert "small.jpg: 60x40 pixels" in message
     page = (tmp_path / "out/index.html").read_text()
     assert "Left out: 2" in page
     assert "torn.jpg" in page
@@ -137,10 +137,10 @@ def test_too_few_photographs_are_an_error_that_names_the_folder(
             (folder / name).write_bytes(jpeg_from_array(np.zeros((60, 80, 3), np.uint8)))
     words = ["compare", str(root), str(folder), "--out", str(tmp_path / "out")]
     assert main(words) != 0
-    told = capsys.readouterr().err
-    assert text in told
-    assert str(folder) in told
-    assert "Traceback" not in told
+    message = capsys.readouterr().err
+    assert text in message
+    assert str(folder) in message
+    assert "Traceback" not in message
 
 
 def test_a_root_without_views_and_a_missing_package_are_told(

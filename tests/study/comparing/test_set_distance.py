@@ -1,4 +1,4 @@
-"""Distances of sets of pictures against sums over pairs written out, and what is counted of a picture."""
+"""Distances of sets of pictures against explicit sums over pairs, and statistics of a picture."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ THEIRS = Grouped(np.random.default_rng(4).normal(0.6, 1, size=(4, 5)), ("x", "y"
 
 
 def _mean_kernel(a: Grouped, b: Grouped) -> float:
-    """Over all pairs of pictures that are of different groups."""
+    """Sum over all pairs of pictures of different groups."""
     values = [
         (float(x @ y) / 5 + 1) ** 3
         for (x, g), (y, h) in itertools.product(
@@ -37,9 +37,9 @@ def test_the_kernel_distance_is_over_pairs_of_different_groups() -> None:
     expected = (
         _mean_kernel(OURS, OURS) + _mean_kernel(THEIRS, THEIRS) - 2 * _mean_kernel(OURS, THEIRS)
     )
-    found = kernel_distance(OURS, THEIRS)
-    assert found.value == pytest.approx(1000 * expected)
-    assert found.low < found.value < found.high
+    distance = kernel_distance(OURS, THEIRS)
+    assert distance.value == pytest.approx(1000 * expected)
+    assert distance.low < distance.value < distance.high
 
 
 def test_a_set_is_at_no_distance_from_itself_and_the_order_does_not_count() -> None:
@@ -54,17 +54,17 @@ def test_the_distance_of_equal_distributions_is_zero_on_average() -> None:
         rows = np.random.default_rng(seed).normal(size=(12, 4))
         names = tuple(map(str, range(12)))
         values.append(kernel_distance(Grouped(rows[:6], names[:6]), Grouped(rows[6:], names[6:])).value)  # fmt: skip
-    # No bias: the mean lies within three of its standard errors.
+    # No bias: the mean is within three of its standard errors.
     assert abs(np.mean(values)) < 3 * np.std(values) / np.sqrt(len(values))
 
 
 def test_an_interval_over_few_groups_is_wider_than_over_many_pictures() -> None:
     dice = np.random.default_rng(5)
     rows = np.repeat(dice.normal(size=(4, 5)), 10, axis=0) + 0.01 * dice.normal(size=(40, 5))
-    others = Grouped(dice.normal(size=(200, 5)), tuple(f"p{k}" for k in range(200)))
+    photographs = Grouped(dice.normal(size=(200, 5)), tuple(f"p{k}" for k in range(200)))
     single = Grouped(rows, tuple(map(str, range(40))))
     homes = Grouped(rows, tuple("abcd"[k // 10] for k in range(40)))
-    narrow, wide = (kernel_distance(each, others) for each in (single, homes))
+    narrow, wide = (kernel_distance(each, photographs) for each in (single, homes))
     assert wide.high - wide.low > 1.5 * (narrow.high - narrow.low)
 
 
@@ -72,17 +72,17 @@ def test_shared_histograms_are_sums_of_minima_of_means() -> None:
     a = Grouped(np.array([[1.0, 0, 0], [0, 1, 0]]), ("a", "b"))
     b = Grouped(np.array([[0.2, 0.2, 0.6]]), ("x",))
     assert shared_histogram(a, b).value == pytest.approx(0.2 + 0.2)
-    found = shared_histogram(a, a)
-    assert found.value == pytest.approx(1)
-    assert 0 <= found.low <= 1 == pytest.approx(found.high)
+    overlap = shared_histogram(a, a)
+    assert overlap.value == pytest.approx(1)
+    assert 0 <= overlap.low <= 1 == pytest.approx(overlap.high)
 
 
 def test_halves_of_equal_pictures_share_all_and_few_groups_have_none() -> None:
     rows = np.tile([0.25, 0.75], (6, 1))
     assert shared_of_halves(Grouped(rows, tuple("abcdef"))) == pytest.approx(1)
     assert shared_of_halves(Grouped(rows, tuple("aabbcc"))) is None
-    apart = Grouped(np.eye(4), tuple("abcd"))
-    assert shared_of_halves(apart) == pytest.approx(0)
+    disjoint = Grouped(np.eye(4), tuple("abcd"))
+    assert shared_of_halves(disjoint) == pytest.approx(0)
 
 
 def test_pictures_are_drawn_singly_where_there_are_fewer_than_three_groups() -> None:
@@ -120,6 +120,6 @@ def test_without_depth_only_appearance_is_counted() -> None:
     facts = facts_of("a", "a", np.zeros((30, 40, 3), np.uint8))
     assert facts.histograms.keys() == {"colour", "luma"}
     assert "frontal" not in facts.numbers
-    # Depth that is nowhere known says nothing, either.
+    # Unknown depth adds nothing either.
     blind = facts_of("a", "a", np.zeros((30, 40, 3), np.uint8), np.zeros((30, 40)), np.eye(3))
     assert "depth" not in blind.histograms

@@ -19,7 +19,7 @@ _RENDER = (
 
 def test_four_lights_are_compared_on_a_home_that_never_trained(tmp_path: Path) -> None:
     assert main([*_RENDER.split(), "--out", str(tmp_path / "root")]) == 0
-    # Let the same rooms stand for another home.
+    # The same rooms serve as another home.
     (house,) = (tmp_path / "root" / "houses").iterdir()
     villa = tmp_path / "other" / "houses" / "villa-00000000"
     shutil.copytree(house, villa)

@@ -1,4 +1,4 @@
-"""The bench that asks a detector of our things: which count, what is found; and the nodes of its graph."""
+"""The benchmark with an object detector: counted items, matches, and the nodes of its graph."""
 
 from __future__ import annotations
 
@@ -68,14 +68,14 @@ def test_things_that_are_cut_or_hidden_do_not_count(tmp_path: Path) -> None:
 def test_photographs_are_read_from_cocos_file(tmp_path: Path) -> None:
     (tmp_path / "a.png").write_bytes(png_from_array(np.zeros((50, 100, 3), np.uint8)))
     box = {"image_id": 1, "bbox": [10, 5, 10, 20], "iscrowd": 0}
-    found = {
+    detections = {
         "images": [{"id": 1, "file_name": "a.png"}, {"id": 2, "file_name": "none.png"}],
         "categories": [{"id": 46, "name": "wine glass"}, {"id": 1, "name": "person"}],
         "annotations": [
             box | {"category_id": 46}, box | {"category_id": 1}, box | {"category_id": 46, "iscrowd": 1},
         ],
     }  # fmt: skip
-    (tmp_path / "boxes.json").write_text(json.dumps(found))
+    (tmp_path / "boxes.json").write_text(json.dumps(detections))
     ((name, _, things),) = detector.pictures_of_coco(tmp_path / "boxes.json", tmp_path)
     assert (name, things) == ("a.png", [Thing("a.png", "cup", 0.2, (10, 5, 20, 25))])
 
@@ -88,9 +88,9 @@ def test_the_bench_tells_the_recall_of_kept_results(
     assert "benchmarks.study.detector" in capsys.readouterr().err
     rows = {"views": [as_row(CUP)]}
     (tmp_path / "results.json").write_text(json.dumps(rows))
-    found = study_figures._detector()
-    assert found == {"study.detector_small": 0.0}
-    assert found.keys() <= study_figures.UNITS.keys()
+    figures = study_figures._detector()
+    assert figures == {"study.detector_small": 0.0}
+    assert figures.keys() <= study_figures.UNITS.keys()
 
 
 def test_a_convolution_pads_as_tensorflows_same() -> None:

@@ -84,9 +84,9 @@ def test_homes_are_held_out_whole(root: Path) -> None:
 
 def test_shards_train_as_their_root_does(root: Path, tmp_path: Path) -> None:
     pack(open_views(root), tmp_path / "shards", Packing(modes=("mlt_il_ol",), views_per_shard=4))
-    plan, held = small_plan(), frozenset({"home-2"})
+    plan, hold_out = small_plan(), frozenset({"home-2"})
     whole, packed = (
-        training_views(TrainingSource((str(place),), hold_out=held), plan)
+        training_views(TrainingSource((str(place),), hold_out=hold_out), plan)
         for place in (root, tmp_path / "shards")
     )
     assert whole.digest() == packed.digest()
@@ -97,7 +97,7 @@ def test_the_table_shows_homes_baseline_and_paper_side_by_side(
 ) -> None:
     words = ["evaluate", str(run), "--on", f"home={root}", "--on", f"photos={pairs}"]
     assert main([*words, "--out", str(run / "e")]) == 0
-    said = capsys.readouterr().out
+    text = capsys.readouterr().out
     for column in (
         "training homes (6)",
         "held-out homes (3)",
@@ -105,22 +105,22 @@ def test_the_table_shows_homes_baseline_and_paper_side_by_side(
         "photos (1)",
         "mean normal",
     ):
-        assert column in said
-    assert "paper: MLT-IL/OL, on NYUv2" in said
-    assert "27.90" in said
-    assert "underfit" in said
-    assert "planes fitted to depth" in said
+        assert column in text
+    assert "paper: MLT-IL/OL, on NYUv2" in text
+    assert "27.90" in text
+    assert "underfit" in text
+    assert "planes fitted to depth" in text
     # Colours by chance teach nothing, so that the held-out home may be judged alone.
     figures = json.loads((run / "e" / "evaluation.json").read_text())
-    assert [one["n_views"] for one in figures["evaluations"]] == [3, 1]
+    assert [row["n_views"] for row in figures["evaluations"]] == [3, 1]
     assert set(figures["evaluations"][1]["errors"]) == {"wall"}
     # The photograph's wall is 2 m away and faces the camera; the home's views have depth as well.
-    parts = [one["parts"] for one in figures["evaluations"]]
+    parts = [row["parts"] for row in figures["evaluations"]]
     assert parts[1].keys() == {"network", "mean normal"}
     assert {"frontal", "2 to 4 m"} <= parts[1]["mean normal"].keys()
     assert not {"up", "nearer than 2 m"} & parts[1]["mean normal"].keys()
     assert any(" m" in part for part in parts[0]["network"])
-    assert "photos: mean, degrees" in said
+    assert "photos: mean, degrees" in text
     page = (run / "e" / "index.html").read_text()
     assert page.count("<figure>") == 4 * 4
     assert "home home-2-00000000: a person" in page
@@ -199,9 +199,9 @@ def test_scannets_scenes_are_judged(tmp_path: Path, camera: str) -> None:
     views = open_judged_place(str(tmp_path), small_plan(), mode="mlt_il_ol")
     assert views.ids == ("scene0000_00/000100", "scene0001_00/000100")
     truth = views.truths[0]
-    wanted = [[0, 0, -32767]] * truth["valid"].sum()
-    np.testing.assert_allclose(truth["normal"][truth["valid"]], wanted, atol=40)
-    # The picture lies on its depth: dark on the left, bright on the right.
+    expected = [[0, 0, -32767]] * truth["valid"].sum()
+    np.testing.assert_allclose(truth["normal"][truth["valid"]], expected, atol=40)
+    # The picture is aligned with its depth: dark on the left, bright on the right.
     colour = views.colour[0].astype(int)
     assert colour[:, :18].max() < 30
     assert colour[:, 22:].min() > 170
@@ -214,7 +214,7 @@ def test_scannets_scenes_are_judged(tmp_path: Path, camera: str) -> None:
 
 def test_scannets_labels_must_be_nyu40s(tmp_path: Path) -> None:
     write_scene(tmp_path / "s", "intrinsics_depth.txt")
-    raw = np.full((480, 640), 1163, np.uint16)  # ids of its own, of label-filt
+    raw = np.full((480, 640), 1163, np.uint16)  # another numbering, as in label-filt
     (tmp_path / "s/label/000100.png").write_bytes(png_from_array(raw))
     with pytest.raises(BadInput, match="NYU40 ids, 0 to 40"):
         open_judged_place(str(tmp_path), small_plan("segmentation"), mode="mlt_il_ol")
@@ -236,8 +236,8 @@ def test_two_places_of_one_name_and_light_of_photographs_are_one_line(pairs: Pat
         with pytest.raises(BadInput, match="photographs have no light of ours"):
             open_judged_place(f"{photographs}@mlt_ol", small_plan(), mode="mlt_il_ol")
     names = [
-        one.name
-        for one in open_judged_places(
+        views.name
+        for views in open_judged_places(
             ["a=" + words[0][5:], words[0]], small_plan(), mode="mlt_il_ol"
         )
     ]
@@ -253,8 +253,8 @@ def test_sequences_of_tum_are_judged(tmp_path: Path) -> None:
     views = open_judged_place(str(tmp_path), small_plan(), mode="mlt_il_ol")
     assert views.ids == (f"{name}/1.000000", f"{name}/3.000000")
     truth = views.truths[0]
-    wanted = [[0, 0, -32767]] * truth["valid"].sum()
-    np.testing.assert_allclose(truth["normal"][truth["valid"]], wanted, atol=40)
+    expected = [[0, 0, -32767]] * truth["valid"].sum()
+    np.testing.assert_allclose(truth["normal"][truth["valid"]], expected, atol=40)
     depth = open_judged_place(str(tmp_path), small_plan("depth"), mode="mlt_il_ol")
     assert float(depth.truths[0]["depth"].mean()) == pytest.approx(2.0, abs=1e-3)
     (tmp_path / name / "intrinsics.txt").unlink()
@@ -323,7 +323,7 @@ def test_sun_rgbds_classes_are_those_of_its_toolbox(tmp_path: Path) -> None:
     middle = second.shape[1] // 2
     assert (second[:, : middle - 1] == 37).all()
     assert (second[:, middle + 1 :] == 5).all()
-    # What is wrong with the toolbox is one line that names the file.
+    # A damaged toolbox gives one line that names the file.
     (toolbox / "SUNRGBD2Dseg.mat").write_bytes(b"MATLAB 7.3")
     with pytest.raises(BadInput, match=r"SUNRGBD2Dseg\.mat: seglabel, row 2: cannot be read"):
         open_judged_place(place, plan, mode="mlt_il_ol")
@@ -369,8 +369,8 @@ def test_all_99_thresholds_are_used_where_they_are_asked_for(
     assert main(words) == 0
     capsys.readouterr()
     assert main(["evaluate", str(out), "--on", f"home={root}", "--exact"]) == 0
-    said = capsys.readouterr().out
-    assert "thresholds: 33 of training and held-out homes, 99 of all else" in said
+    text = capsys.readouterr().out
+    assert "thresholds: 33 of training and held-out homes, 99 of all else" in text
     assert main(["evaluate", str(run), "--exact"]) == 1
     assert "normals has no thresholds" in capsys.readouterr().err
 
@@ -391,8 +391,8 @@ def test_a_home_that_trained_may_not_judge(root: Path) -> None:
 def test_a_file_is_no_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "photo.jpg").write_bytes(b"no run")
     assert main(["evaluate", str(tmp_path / "photo.jpg")]) == 1
-    (said,) = capsys.readouterr().err.splitlines()
-    assert "photo.jpg: not a run of `train`" in said
+    (message,) = capsys.readouterr().err.splitlines()
+    assert "photo.jpg: not a run of `train`" in message
 
 
 def test_a_run_that_is_not_finished_is_not_judged(run: Path, tmp_path: Path) -> None:
@@ -460,8 +460,8 @@ def test_a_table_of_what_the_paper_does_not_know_has_no_number_of_it(
     row = {"mode": "mlt_il_ol", "views": 3, "seeds": [run]}
     result = {"task": task, "plan": "tiny", "n_classes": n_classes, "judged_on": {}}
     lines = ablation_table(result | {"rows": {"traced": row}}).splitlines()
-    (told,) = (line for line in lines if line.startswith("| traced"))
-    assert told.rstrip(" |").endswith("-")
+    (table_row,) = (line for line in lines if line.startswith("| traced"))
+    assert table_row.rstrip(" |").endswith("-")
 
 
 def test_a_photograph_of_another_form_is_cut_in_its_middle() -> None:
@@ -473,11 +473,11 @@ def test_a_photograph_of_another_form_is_cut_in_its_middle() -> None:
 def test_a_home_that_one_of_several_roots_lacks_is_a_note_and_one_that_all_lack_an_error(
     root: Path, tmp_path: Path
 ) -> None:
-    other = tmp_path / "other"
-    fill(FolderStore(other), {"villa-00000000": 1}, SIZE)
-    roots, light = [f"a={root}", f"b={other}"], ["mlt_il_ol"]
-    held = TrainingSource((), hold_out=frozenset({"home-2"}), all_there=False)
-    sets = training_sets(roots, light, held)
+    second_root = tmp_path / "other"
+    fill(FolderStore(second_root), {"villa-00000000": 1}, SIZE)
+    roots, light = [f"a={root}", f"b={second_root}"], ["mlt_il_ol"]
+    source = TrainingSource((), hold_out=frozenset({"home-2"}), all_there=False)
+    sets = training_sets(roots, light, source)
     assert hold_out_notes(sets) == ["b_mlt_il_ol has no home home-2 to hold out"]
     assert len(training_views(sets[1].source, small_plan())) == 1
     nowhere = TrainingSource((), hold_out=frozenset({"home-9"}), all_there=False)
@@ -488,24 +488,24 @@ def test_a_home_that_one_of_several_roots_lacks_is_a_note_and_one_that_all_lack_
 def test_predictions_of_others_are_judged_beside_the_runs_own(
     run: Path, pairs: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    said = tmp_path / "said"
-    said.mkdir()
+    folder = tmp_path / "said"
+    folder.mkdir()
     towards = np.broadcast_to([0.0, 0.0, -1.0], (60, 90, 3))
-    np.save(said / "wall.npy", towards)
-    words = ["evaluate", str(run), "--on", f"photos={pairs}", "--predictions", f"theirs={said}"]
+    np.save(folder / "wall.npy", towards)
+    words = ["evaluate", str(run), "--on", f"photos={pairs}", "--predictions", f"theirs={folder}"]
     assert main([*words, "--out", str(tmp_path / "e")]) == 0
     rows = json.loads((tmp_path / "e" / "evaluation.json").read_text())["evaluations"]
     assert rows[0]["figures"]["theirs"]["mean_deg"] == pytest.approx(0, abs=0.3)
     assert "theirs" in capsys.readouterr().out
     # The same as `predict` writes it: x right, y forward, z up.
-    (said / "wall.npy").unlink()
+    (folder / "wall.npy").unlink()
     axes = np.broadcast_to([0.0, -1.0, 0.0], (60, 90, 3))
     stored = np.rint((axes + 1) * 65535 / 2).astype(np.uint16)
-    (said / "wall_normal.png").write_bytes(png_from_array(stored))
+    (folder / "wall_normal.png").write_bytes(png_from_array(stored))
     views = open_judged_place(str(pairs), small_plan(), mode="mlt_il_ol")
-    found = predictions_in(OthersPredictions("theirs", said), views, small_plan())
-    assert found is not None
-    (normal,) = found
+    predictions = predictions_in(OthersPredictions("theirs", folder), views, small_plan())
+    assert predictions is not None
+    (normal,) = predictions
     assert normal.shape == (60, 75, 3)
     np.testing.assert_allclose(normal[..., 2], -1, atol=1e-4)
 
@@ -524,9 +524,9 @@ def test_weights_of_the_package_are_judged_by_their_task(
     out = tmp_path_factory.mktemp("judged")
     words = ["evaluate", "--task", "normals", "--on", f"wall={pairs}", "--out", str(out), "--json"]
     assert main(words) == 0
-    (told,) = json.loads(capsys.readouterr().out)["evaluations"]
+    (evaluation,) = json.loads(capsys.readouterr().out)["evaluations"]
     (judged,) = json.loads((out / "evaluation.json").read_text())["evaluations"]
-    assert told["figures"] == judged["figures"]
+    assert evaluation["figures"] == judged["figures"]
     assert judged["figures"]["network"]["n_pixels"] > 0
     assert main(words[:-3]) == 1
     assert "--out must say where the page goes" in capsys.readouterr().err
@@ -549,10 +549,10 @@ def test_figures_of_no_pixel_are_null_in_json_and_a_dash_in_tables(
     assert shown_figure("mean_deg", judged["figures"]["network"]["mean_deg"]) == "-"
 
 
-@pytest.mark.parametrize("given", [["--on", "x="], ["--on", ""], ["--on", "a", "--views", "-2"]])
+@pytest.mark.parametrize("words", [["--on", "x="], ["--on", ""], ["--on", "a", "--views", "-2"]])
 def test_what_names_no_place_or_no_number_of_views_is_one_line(
-    given: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    words: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["evaluate", "--task", "normals", *given, "--out", str(tmp_path / "e")]) == 1
-    (said,) = capsys.readouterr().err.splitlines()
-    assert "names no place" in said or "--views: -2: expected 0 or more" in said
+    assert main(["evaluate", "--task", "normals", *words, "--out", str(tmp_path / "e")]) == 1
+    (message,) = capsys.readouterr().err.splitlines()
+    assert "names no place" in message or "--views: -2: expected 0 or more" in message

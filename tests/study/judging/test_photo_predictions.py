@@ -121,9 +121,9 @@ def test_a_file_that_is_no_picture_is_told_and_the_rest_goes_on(
     words = ["predict", str(run), str(broken), str(good), str(tmp_path / "none.jpg")]
     assert main([*words, "--out", str(out)]) == 1
     assert (out / "good_normal.png").exists()
-    said = capsys.readouterr().out
-    assert "broken.png" in said
-    assert "none.jpg" in said
+    text = capsys.readouterr().out
+    assert "broken.png" in text
+    assert "none.jpg" in text
 
 
 def test_a_folder_without_pictures_is_an_error(tmp_path: Path) -> None:
@@ -152,8 +152,8 @@ def test_onnx_says_what_the_run_says(run: Path, tmp_path: Path) -> None:
     with torch.no_grad():
         expected = network_output(trained.network.eval(), colour, trained.plan).numpy()
     session = onnxruntime.InferenceSession(path)
-    found = session.run(["map"], {"colour": colour.numpy()})[0]
-    np.testing.assert_allclose(found, expected, atol=1e-4)
+    output = session.run(["map"], {"colour": colour.numpy()})[0]
+    np.testing.assert_allclose(output, expected, atol=1e-4)
 
 
 def test_packed_weights_say_what_the_run_says_and_are_checked_by_their_sha256(

@@ -57,12 +57,12 @@ def test_the_bench_tells_the_gain_of_the_most_views_from_where_it_is_kept(
     assert "start_curve render" in capsys.readouterr().err
     rows = [row for row in ROWS if row["views"] == 100]
     (tmp_path / "results.json").write_text(json.dumps({"rows": rows}))
-    found = study_figures._init_gain()
-    assert found == {
+    figures = study_figures._init_gain()
+    assert figures == {
         "study.curve_views": 100, "study.init_gain": pytest.approx(4),
         "study.init_gain_low": 3, "study.init_gain_high": 5,
     }  # fmt: skip
-    assert found.keys() <= study_figures.UNITS.keys()
+    assert figures.keys() <= study_figures.UNITS.keys()
     # From one start alone nothing is said of a gain.
     (tmp_path / "results.json").write_text(json.dumps({"rows": ROWS}))
     assert study_figures._init_gain() == {"study.curve_views": 400}

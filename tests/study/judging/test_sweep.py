@@ -1,4 +1,4 @@
-"""The sweep: arms differ in one thing, gains are of equal seeds, and its table goes into the lab book."""
+"""The sweep: arms differ in one field, gains are of equal seeds, and its table goes into the lab book."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def test_every_arm_is_of_fields_that_there_are_and_differs_from_plain() -> None:
         is_as_plain = changed == (plain, plan_of("normals", "lite")) and len(arm.pictures) < 2
         assert is_as_plain == (name == sweep.PLAIN), name
         assert set(arm.pictures) <= sweep.ARMS.keys()
-        assert "_" not in name  # names of runs are told apart by it
+        assert "_" not in name  # makes the names of runs unique
 
 
 def test_plain_is_always_among_the_arms_and_homes_are_those_that_all_have() -> None:

@@ -16,11 +16,11 @@ def _unit(shape: tuple[int, ...], seed: int = 0) -> np.ndarray:
 
 
 def _turned(normals: np.ndarray, degrees: float) -> np.ndarray:
-    """Each normal turned by an angle about some axis of its own."""
-    other = np.cross(normals, _unit(normals.shape[:-1], 1))
-    other /= np.linalg.norm(other, axis=-1, keepdims=True)
+    """Each normal turned by an angle about a random axis."""
+    axis = np.cross(normals, _unit(normals.shape[:-1], 1))
+    axis /= np.linalg.norm(axis, axis=-1, keepdims=True)
     angle = math.radians(degrees)
-    return np.cos(angle) * normals + np.sin(angle) * other
+    return np.cos(angle) * normals + np.sin(angle) * axis
 
 
 def test_normals_turned_by_thirty_degrees_err_by_thirty() -> None:

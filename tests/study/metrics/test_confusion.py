@@ -23,12 +23,12 @@ def test_scores_are_those_of_a_matrix_by_hand() -> None:
 
 
 def test_two_views_pool_into_one_matrix() -> None:
-    rng, both, one = np.random.default_rng(0), Confusion(5), Confusion(5)
+    rng, pooled, whole = np.random.default_rng(0), Confusion(5), Confusion(5)
     truth, predicted = rng.integers(0, 6, (2, 9, 9)), rng.integers(1, 6, (2, 9, 9))
     for k in range(2):
-        both.add(predicted[k], truth[k])
-    one.add(predicted.reshape(9, 18), truth.reshape(9, 18))
-    assert both.score() == one.score()
+        pooled.add(predicted[k], truth[k])
+    whole.add(predicted.reshape(9, 18), truth.reshape(9, 18))
+    assert pooled.score() == whole.score()
 
 
 def test_a_perfect_prediction_scores_one() -> None:

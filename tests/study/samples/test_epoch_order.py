@@ -28,7 +28,7 @@ def test_readers_share_all_views_and_none_is_read_twice(counts, n_parts, seed, e
     assert len({len(part) for part in parts}) == 1
     read = [row for part in parts for row in part]
     assert len(set(read)) == len(read) > sum(counts) - n_parts
-    assert all(0 <= at < counts[shard] for shard, at in read)
+    assert all(0 <= position < counts[shard] for shard, position in read)
     whole = [
         row for p in range(n_parts) for row in rows(whole_order(counts, part=p, n_parts=n_parts))
     ]
@@ -36,9 +36,9 @@ def test_readers_share_all_views_and_none_is_read_twice(counts, n_parts, seed, e
 
 
 def test_every_view_is_read_in_time_though_parts_are_equal():
-    seen = {row for epoch in range(40) for p in range(2)
+    all_rows = {row for epoch in range(40) for p in range(2)
             for row in rows(shard_order([7], seed=0, epoch=epoch, part=p, n_parts=2))}  # fmt: skip
-    assert len(seen) == 7
+    assert len(all_rows) == 7
 
 
 def test_the_order_follows_from_seed_and_epoch():

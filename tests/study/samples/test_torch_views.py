@@ -62,13 +62,15 @@ def test_shards_and_folder_give_equal_tensors(places):
     stored = {t["id"]: t for t in StoredViews(places[0], request)}
     packed = {t["id"]: t for t in ShardedViews(places[1], request)}
     assert stored.keys() == packed.keys()
-    for at, tensors in stored.items():
+    for id, tensors in stored.items():
         for name, tensor in tensors.items():
-            other = packed[at][name]
+            tensor_of_shard = packed[id][name]
             same = (
-                torch.equal(tensor, other) if isinstance(tensor, torch.Tensor) else tensor == other
+                torch.equal(tensor, tensor_of_shard)
+                if isinstance(tensor, torch.Tensor)
+                else tensor == tensor_of_shard
             )
-            assert same, (at, name)
+            assert same, (id, name)
 
 
 def loader_of(place: Path, workers: int, seed: int = 5, rank: int = 0, world: int = 1):
@@ -109,25 +111,25 @@ def test_a_loader_goes_on_where_its_state_says(places, packed, workers):
 def test_a_loop_that_asks_for_no_batch_beyond_the_length_gets_whole_epochs(places, packed):
     whole, counted = loader_of(places[packed], 0), loader_of(places[packed], 0)
     batches = [*ids_of(whole), *ids_of(whole)]
-    found = []
+    ids = []
     for _ in range(2):
         epoch = iter(counted)
-        found += [next(epoch)["id"] for _ in range(len(counted))]
-    assert found == batches
+        ids += [next(epoch)["id"] for _ in range(len(counted))]
+    assert ids == batches
 
 
 @pytest.mark.parametrize("packed", [False, True])
 def test_ranks_read_different_views_and_equally_many(places, packed):
     ranks = [ids_of(loader_of(places[packed], 0, rank=r, world=2)) for r in range(2)]
-    read = [{at for batch in batches for at in batch} for batches in ranks]
+    read = [{id for batch in batches for id in batch} for batches in ranks]
     assert len(read[0]) == len(read[1]) == 12
     assert not read[0] & read[1]
 
 
 def test_the_seed_decides_the_order(places):
     for place in places:
-        first, again, other = (ids_of(loader_of(place, 0, seed=s)) for s in (1, 1, 2))
-        assert first == again != other
+        first, again, reseeded = (ids_of(loader_of(place, 0, seed=s)) for s in (1, 1, 2))
+        assert first == again != reseeded
 
 
 def test_a_state_of_another_loader_is_refused(places):
@@ -152,11 +154,11 @@ def test_transforms_follow_from_seed_epoch_and_view(places):
     def colours(n_parts, epoch):
         views = {}
         for rank in range(n_parts):
-            own = ShardedViews(
+            shards = ShardedViews(
                 places[1], transform=by_chance, rank=rank, world=n_parts, shuffle=False
             )
-            own.start_at(epoch)
-            views |= {t["id"]: t["colour"].numpy().tobytes() for t in own}
+            shards.start_at(epoch)
+            views |= {t["id"]: t["colour"].numpy().tobytes() for t in shards}
         return views
 
     assert colours(1, 0) == colours(3, 0) != colours(1, 1)
@@ -192,6 +194,6 @@ def test_evaluation_reads_every_view_once_whatever_the_workers(places):
     from pbrs_farm.study.samples.sharded_views import ShardedViews
 
     views = ShardedViews(places[1], shuffle=False)
-    read = [at for batch in DataLoader(views, batch_size=4, num_workers=2) for at in batch["id"]]
+    read = [id for batch in DataLoader(views, batch_size=4, num_workers=2) for id in batch["id"]]
     assert len(read) == len(set(read)) == 24
     assert np.unique(read).size == 24

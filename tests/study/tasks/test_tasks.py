@@ -1,4 +1,4 @@
-"""What the tasks make of a view: mirrored targets, baselines, pictures, and what they refuse."""
+"""Tasks: mirrored targets, baselines, pictures, and refused views."""
 
 from __future__ import annotations
 
@@ -69,9 +69,9 @@ def test_depth_is_judged_up_to_a_scale_and_trained_halfway_so() -> None:
     depth = torch.tensor([[[1.0, 2.0], [4.0, 0.0]]])
     twice = torch.log(2 * torch.where(depth > 0, depth, 7.0))[:, None]
     scorer = task.scorer(plan)
-    own = scorer.add(task.predictions(twice)[0], {"depth": depth[0].numpy()})
+    error = scorer.add(task.predictions(twice)[0], {"depth": depth[0].numpy()})
     figures = scorer.figures()
-    assert own == pytest.approx(0, abs=1e-6)
+    assert error == pytest.approx(0, abs=1e-6)
     assert figures["abs_rel"] == pytest.approx(1)
     assert figures["below_1_25"] == 0
     assert figures["rms_m"] == pytest.approx(np.sqrt(7))  # of 1, 2 and 4 metres too far

@@ -34,7 +34,7 @@ def killed_plan(word: str) -> TrainingPlan:
 
 
 def sample(number: int, size: tuple[int, int] = (40, 32)) -> Sample:
-    """A box of three walls whose corner lies elsewhere in each view."""
+    """A box of three walls with its corner at another place in each view."""
     width, height = size
     rng = np.random.default_rng(number)
     corner = rng.uniform(0.3, 0.7, 2) * (width, height)

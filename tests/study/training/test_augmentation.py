@@ -1,4 +1,4 @@
-"""What a view may look like without its labels changing."""
+"""Augmentation keeps the labels of a view."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def test_hue_changes_pictures_and_no_label() -> None:
 
 
 def sphere(height: int = 96, width: int = 128, hfov_deg: float = 60.0) -> dict[str, torch.Tensor]:
-    """What a camera sees amid a sphere painted by direction: normals that no turn changes."""
+    """A view from the middle of a sphere coloured by direction: no rotation changes its normals."""
     half = np.tan(np.radians(hfov_deg / 2))
     x = ((np.arange(width) + 0.5) * 2 / width - 1) * half
     y = ((np.arange(height) + 0.5) * 2 / height - 1) * half * height / width
@@ -65,12 +65,12 @@ def sphere(height: int = 96, width: int = 128, hfov_deg: float = 60.0) -> dict[s
 def test_a_turned_camera_sees_the_same_sphere_from_its_middle(pitch: float, roll: float) -> None:
     old = sphere()
     new = rotate_cameras(old, task_of("normals"), torch.tensor([[pitch, roll]]), 60.0)
-    known = new["valid"][0]
-    assert 0.6 < float(known.float().mean()) < 1
+    valid = new["valid"][0]
+    assert 0.6 < float(valid.float().mean()) < 1
     # Every normal points at the camera, whichever way it looks: to a pixel, since labels are nearest.
-    difference = (new["normal"] - old["normal"])[0][known].abs().max() / 32767
+    difference = (new["normal"] - old["normal"])[0][valid].abs().max() / 32767
     assert float(difference) < 1.2 * 2 * np.tan(np.radians(30)) / 128
-    assert not new["normal"][0][~known].any()
+    assert not new["normal"][0][~valid].any()
 
 
 def test_a_camera_that_pitches_up_sees_what_is_above_and_rolls_clockwise() -> None:

@@ -28,10 +28,10 @@ def test_tensorboard_has_every_row_of_the_metrics(tmp_path: Path) -> None:
     events.Reload()
     rows = RunFolder(tmp_path).metrics()
     for name in ("loss", "rate", "train_error"):
-        told = [(row["step"], row[name]) for row in rows if name in row]
-        seen = [(event.step, event.value) for event in events.Scalars(name)]
-        assert [step for step, _ in seen] == [step for step, _ in told]
-        assert [value for _, value in seen] == pytest.approx([value for _, value in told])
+        rows_of_name = [(row["step"], row[name]) for row in rows if name in row]
+        logged = [(event.step, event.value) for event in events.Scalars(name)]
+        assert [step for step, _ in logged] == [step for step, _ in rows_of_name]
+        assert [value for _, value in logged] == pytest.approx([value for _, value in rows_of_name])
 
 
 def test_wandb_keeps_a_run_offline(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -54,6 +54,6 @@ def test_a_package_that_is_missing_names_its_extra(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("pbrs_farm.study.training.loggers.find_spec", lambda _name: None)
-    with pytest.raises(MachineFailed) as told, loggers(["tensorboard"], tmp_path, {}):
+    with pytest.raises(MachineFailed) as error, loggers(["tensorboard"], tmp_path, {}):
         pass
-    assert told.value.hint == install_command("tensorboard")
+    assert error.value.hint == install_command("tensorboard")

@@ -45,25 +45,25 @@ def sequences(tmp_path: Path) -> Path:
 
 
 def _named(n: int, name: str) -> ViewArrays:
-    made = views(n, small_plan())
-    return ViewArrays(tuple(f"{name}/{k}" for k in range(n)), made.colour, made.targets)
+    arrays = views(n, small_plan())
+    return ViewArrays(tuple(f"{name}/{k}" for k in range(n)), arrays.colour, arrays.targets)
 
 
 def _mixed() -> MixedViews:
     return MixedViews(_named(7, "home"), ((_named(3, "x"), 0.25), (_named(2, "y"), 0.1)))
 
 
-def _ids(mixed: MixedViews, steps: range, own: slice = slice(None)) -> list[list[str]]:
-    return [ids for ids, _ in mixed.batches(steps, small_plan(batch="8"), 0, own)]
+def _ids(mixed: MixedViews, steps: range, rows: slice = slice(None)) -> list[list[str]]:
+    return [ids for ids, _ in mixed.batches(steps, small_plan(batch="8"), 0, rows)]
 
 
 def test_each_set_has_its_share_of_the_batches() -> None:
     batches = _ids(_mixed(), range(40))
     assert all(len(ids) == 8 for ids in batches)
-    counts = Counter(at.partition("/")[0] for ids in batches for at in ids)
+    counts = Counter(id.partition("/")[0] for ids in batches for id in ids)
     assert counts == {"x": 80, "y": 32, "home": 208}
     # Every photograph is taken equally often, but for the last round.
-    taken = Counter(at for ids in batches for at in ids if at.startswith("x"))
+    taken = Counter(id for ids in batches for id in ids if id.startswith("x"))
     assert set(taken.values()) <= {26, 27}
 
 
@@ -80,8 +80,8 @@ def test_rows_are_those_of_their_ids() -> None:
     x, y = (part for part, _ in mixed.photographs)
     sources = {"home": mixed.views, "x": x, "y": y}
     for ids, arrays in mixed.batches(range(3), small_plan(batch="8"), 0, slice(None)):
-        for k, at in enumerate(ids):
-            name, _, number = at.partition("/")
+        for k, id in enumerate(ids):
+            name, _, number = id.partition("/")
             source = sources[name]
             assert isinstance(source, ViewArrays)
             np.testing.assert_array_equal(arrays["colour"][k], source.colour[int(number)])
@@ -95,10 +95,10 @@ def test_streamed_views_are_mixed_as_those_in_memory(root: Path, sequences: Path
         source = TrainingSource((str(root),), hold_out=frozenset(), mix=(Mix(str(sequences), 0.3),))
         mixed = training_views(source, plan)
         batches.append(list(mixed.batches(range(6), plan, 0, slice(None))))
-    for (ids, arrays), (other_ids, others) in zip(*batches, strict=True):
+    for (ids, arrays), (other_ids, expected) in zip(*batches, strict=True):
         assert ids == other_ids
-        assert arrays.keys() == others.keys() == {"colour", "normal", "valid"}
-        assert all(np.array_equal(arrays[name], others[name]) for name in arrays)
+        assert arrays.keys() == expected.keys() == {"colour", "normal", "valid"}
+        assert all(np.array_equal(arrays[name], expected[name]) for name in arrays)
 
 
 def test_a_run_with_photographs_says_so_and_they_may_not_judge(
@@ -183,7 +183,7 @@ def test_a_run_starts_from_the_packages_weights_or_says_that_they_do_not_fit(
     out = tmp_path / "lite"
     assert main([*words, "--plan", "lite", "--set", "rate=0", "--out", str(out)]) == 0
     shipped = Path(json.loads((out / "run.json").read_text())["init"])
-    tensors = [read_tensors(RunFolder(at).weights)[0] for at in (out, shipped)]
+    tensors = [read_tensors(RunFolder(folder).weights)[0] for folder in (out, shipped)]
     # At a rate of 0 the weights are those that ship, in full floats.
     name = "model.encoder.stem.0.weight"
     assert torch.equal(tensors[0][name], tensors[1][name].float())

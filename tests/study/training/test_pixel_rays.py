@@ -1,4 +1,4 @@
-"""What networks are told of each pixel's ray: the lens' own, whatever is done to a view."""
+"""Rays as an input of networks: those of the lens, after any augmentation."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def sphere() -> dict[str, torch.Tensor]:
 
 
 def still_plan(**changed: str) -> TrainingPlan:
-    """No change but those that are named."""
+    """A plan with only the given augmentation."""
     none = {"flip": "false", "turn_deg": "0", "zoom": "1", "hue": "0"}
     light = {"gain": "0", "gamma": "0", "tint": "0", "noise": "0"}
     return small_plan(rays="true", **none | light | changed)
@@ -92,11 +92,11 @@ def test_rays_stay_those_of_the_pixels_under_every_change(
 ) -> None:
     dice = torch.Generator().manual_seed(seed)
     new = augment(sphere(), task_of("normals"), still_plan(**changed), dice)
-    seen = -new["normal"].float() / 32767
-    told = ray_channels(new["rays"]).permute(0, 2, 3, 1)
-    known = new["valid"]
-    assert float(known.float().mean()) > 0.5
-    off = torch.linalg.norm(seen - told, dim=-1)[known]
+    normal = -new["normal"].float() / 32767
+    channels = ray_channels(new["rays"]).permute(0, 2, 3, 1)
+    valid = new["valid"]
+    assert float(valid.float().mean()) > 0.5
+    off = torch.linalg.norm(normal - channels, dim=-1)[valid]
     # Labels are the nearest pixel's each time: off by its half diagonal at most.
     n_times = len(changed.keys() - {"flip"})
     assert float(off.max()) < max(0.8 * n_times, 0.01) / 110
@@ -105,8 +105,8 @@ def test_rays_stay_those_of_the_pixels_under_every_change(
 def test_an_enlarged_part_is_as_exact_as_its_colour_between_pixels() -> None:
     dice = torch.Generator().manual_seed(1)
     new = augment(sphere(), task_of("normals"), still_plan(zoom="3"), dice)
-    told = ray_channels(new["rays"])
-    off = (new["colour"] * 2 - 1 - told)[:, :, 8:-8, 8:-8].abs()
+    channels = ray_channels(new["rays"])
+    off = (new["colour"] * 2 - 1 - channels)[:, :, 8:-8, 8:-8].abs()
     assert float(off.max()) < 1e-3
 
 
@@ -128,16 +128,16 @@ def test_a_crop_of_a_photograph_keeps_its_rays() -> None:
 def test_every_kind_of_network_sees_its_rays(name: str) -> None:
     torch.manual_seed(0)
     network = network_of(name, 3, rays=True).eval()
-    for p in network.parameters():  # what starts at nothing hides what is before it
+    for p in network.parameters():  # a zero layer passes no gradient
         if p.ndim > 1 and not p.any():
             torch.nn.init.normal_(p, std=0.1)
     rays = ray_channels(rays_of_cameras(CAMERAS[:1], 64, 64))
-    given = torch.cat([torch.rand(1, 3, 64, 64), rays], 1).requires_grad_()
-    said = network(given)
-    assert said.shape[-2:] == (64, 64)
-    said.abs().sum().backward()
-    assert given.grad is not None
-    assert (given.grad.abs().amax((0, 2, 3)) > 0).all()
+    inputs = torch.cat([torch.rand(1, 3, 64, 64), rays], 1).requires_grad_()
+    output = network(inputs)
+    assert output.shape[-2:] == (64, 64)
+    output.abs().sum().backward()
+    assert inputs.grad is not None
+    assert (inputs.grad.abs().amax((0, 2, 3)) > 0).all()
 
 
 def test_imagenets_start_asks_nothing_of_rays_at_first(
@@ -197,14 +197,14 @@ def test_a_photographs_lens_is_told_or_found_or_assumed_and_its_row_says_which(
         table = json.loads((out / "predictions.json").read_text())
         return {row["photograph"]: (row["hfov_deg"], row["camera"]) for row in table}
 
-    found = rows()
-    assert found["bare"] == (60.0, "assumed")
-    assert found["beside"] == (90.0, "intrinsics")
+    rows_of_run = rows()
+    assert rows_of_run["bare"] == (60.0, "assumed")
+    assert rows_of_run["beside"] == (90.0, "intrinsics")
     # 36 mm of film 43.27 mm across, of a picture 150 pixels across and 120 wide.
     f = 36 / np.hypot(36, 24) * 150
-    assert found["exif"] == (round(float(np.degrees(2 * np.arctan(60 / f))), 1), "EXIF")
-    assert "bare_normal.png: " in (said := capsys.readouterr().out)
-    assert "60.0 degrees wide (assumed)" in said
+    assert rows_of_run["exif"] == (round(float(np.degrees(2 * np.arctan(60 / f))), 1), "EXIF")
+    assert "bare_normal.png: " in (text := capsys.readouterr().out)
+    assert "60.0 degrees wide (assumed)" in text
     assert set(rows("--hfov", "75").values()) == {(75.0, "told")}
 
 
@@ -223,8 +223,8 @@ def test_another_lens_changes_what_a_run_says(run: Path) -> None:
     colour = np.random.default_rng(0).integers(0, 256, (1, 32, 40, 3)).astype(np.uint8)
     f = 20 / tan(np.radians(30))
     cameras = [np.array([[k * f, k * f, 20, 16]], np.float32) for k in (1, 2)]
-    one, other = (
+    narrow, wide = (
         next(predict(trained.network, colour, trained.task, trained.plan, cameras=c))
         for c in cameras
     )
-    assert np.abs(one - other).max() > 1e-4
+    assert np.abs(narrow - wide).max() > 1e-4

@@ -58,9 +58,9 @@ def test_views_that_fit_stay_in_memory(root: Path) -> None:
 def test_a_root_streamed_trains_to_the_weights_of_memory(
     root: Path, tmp_path: Path, workers: str
 ) -> None:
-    kept = weights_of(root, tmp_path / "kept")
+    in_memory = weights_of(root, tmp_path / "kept")
     streamed = weights_of(root, tmp_path / "streamed", memory_gb="0", workers=workers)
-    assert equal(kept, streamed)
+    assert equal(in_memory, streamed)
     figures = [RunFolder(tmp_path / name).figures()["network"] for name in ("kept", "streamed")]
     assert figures[0] == figures[1]
 
@@ -91,7 +91,7 @@ def test_shards_streamed_go_on_to_the_same_weights_with_other_workers(
 def test_each_view_comes_once_a_round_in_both_lights(root: Path, tmp_path: Path) -> None:
     plan = small_plan(memory_gb="0", batch="6")
     views = training_views(source_of(root), plan)
-    read = [at for ids, _ in views.batches(range(3), plan, 0, slice(None)) for at in ids]
+    read = [id for ids, _ in views.batches(range(3), plan, 0, slice(None)) for id in ids]
     assert sorted(read) == sorted(views.ids)
     assert len(set(read)) == 9
     assert views.homes == tuple(HOMES)[:3]

@@ -1,4 +1,4 @@
-"""Checkpoints hold every type of tensor, and a damaged one is told."""
+"""Checkpoints hold every type of tensor, and a damaged one is an error."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ def some_tensors() -> dict[str, torch.Tensor]:
 def test_what_is_written_is_read(tmp_path: Path) -> None:
     tensors, path = some_tensors(), tmp_path / "x.safetensors"
     write_tensor_file(path, tensors, {"position": "there"})
-    found, words = read_tensor_file(path)
+    tensors_read, words = read_tensor_file(path)
     assert words == {"position": "there"}
-    assert found.keys() == tensors.keys()
+    assert tensors_read.keys() == tensors.keys()
     for name, tensor in tensors.items():
-        assert found[name].dtype == tensor.dtype
-        assert torch.equal(found[name], tensor)
+        assert tensors_read[name].dtype == tensor.dtype
+        assert torch.equal(tensors_read[name], tensor)
 
 
 @pytest.mark.parametrize("damage", ["empty", "cut", "words", "huge"])

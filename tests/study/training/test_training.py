@@ -1,4 +1,4 @@
-"""Training learns, can be killed, stops at what is no number, and never looks finished when it is not."""
+"""Training learns, resumes after a kill, stops at NaN, and is never marked finished too early."""
 
 from __future__ import annotations
 
@@ -82,40 +82,40 @@ def test_a_killed_run_goes_on_to_the_same_weights(task: str, tmp_path: Path) -> 
 
 def test_the_weights_are_those_that_the_judge_who_chooses_liked_best(tmp_path: Path) -> None:
     plan = small_plan(steps="4", judge_every="1")
-    seen: list[dict[str, torch.Tensor]] = []
+    weights: list[dict[str, torch.Tensor]] = []
 
     def also(network: torch.nn.Module) -> dict[str, float]:
-        seen.append({name: x.clone() for name, x in network.state_dict().items()})
-        return {"on_rooms": [9.0, 3.0, 5.0, 4.0][len(seen) - 1]}
+        weights.append({name: x.clone() for name, x in network.state_dict().items()})
+        return {"on_rooms": [9.0, 3.0, 5.0, 4.0][len(weights) - 1]}
 
     train(Job(plan, tmp_path, stop_on="on_rooms"), views(3, plan), also=also)
-    kept, position = read_tensors(RunFolder(tmp_path).weights)
+    stored, position = read_tensors(RunFolder(tmp_path).weights)
     assert position.step == 2
-    assert all(torch.equal(kept[f"model.{name}"], x) for name, x in seen[1].items())
+    assert all(torch.equal(stored[f"model.{name}"], x) for name, x in weights[1].items())
     assert not RunFolder(tmp_path).best.exists()
-    other = small_plan(steps="4", judge_every="2")
+    longer = small_plan(steps="4", judge_every="2")
     with pytest.raises(BadInput, match="another stop_on"):
-        train(Job(other, tmp_path, stop_on="on_rooms"), views(3, other), also=also)
+        train(Job(longer, tmp_path, stop_on="on_rooms"), views(3, longer), also=also)
 
 
 def test_a_running_mean_of_weights_is_judged_kept_and_gone_on_with(tmp_path: Path) -> None:
     plan = small_plan(steps="4", average="0.5", judge_every="1", checkpoint_every="3")
-    told: list[dict[str, torch.Tensor]] = []
+    weights: list[dict[str, torch.Tensor]] = []
 
     def also(network: torch.nn.Module) -> dict[str, float]:
-        told.append({name: x.clone() for name, x in network.state_dict().items()})
+        weights.append({name: x.clone() for name, x in network.state_dict().items()})
         return {}
 
     train(Job(plan, tmp_path / "mean"), views(3, plan), also=also)
     plain = small_plan(steps="4", judge_every="1", checkpoint_every="3")
-    means, told = told, []
+    means, weights = weights, []
     train(Job(plain, tmp_path / "plain"), views(3, plain), also=also)
-    kept = [0.0, 2 / 11, 3 / 12, 4 / 13]  # (1 + n) / (10 + n), all below a half
+    decays = [0.0, 2 / 11, 3 / 12, 4 / 13]  # (1 + n) / (10 + n), all below a half
     for name in ("head.weight", "stem.first.1.running_var"):
-        mean = torch.zeros_like(told[0][name])
-        for share, step, found in zip(kept, told, means, strict=True):
+        mean = torch.zeros_like(weights[0][name])
+        for share, step, average in zip(decays, weights, means, strict=True):
             mean = share * mean + (1 - share) * step[name]
-            torch.testing.assert_close(found[name], mean)
+            torch.testing.assert_close(average[name], mean)
     saved, _ = read_tensors(RunFolder(tmp_path / "mean").weights)
     assert all(torch.equal(saved[f"model.{name}"], x) for name, x in means[-1].items())
 
@@ -167,9 +167,9 @@ def test_a_loss_that_is_no_number_names_the_view(tmp_path: Path) -> None:
 def test_a_folder_of_another_plan_or_task_is_refused(tmp_path: Path) -> None:
     plan = small_plan(steps="2")
     train(Job(plan, tmp_path), views(3, plan))
-    other = small_plan(steps="3")
+    longer = small_plan(steps="3")
     with pytest.raises(BadInput, match="another plan: steps 2, now 3"):
-        train(Job(other, tmp_path), views(3, other))
+        train(Job(longer, tmp_path), views(3, longer))
     edges = small_plan("boundaries", steps="2")
     with pytest.raises(BadInput, match="another task"):
         train(Job(edges, tmp_path), views(3, edges))
@@ -248,8 +248,8 @@ def test_errors_on_training_and_held_out_views_are_drawn(tmp_path: Path) -> None
     # Looking changes nothing: the same weights as without.
     blind = small_plan()
     train(Job(blind, tmp_path / "b"), views(4, plan), views(2, plan))
-    seen, unseen = (read_tensors(RunFolder(tmp_path / x).weights)[0] for x in "ab")
-    assert all(torch.equal(seen[name], unseen[name]) for name in seen)
+    judged, unseen = (read_tensors(RunFolder(tmp_path / x).weights)[0] for x in "ab")
+    assert all(torch.equal(judged[name], unseen[name]) for name in judged)
 
 
 def test_a_run_of_before_a_field_was_there_goes_on(tmp_path: Path) -> None:
