@@ -104,7 +104,7 @@ def middle_of_form(
 ) -> tuple[slice, slice]:
     """Rows and columns of the largest centred crop with an aspect ratio."""
     share = form_width / form_height
-    new_width = min(width, round(height * share))
-    new_height = min(height, round(width / share))
+    new_width = max(min(width, round(height * share)), 1)
+    new_height = max(min(height, round(width / share)), 1)
     top, left = (height - new_height) // 2, (width - new_width) // 2
     return slice(top, top + new_height), slice(left, left + new_width)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -54,7 +55,9 @@ def read_views(place: str, size: Size, *, mode: str = "", most: int = 0) -> Pict
     Raises BadInput for a place with fewer than two readable views.
     """
     frames = evenly_spaced(_frames(place), most)
-    pictures, left_out = _read(place, [lambda f=f: _facts_of_frame(f, size, mode) for f in frames])
+    pictures, left_out = _read(
+        place, [partial(_facts_of_frame, frame, size, mode) for frame in frames]
+    )
     homes = {frame.ref.house for frame in frames}
     credits = tuple(credits_of_views(open_views(place), homes))
     return PictureSet(place, pictures, left_out, credits)
@@ -105,13 +108,12 @@ def read_photographs(place: Path, size: Size, *, most: int = 0) -> PictureSet:
         return read_views(str(place), size, most=most)
     if has_depth(place):
         pairs = evenly_spaced(pairs_in(place), most)
-        readers = [lambda p=p: _facts_of_pair(p, place, size) for p in pairs]
+        readers = [partial(_facts_of_pair, pair, place, size) for pair in pairs]
         note = "The photographs have no intrinsics: normals are not compared."
     else:
         files = sorted(path for path in place.rglob("*") if path.suffix.lower() in SUFFIXES)
-        readers = [
-            lambda p=p: _facts_of_photograph(p, place, size) for p in evenly_spaced(files, most)
-        ]
+        chosen = evenly_spaced(files, most)
+        readers = [partial(_facts_of_photograph, path, place, size) for path in chosen]
         note = "The photographs have no depth: appearance alone is compared."
     pictures, left_out = _read(str(place), readers)
     has_normals = any("normals" in picture.histograms for picture in pictures)

@@ -130,5 +130,5 @@ def _checked(array: NDArray[Any], path: Path, task: StudyTask) -> NDArray[Any]:
 def _fitted(prediction: NDArray[Any], size: tuple[int, int]) -> NDArray[Any]:
     """The middle of a prediction at (height, width)."""
     height, width = size
-    rows, columns = middle_of_form(*prediction.shape[:2], width, height)
+    rows, columns = middle_of_form(prediction.shape[0], prediction.shape[1], width, height)
     return np.asarray(resized_nearest(prediction[rows, columns], width, height))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -32,15 +33,15 @@ def angles_deg(predicted: NDArray[Any], truth: NDArray[Any]) -> F64:
 class NormalScore:
     """Figures of normals: degrees, and shares 0..1 of pixels below a threshold."""
 
-    mean_deg: float
-    median_deg: float  # over pixels, not views
-    below_11_25: float
-    below_22_5: float
-    below_30: float
-    below_5: float
-    below_7_5: float
-    rms_deg: float
-    n_pixels: int
+    mean_deg: float = math.nan
+    median_deg: float = math.nan  # over pixels, not views
+    below_11_25: float = math.nan
+    below_22_5: float = math.nan
+    below_30: float = math.nan
+    below_5: float = math.nan
+    below_7_5: float = math.nan
+    rms_deg: float = math.nan
+    n_pixels: int = 0
 
 
 class AngularErrors:
@@ -71,10 +72,10 @@ class AngularErrors:
         """Figures over all pixels so far, the median to 0.005 degrees; NaN without a pixel."""
         n = int(self._histogram.sum())
         if n == 0:
-            return NormalScore(*[float("nan")] * 8, n_pixels=0)
+            return NormalScore()
         # The bins of the two middle pixels, which are one if n is odd.
         middle = np.searchsorted(np.cumsum(self._histogram), [(n - 1) // 2, n // 2], side="right")
         median_deg = float(middle.mean() * _BIN_DEG)
-        shares = (float(count / n) for count in self._below)
+        b = (self._below / n).tolist()
         rms_deg = float(np.sqrt(self._sum_of_squares / n))
-        return NormalScore(self._sum / n, median_deg, *shares, rms_deg=rms_deg, n_pixels=n)
+        return NormalScore(self._sum / n, median_deg, b[0], b[1], b[2], b[3], b[4], rms_deg, n)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,11 +14,11 @@ from numpy.typing import NDArray
 class ClassScore:
     """Figures of segmentation, shares 0..1."""
 
-    pixel_accuracy: float
-    mean_accuracy: float  # over the classes in the truth
-    mean_iou: float  # over the classes in truth or prediction
-    weighted_iou: float  # classes weighted by their share of the truth
-    n_pixels: int
+    pixel_accuracy: float = math.nan
+    mean_accuracy: float = math.nan  # over the classes in the truth
+    mean_iou: float = math.nan  # over the classes in truth or prediction
+    weighted_iou: float = math.nan  # classes weighted by their share of the truth
+    n_pixels: int = 0
 
 
 class Confusion:
@@ -58,7 +59,7 @@ class Confusion:
         """
         n = int(self.counts.sum())
         if n == 0:
-            return ClassScore(*[float("nan")] * 4, n_pixels=0)
+            return ClassScore()
         hits, truth, iou = np.diag(self.counts), self.counts.sum(1), self.iou()
         return ClassScore(
             pixel_accuracy=float(hits.sum() / n),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,11 +18,15 @@ _RATIO = 1.25  # threshold of delta 1
 class DepthScore:
     """Figures of depth: shares 0..1, and metres."""
 
-    scale_invariant: float  # mean over views of the standard deviation of ln(predicted / true)
-    abs_rel: float  # mean over pixels of |predicted - true| / true
-    below_1_25: float  # of pixels whose ratio to the truth, or its inverse, is below 1.25
-    rms_m: float  # root of the mean square over pixels
-    n_pixels: int
+    scale_invariant: float = (
+        math.nan
+    )  # mean over views of the standard deviation of ln(predicted / true)
+    abs_rel: float = math.nan  # mean over pixels of |predicted - true| / true
+    below_1_25: float = (
+        math.nan
+    )  # of pixels whose ratio to the truth, or its inverse, is below 1.25
+    rms_m: float = math.nan  # root of the mean square over pixels
+    n_pixels: int = 0
 
 
 class DepthErrors:
@@ -54,7 +59,7 @@ class DepthErrors:
         The scale-invariant error is a mean over views, the other figures are over pixels.
         """
         if not self._n:
-            return DepthScore(*[float("nan")] * 4, n_pixels=0)
+            return DepthScore()
         return DepthScore(
             scale_invariant=float(np.mean(self._spreads)),
             abs_rel=self._relative / self._n,

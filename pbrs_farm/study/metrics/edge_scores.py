@@ -6,6 +6,7 @@ threshold summed over all pictures, F interpolated between thresholds.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -60,11 +61,11 @@ def n_matched(predicted: Mask, truth: Mask, max_distance_px: float) -> int:
 class EdgeScore:
     """Figures of boundaries, shares 0..1."""
 
-    ods: float  # best F with one threshold for all pictures
-    ois: float  # F with each picture's own best threshold
-    ap: float
-    r50: float  # recall at half precision
-    n_views: int
+    ods: float = math.nan  # best F with one threshold for all pictures
+    ois: float = math.nan  # F with each picture's own best threshold
+    ap: float = math.nan
+    r50: float = math.nan  # recall at half precision
+    n_views: int = 0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -118,8 +119,7 @@ class EdgeScores:
     def score(self) -> EdgeScore:
         """Figures over all pictures so far (Arbelaez et al. 2011); NaN without one."""
         if not self._views:
-            nan = float("nan")
-            return EdgeScore(nan, nan, nan, nan, n_views=0)
+            return EdgeScore()
         matched = np.sum([v.matched for v in self._views], axis=0)
         predicted = np.sum([v.predicted for v in self._views], axis=0)
         n_truth = sum(v.n_truth for v in self._views)

@@ -104,4 +104,4 @@ class DepthTask(StudyTask):
         return np.clip(np.rint(prediction * 1000), 1, 65535).astype(np.uint16)
 
     def restored(self, stored: NDArray[Any]) -> NDArray[Any]:
-        return stored / 1000.0
+        return np.asarray(stored / 1000.0)

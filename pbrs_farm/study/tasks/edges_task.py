@@ -88,4 +88,4 @@ class EdgesTask(StudyTask):
         return np.rint(255 * np.clip(np.asarray(prediction, np.float64), 0, 1)).astype(np.uint8)
 
     def restored(self, stored: NDArray[Any]) -> NDArray[Any]:
-        return stored / 255.0
+        return np.asarray(stored / 255.0)
