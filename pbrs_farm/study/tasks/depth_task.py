@@ -101,7 +101,7 @@ class DepthTask(StudyTask):
 
     def stored(self, prediction: NDArray[Any]) -> NDArray[Any]:
         """Millimetres, clipped to 16 bits."""
-        return np.clip(np.rint(prediction * 1000), 1, 65535).astype(np.uint16)
+        return np.asarray(np.clip(np.rint(prediction * 1000), 1, 65535), np.uint16)
 
     def restored(self, stored: NDArray[Any]) -> NDArray[Any]:
         return np.asarray(stored / 1000.0)
