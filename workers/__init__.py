@@ -1,1 +1,1 @@
-"""The farm: Celery carries the work, a ledger in Redis says what is done, storage is the truth."""
+"""The farm: Celery transports tasks, a ledger in Redis tracks their state, storage is the truth."""

@@ -25,7 +25,7 @@ from workers.liveness import alive_file
 _PREFIX: Final = "PBRS_FARM_"
 
 
-# A field's least value stands in its metadata: _check_config raises BadInput below it.
+# A field's minimum is in its metadata: _check_config raises BadInput below it.
 def _above(default: float, limit: float = 0.0) -> Any:
     return field(default=default, metadata={"above": limit})
 
@@ -50,9 +50,9 @@ class Limits:
         _check_config(self, f"{_PREFIX}LIMITS_")
 
     def deadline_s(self, stage: str) -> float:
-        """Seconds a task of the stage may take.
+        """Time limit of a task of the stage, seconds.
 
-        Geometry, gl and light have limits of their own; all merges share that of reduce.
+        Geometry, gl and light have separate limits; all merges share that of reduce.
         """
         return {GEOMETRY: self.geometry_s, GL: self.gl_s, LIGHT: self.light_s}.get(
             stage, self.reduce_s
@@ -89,7 +89,7 @@ class FarmConfig:
     prefix: str = "pbrs:"  # of every key in Redis
     store_id: str = ""  # of the store, as the worker's supervisor read it
     worker: str = ""  # its name in the ledger
-    slots: int = _least(1, 1)  # tasks at once
+    slots: int = _least(1, 1)  # concurrent tasks
     queues: tuple[str, ...] = ()  # () = all
     scratch: Path = Path("/tmp")
     runner: str = "workers.node.house_runner:runner"  # what does the tasks
@@ -121,12 +121,12 @@ class FarmConfig:
 
     @property
     def preemption_file(self) -> Path:
-        """While this file exists the worker's tasks are given back to the ledger at once."""
+        """While this file exists, the worker's tasks are returned to the ledger immediately."""
         return self.scratch / f"pbrs-{self.worker}.preempted"
 
     @property
     def leaving_file(self) -> Path:
-        """While this file exists the worker takes nothing more and finishes what it runs."""
+        """While this file exists, the worker finishes its tasks and takes no more."""
         return self.scratch / f"pbrs-{self.worker}.leaving"
 
     @property
@@ -138,7 +138,7 @@ class FarmConfig:
 def config_from_environment(environment: Mapping[str, str] | None = None) -> FarmConfig:
     """FarmConfig from PBRS_STORE, PBRS_REDIS_URL and PBRS_FARM_<FIELD> (PBRS_FARM_LIMITS_<FIELD>).
 
-    PBRS_REDIS_PASSWORD(_FILE) is put into the URL when that has none. Raises BadInput.
+    PBRS_REDIS_PASSWORD(_FILE) is inserted into the URL unless it has one. Raises BadInput.
     """
     env = dict(os.environ if environment is None else environment)
     settings = settings_from_environment(env)
@@ -165,12 +165,11 @@ def config_from_environment(environment: Mapping[str, str] | None = None) -> Far
 
 
 def make_scratch(config: FarmConfig) -> None:
-    """The scratch folder, made where there is none. Raises MachineFailed where it cannot be written.
+    """Create the scratch folder if needed. Raises MachineFailed if it is not writable.
 
-    An existing folder is only tested for being writable, nothing in it is touched. Call it once at
-    the start of a process, before it works.
+    An existing folder is only tested. Call it once at the start of a process, before it works.
     """
-    # A file in its place, a folder that is read-only or another user's: all are one line.
+    # A file in its place, a read-only folder, another user's folder: one line for each.
     fault = ""
     try:
         config.scratch.mkdir(parents=True, exist_ok=True)
@@ -200,7 +199,7 @@ _ELSEWHERE: Final = {"redis_url", "store_url", "store", "limits", "webhook", "to
 def _read_setting(
     cls: type[FarmConfig | Limits], given: Mapping[str, str], prefix: str
 ) -> dict[str, Any]:
-    """Field -> its value from its variable's text; BadInput for what is none."""
+    """Field -> value parsed from its variable; BadInput for an invalid one."""
     # Read each variable by the type of its field; an unknown one is an error: no slip passes.
     kinds = {f.name: str(f.type) for f in fields(cls) if f.name not in _ELSEWHERE}
     values = {}

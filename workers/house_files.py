@@ -33,10 +33,10 @@ _LIBRARIES: Final = f"{FOLDER}libraries/"  # the user's own, to dress with
 def entries_from_arguments(
     arguments: Sequence[str], seeds: Sequence[int] = (0,), *, models: str = ""
 ) -> list[tuple[HouseEntry, SourceRef]]:
-    """The houses that arguments name: files, folders of files, example homes, `builtin`.
+    """Resolve arguments to houses: files, folders of files, example homes, `builtin`.
 
-    Each is dressed by each seed, a house of its own. Touches no store. Raises BadHouse for one that
-    names no house.
+    One house per home and dressing seed. Does not access a store. Raises BadHouse for an argument that is no
+    house.
     """
     # Take each house once, whatever arguments name it.
     found: dict[str, tuple[HouseEntry, SourceRef]] = {}
@@ -110,9 +110,9 @@ def _upload_package(store: Store, package: str) -> None:
 
 
 def is_left_in_place(ref: SourceRef) -> bool:
-    """The source is read where it lies, so every worker must see it.
+    """True if the source is read in place, so every worker needs access to it.
 
-    SUNCG, files with others beside them or with a folder of models, and what plugins read.
+    SUNCG, files with companions or with a folder of models, and sources of plugins.
     """
     return format_of_source(ref) is not None and _source_in_store(ref).location == ref.location
 
@@ -130,11 +130,10 @@ def placed_reference(path: Path) -> tuple[str, bytes]:
 
 
 def upload_catalogue(store: Store, recipe: Recipe) -> Recipe:
-    """Put into the store what dressing by a recipe needs, and the recipe that names it there.
+    """Upload the libraries that a recipe's dressing needs; returns the recipe with their names in the store.
 
-    The furniture package goes there where it is cached; else workers fetch it themselves. A folder
-    of models stays where it is: workers must see it at the same path. Raises BadInput for a
-    library that is none.
+    The furniture package is uploaded if it is cached; otherwise workers download it. A folder of models is
+    not uploaded: workers need it at the same path. Raises BadInput for an invalid library.
     """
     from pbrs_farm.prepare.dress_catalogue import catalogue_of
 
@@ -177,9 +176,8 @@ def with_catalogue(recipe: Recipe, words: str) -> Recipe:
 def local_catalogue(store: Store, recipe: Recipe) -> Recipe:
     """On a worker: the recipe with libraries of the store as files of this machine's cache.
 
-    Effects: reads the store and writes to the cache folder; a library that is there already is not
-    fetched again. Words that name no library of the store stay. ObjectMissing where the store lost
-    one.
+    Effects: reads the store and writes to the cache folder; cached libraries are not downloaded again. Other
+    words are unchanged. ObjectMissing if the store lost a library.
     """
     words = []
     for word in filter(None, recipe.dress.catalogue.split(":")):
@@ -197,7 +195,7 @@ def fill_cache(store: Store, *, with_furniture: bool = False) -> None:
 
     The example homes' package, and the furniture's where a house is dressed or made.
     """
-    # Take from the store only packages that are wanted and not here.
+    # Download only required packages that are missing here.
     wanted = [homes_package.PACKAGE] if homes_package.cached() is None else []
     if with_furniture and not has_furniture():
         wanted.append(furniture_package.PACKAGE)

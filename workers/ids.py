@@ -102,9 +102,9 @@ def queue_of(stage: str, *, gpu: bool) -> str:
 
 
 def pool_of(stage: str, *, gpu: bool) -> str:
-    """The pool of a stage's tasks, whose window they are sent in and whose leases they hold.
+    """The pool of a stage's tasks, with its own window and leases.
 
-    A pool is a stage, but light on a GPU has one of its own: messages that no worker takes hold up no others.
+    A pool is a stage, except that light on a GPU is a separate one: messages without a worker block no others.
     """
     return LIGHT_GPU if gpu and stage == LIGHT else stage
 
@@ -138,7 +138,7 @@ def job_key(job: str, file: str = "job.json") -> str:
 def log_key(job: str, task: str, attempt: int) -> str:
     """Key of a task's log: of a failed attempt, and of a long one while it runs.
 
-    task: as text; its slashes are flattened. attempt: counts from 1, and each has a log of its own.
+    task: as text; its slashes are flattened. attempt: counts from 1; one log each.
     """
     return job_key(job, f"logs/{_flat_name(task)}.{attempt}.txt")
 
@@ -146,8 +146,8 @@ def log_key(job: str, task: str, attempt: int) -> str:
 def attempts_from_log_keys(job: str, task: str, keys: Iterable[str]) -> dict[int, str]:
     """Attempt -> the key of its log, for those of the keys that are logs of the task.
 
-    keys: any keys, as a listing of the job's logs gives them; those of other tasks are passed over.
-    Empty where the task left no log: only failures and long tasks do.
+    keys: any keys, as from a listing of the job's logs; those of other tasks are ignored. Empty if the task
+    has no log: only failures and long tasks have one.
     """
     pattern = re.compile(re.escape(log_key(job, task, 0)).replace(r"\.0\.txt", r"\.(\d+)\.txt"))
     return {int(match[1]): key for key in keys if (match := pattern.fullmatch(key))}
@@ -163,7 +163,7 @@ def failed_key(job: str, task: str) -> str:
 
 
 def task_from_failed_key(job: str, key: str) -> str:
-    """The task whose record of failure lies under key."""
+    """The task of a failure record's key."""
     flat = key.removeprefix(job_key(job, "failed/")).removesuffix(".json")
     return flat.replace("whole/", "-/", 1) if flat.startswith("whole/") else flat
 
@@ -178,9 +178,9 @@ def _flat_name(task: str) -> str:
 
 
 def priority_from_text(text: str) -> int:
-    """The priority a word names. Raises BadInput for what is no number from 0 to 9.
+    """Parse a priority. Raises BadInput for anything but a number from 0 to 9.
 
-    0 goes first. A sign, a blank or a second digit is an error, so that "10" is not read as 1.
+    0 goes first. A sign, a space or a second digit is an error, so that "10" is not read as 1.
     """
     if len(text) != 1 or not text.isascii() or not text.isdigit():
         hint = f"a number from 0, which goes first, to {LEAST_URGENT}"

@@ -1,4 +1,4 @@
-"""What a job is and where its own objects are stored; frozen values, no effects."""
+"""Job specifications and the storage keys of a job's objects; frozen values, no effects."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from workers.ids import DEFAULT_PRIORITY, GL, LEAST_URGENT, LIGHT
 
 @cache
 def work_version() -> str:
-    """What a worker of this installation makes of a task: workers of one such version make the same.
+    """Version of the results of this installation: workers with equal versions make equal results.
 
-    It follows the versions of the steps and of the passes of a house, not the package's: an upgrade that changes no stored byte
-    changes nothing here, and a running job goes on.
+    It derives from the versions of the steps and of the passes of a house, not of the package: an upgrade that changes
+    no stored byte changes nothing here, and a running job continues.
     """
     from pbrs_farm.prepare.passes import versions_of_passes
     from pbrs_farm.run import plan
 
     steps = {name: step.version for name, step in plan.STEPS.items()}
-    # Workers that do not know how a root lies would not find what others made.
+    # Workers with another root layout would not find the results of others.
     return keys.digest(steps, versions_of_passes(), FORMAT)[:12]
 
 
@@ -89,7 +89,7 @@ class FarmOptions(Record):
 
 
 class FarmAccess(Record):
-    """What submit takes as every verb of the farm does (commands/arguments.py:add_farm)."""
+    """Options of submit shared by all verbs of the farm (commands/arguments.py:add_farm)."""
 
     store: str = option("", "default: $PBRS_STORE", metavar="URL")
     as_json: bool = option(False, "for machines", name="json")
@@ -108,7 +108,7 @@ class _ReferenceOption(Record):
 class SubmitRequest(
     FarmOptions, _ReferenceOption, Request, ModelsOption, _HousesOption, FarmAccess
 ):
-    """What `submit` takes beside the words of homes, from its options or a job's file."""
+    """Inputs of `submit` besides the words of homes, from its options or a job's file."""
 
     like: str = option(
         "", "take the options of this job.toml for the homes named here", metavar="FILE"
@@ -141,7 +141,7 @@ class JobSpec(FarmOptions, Wanted):
     n_houses: int = 0
 
 
-# What is decided when a job is entered and changes nothing of what it makes.
+# Fields of a job's entry that do not affect its results.
 _NOT_WORK = {
     "job_id",
     "priority",
@@ -181,8 +181,8 @@ def lines_from_houses(houses: Iterable[HouseEntry]) -> bytes:
 def houses_from_lines(data: bytes) -> Iterator[HouseEntry]:
     """The houses of a houses.jsonl.
 
-    One after another, so that a million houses are not all objects at once. Raises pydantic's
-    ValidationError for a line that is none: we wrote the file ourselves.
+    An iterator, so that a million houses are not in memory at once. Raises pydantic's ValidationError for an
+    invalid line: the file is always written by this program.
     """
     for line in data.splitlines():
         yield HouseEntry.model_validate_json(line)

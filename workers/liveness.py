@@ -1,6 +1,6 @@
-"""The liveness probe: `python -m workers.liveness`; 1 when the process's main loop stands still.
+"""The liveness probe: `python -m workers.liveness`; exits with 1 if the process's main loop is stuck.
 
-Effects: reads the age of one file. Imports little, for it runs every half minute.
+Effects: reads the age of one file. Imports little, since it runs every half minute.
 """
 
 from __future__ import annotations

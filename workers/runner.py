@@ -1,8 +1,8 @@
-"""What the farm asks of whatever makes the pictures; values and one interface, no effects.
+"""Interface between the farm and the renderer, and its values; no effects.
 
-A renderer process holds one runner and gives it tasks one after another. The runner keeps loaded
-what the next task may need (scenes), writes outputs and markers to the store, and may be killed
-at any time: a task that is run again finds its markers and does only what is missing.
+A renderer process holds one runner and gives it tasks one after another. The runner keeps data for the next task
+loaded (scenes), writes outputs and markers to the store, and may be killed at any time: a repeated task finds
+its markers and does only the missing steps.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class TaskRequest(Record):
 
 
 class Result(Record):
-    """What came of a task."""
+    """Result of a task."""
 
     batches: tuple[tuple[str, ...], ...] = ()  # of views to be made, only after geometry
     n_views: int = 0
@@ -46,7 +46,7 @@ class Result(Record):
 
 @dataclass(frozen=True, slots=True)
 class Survey:
-    """What storage says of a house."""
+    """Progress of a house in storage."""
 
     batches: tuple[tuple[str, ...], ...] | None = None  # None while its geometry is not done
     missing: Mapping[str, str] = field(default_factory=dict)  # unit -> first stage not done, or ""
@@ -57,19 +57,18 @@ class StepRunner(Protocol):
     """Runs the steps of a task; raises the errors of pbrs_farm.core.errors."""
 
     def run(self, request: TaskRequest, on_step: OnText) -> Result:
-        """Do what the markers say is missing. on_step: called with the name of each step begun.
+        """Do the steps without markers. on_step: called with the name of each started step.
 
-        May be called again for a task that was cut off at any moment. Raises BadInput and its kin
-        for the house's own faults, Transient errors for what may work later; other exceptions count
-        as bugs.
+        May be called again for a task interrupted at any moment. Raises BadInput and its subclasses for faults of
+        the house, Transient errors for temporary failures; other exceptions count as bugs.
         """
         ...
 
     def survey(self, spec: JobSpec, house: str, done: frozenset[str]) -> Survey:
-        """How far the house is. done: names of its markers, "<step>" or "<step>.<view>".
+        """Progress of the house. done: names of its markers, "<step>" or "<step>.<view>".
 
-        Tells `recover` what to enter into the ledger; it must not make anything. A Survey without
-        batches says that geometry is to be done.
+        For `recover`, which enters it into the ledger; it must have no effects. A Survey without batches means that
+        geometry is not done.
         """
         ...
 

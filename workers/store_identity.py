@@ -1,6 +1,6 @@
-"""Which store a process works on: an id that lies in it, for one store has many URLs.
+"""Identity of a store: an id inside it, since one store has many URLs.
 
-Effects: reads the store, and puts the id there once.
+Effects: reads the store, and writes the id there once.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ KEY: Final = "jobs/store.id"
 
 
 def known_store_id(store: Store) -> str:
-    """The id that lies in the store, "" where none does.
+    """The store's id, "" if it has none.
 
-    Only reads, so it suits a client that may not write. At most 64 characters, whatever lies there.
-    Other StoreFailed are passed on.
+    Only reads, so it suits a client without write access. At most 64 characters. Other StoreFailed are passed
+    on.
     """
     try:
         return store.get(KEY).decode("ascii", "replace").strip()[:64]
@@ -27,10 +27,10 @@ def known_store_id(store: Store) -> str:
 
 
 def store_id(store: Store) -> str:
-    """The store's id; put there now where it has none.
+    """The store's id; created if it has none.
 
-    16 hex digits, random. Of several processes that ask a new store at once one writes, and all
-    read that answer. Two URLs with one id are one store.
+    16 random hex digits. Of several processes with a new store one writes, and all read that id. Two URLs with
+    one id are one store.
     """
     if not (known := known_store_id(store)):
         store.put_if_absent(KEY, secrets.token_hex(8).encode())

@@ -1,6 +1,6 @@
-"""What a job will cost before it runs: tasks, hours, storage; pure.
+"""Estimate a job's cost before it runs: tasks, hours, storage; pure.
 
-By the constants of pbrs_farm/run/costs.csv: they distinguish an hour from a month.
+Uses the constants of pbrs_farm/run/costs.csv, which distinguish an hour from a month.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ _CPUS_PER_SLOT: Final = 2
 def seconds_per_view(recipe: Recipe) -> float:
     """Expected seconds of light for a view on one slot of two cores.
 
-    From the samples a pixel and the picture's size alone, never less than 1 s. What a scene costs,
-    how dark it is, and GPUs are not in it: the farm measures its own rates once a job runs.
+    From samples per pixel and picture size only, at least 1 s. Ignores scene complexity, darkness and
+    GPUs: the farm measures its own rates once a job runs.
     """
     return max(1.0, measured()["light_cpu_s"] * megasamples(recipe) / _CPUS_PER_SLOT)
 

@@ -1,7 +1,7 @@
-"""The farm from outside: submit, watch, steer. What the command line calls, by the same verbs.
+"""Client of the farm: submit, watch, steer. The command line calls it, with the same verbs.
 
-Effects: Redis and the store. To look at a job it imports neither numpy nor celery nor mitsuba, nor
-the recipe's models: `status` is asked often, of machines that are busy.
+Effects: Redis and the store. Looking at a job imports neither numpy nor celery nor mitsuba, nor the
+recipe's models: `status` is called often, on busy machines.
 
     farm = Farm(config_from_environment())
     job = farm.submit(houses, new_spec(recipe)).job_id
@@ -55,7 +55,7 @@ _HOUSE_STATES = ("open", "done", "quarantined")
 
 @dataclass(frozen=True, slots=True)
 class Submitted:
-    """A job that is on the farm."""
+    """A job on the farm."""
 
     job_id: str
     n_houses: int
@@ -101,16 +101,15 @@ class Farm:
     def submit(
         self, houses: Sequence[HouseEntry], spec: JobSpec, *, update: bool = False
     ) -> Submitted:
-        """Put a job on the farm; a job that is there already is left alone.
+        """Submit a job; an existing equal job is not changed.
 
-        spec.job_id and n_houses are set here; houses are sorted by id. update: the root's recipe
-        may be replaced. Raises BadRecipe when the root holds another recipe, BadInput when two
-        houses share an id.
+        Sets spec.job_id and n_houses; houses are sorted by id. update: the root's recipe may be replaced.
+        Raises BadRecipe if the root has another recipe, BadInput if two houses share an id.
         """
         from pbrs_farm.run.output_root import claim_root
         from workers.job import lines_from_houses
 
-        # The same work has the same id: a job that is there is left alone.
+        # Equal work has an equal id: an existing job is not changed.
         houses, spec = completed(houses, spec)
         self.ledger.ping()
         user = self.rights.who()
@@ -153,9 +152,9 @@ class Farm:
             )
 
     def check_plugins(self, marks: Collection[str]) -> list[str]:
-        """The living workers that lack a plugin of these marks, each with what it lacks.
+        """The live workers that lack a plugin of these marks, each with the missing ones.
 
-        Raises BadInput where workers live and none of them has them all.
+        Raises BadInput if there are live workers and none of them has all plugins.
         """
         living = [w for w in self.registry.workers() if w.age_s <= ALIVE_S]
         lacking = {
@@ -169,11 +168,11 @@ class Farm:
         return lines
 
     def recover(self, job: str, progress: Callable[[str], None] = lambda _line: None) -> JobView:
-        """Rebuild the ledger of a job from storage, whatever Redis held of it.
+        """Rebuild the ledger of a job from storage, regardless of its state in Redis.
 
-        For a ledger that was lost (Redis restarted empty) or is doubted. Houses that storage shows
-        as done stay done, steps with markers are not made again. progress: called with lines for
-        people. Raises BadInput for a job that the store does not know, and for another user's.
+        For a lost ledger (Redis restarted empty) or a suspect one. Houses and steps with markers stay done.
+        progress: called with lines for people. Raises BadInput for a job that is not in the store, and for
+        another user's.
         """
         from workers.job import houses_from_lines
 
@@ -203,10 +202,10 @@ class Farm:
         return self.recover(job, progress)
 
     def spec(self, job: str) -> JobSpec:
-        """What the job was submitted with; BadInput when the store knows no such job.
+        """The job's specification; BadInput if it is not in the store.
 
-        From the store, so also of a job that the ledger lost; what `set_priority` and `limit`
-        changed later is in it. BadInput, too, for a text that is no job id.
+        From the store, so also available for a job lost from the ledger; includes later changes by
+        `set_priority` and `limit`. BadInput, too, for an invalid job id.
         """
         from pbrs_farm.core.checked_json import checked
         from workers.job import JobSpec
@@ -219,16 +218,16 @@ class Farm:
     def jobs(self) -> list[JobView]:
         """Every job in the ledger, oldest first.
 
-        A few reads a job. A job that is forgotten meanwhile is left out; those that only the store
-        knows are `lost_jobs`.
+        A few reads per job. Jobs that are forgotten in the meantime are skipped; jobs only in the store are
+        `lost_jobs`.
         """
         return [v for j in self.ledger.known_jobs() if (v := self.ledger.view(j)) is not None]
 
     def newest_job(self) -> str:
-        """The job submitted last; BadInput when there is none.
+        """The most recently submitted job; BadInput if there is none.
 
-        "Last" by when it was opened in the ledger. Where the ledger is empty but the store is not,
-        the error's hint is to recover.
+        By time of entry in the ledger. If the ledger is empty but the store is not, the error suggests
+        recover.
         """
         known = self.ledger.known_jobs()
         if not known:
@@ -303,19 +302,18 @@ class Farm:
         return view is not None and view.state == "done"
 
     def explain(self, job: str, text: str) -> list[dict[str, Any]]:
-        """What is known of a task, of all tasks of a house, or of one view (HOUSE/VIEW).
+        """State of a task, of all tasks of a house, or of one view (HOUSE/VIEW).
 
-        Says what each waits for. Raises BadInput when the job has no such house.
+        Includes what each is waiting for. Raises BadInput if the job has no such house.
         """
         rows = explain_tasks(self.ledger, self.registry, self.view(job), text)
         return rows or self._explain_not_admitted(job, text.partition("/")[0])
 
     def finished_houses(self, job: str, besides: Collection[str] = ()) -> set[str]:
-        """The job's houses that are done, but for those known already.
+        """The job's finished houses, except those in besides.
 
-        besides: ids that the caller has seen done, which are not asked for again. Reads the job's
-        list of houses from the store and a field of each from Redis: for a follower of a large job,
-        not for a loop without pause.
+        besides: ids already known to be finished, which are not queried. Reads the job's list of houses from
+        the store and a field of each from Redis: suitable for following a large job with pauses.
         """
         from workers.job import houses_from_lines
 
@@ -324,11 +322,10 @@ class Farm:
         return set(self.ledger.finished(job, asked))
 
     def logs(self, job: str, text: str, attempt: int | None = None) -> str:
-        """The stored log of a task's attempt (the last one by default); BadInput when none.
+        """The stored log of a task's attempt (the last one by default); BadInput if there is none.
 
-        text: "HOUSE/UNIT/STAGE". attempt: counts from 1. Only failed attempts and tasks of a minute
-        or more leave a log; the error names the attempts that have one. Bytes that are no UTF-8 are
-        replaced.
+        text: "HOUSE/UNIT/STAGE". attempt: counts from 1. Only failed attempts and tasks of a minute or more
+        leave a log; the error lists the attempts with one. Invalid UTF-8 is replaced.
         """
         task = task_from_text(text)
         # One object an attempt, in the folder of the task's unit.
@@ -378,11 +375,10 @@ class Farm:
         return sorted(kinds.values(), key=lambda k: (-k["n"], k["fingerprint"]))
 
     def retry(self, job: str, tasks: Sequence[str] = ()) -> list[str]:
-        """Fresh attempts for these tasks, or for all that failed; those that were put back.
+        """Give these tasks, or all failed ones, new attempts; returns the tasks that were reset.
 
-        Tasks that had not failed for good, or that do not exist, are left out of the answer without
-        an error; BadInput for a text that is no task and for another user's job. A job that was
-        done runs again.
+        Tasks that have not failed permanently, or do not exist, are skipped; BadInput for an invalid task
+        and for another user's job. A finished job runs again.
         """
         # The ledger forgets the failure, then storage does.
         self.rights.check_owner(job, self.view(job).user)
@@ -406,17 +402,17 @@ class Farm:
         return self._steer(job, "resume")
 
     def cancel(self, job: str) -> str:
-        """Stop for good: what runs is killed. What is in storage stays; submit takes it up.
+        """Stop a job permanently: running tasks are killed. Storage is kept, and a later submit reuses it.
 
-        It cannot be resumed, and a job that is done stays done. Submitting the same work again
-        makes only what is missing.
+        A cancelled job cannot be resumed; a finished job stays finished. Submitting the same work again
+        renders only missing parts.
         """
         return self._steer(job, "cancel", "by hand")
 
     def reduce(self, job: str) -> str:
-        """Merge what is there now, of a finished or a running job; its report says what lacks.
+        """Merge the existing results of a finished or running job; its report lists missing parts.
 
-        Only asks for it: a worker merges when a slot is free. A cancelled job is left as it is.
+        Only requests it: a worker merges when a slot is free. No effect on a cancelled job.
         """
         return self._steer(job, "reduce")
 
@@ -427,7 +423,7 @@ class Farm:
         go on.
         """
         state = self._steer(job, "priority", str(priority))
-        # A job that is recovered keeps it; who only steers may do without a store.
+        # A recovered job keeps it; steering alone may work without a store.
         if self.config.store_url:
             spec = self.spec(job).model_copy(update={"priority": priority})
             self.store.put(job_key(job), spec.model_dump_json(indent=1).encode())
@@ -453,11 +449,10 @@ class Farm:
         return state
 
     def drain(self, worker: str, *, undo: bool = False) -> None:
-        """The worker finishes what it runs and leaves; BadInput when there is no such worker.
+        """Ask a worker to finish its tasks and leave; BadInput for an unknown worker.
 
-        undo: let it take work again, also one that has left and is started anew under its name.
-        Only asks: the worker leaves when its tasks are done, see `workers`. An admin's right on a
-        farm with users.
+        undo: let it take work again, even if it left and is restarted under its name. Returns immediately:
+        see `workers` for its state. Requires an admin on a farm with users.
         """
         self.rights.check_admin("drain")
         if not self.registry.drain(worker, undo=undo):
@@ -468,8 +463,8 @@ class Farm:
     def workers(self) -> list[dict[str, Any]]:
         """Workers seen in the last hour, each with its state: alive, draining, drained, dead.
 
-        draining: finishes what it runs; drained: takes nothing until it is asked back; dead: gave
-        no sign of life, so its leases end or have ended.
+        draining: finishes its tasks; drained: takes none until asked back; dead: no heartbeat, so its leases
+        expire.
         """
         return [
             {**w.fields, "worker": w.name, "age_s": round(w.age_s, 1), "state": w.state}
@@ -486,7 +481,7 @@ class Farm:
         from workers.coordinator.recover import rebuild
         from workers.runner import runner_maker
 
-        # A submission that was cut off leaves the state "loading": only an old one is taken over.
+        # An interrupted submission leaves the state "loading": only an old one is taken over.
         was = ""
         view = self.ledger.view(spec.job_id)
         if view is not None:
@@ -526,8 +521,8 @@ def completed(
 ) -> tuple[tuple[HouseEntry, ...], JobSpec]:
     """(houses sorted by id, the spec with its number of houses and its job id).
 
-    The id is a digest of both, so that the same work submitted twice is one job. Raises
-    BadInput for no house, or for one that is named twice.
+    The id is a digest of both, so that equal submissions are one job. Raises BadInput for no house, and
+    for a repeated one.
     """
     from workers.job import job_id
 

@@ -1,7 +1,7 @@
-"""What a farm's store holds and nobody needs: found first, listed, and removed only then.
+"""Unreferenced objects in a farm's store: found and listed first, removed only on request.
 
-Effects: lists the store, reads manifests and the ledger; `remove` deletes objects. Nothing of a job
-that is loading, running or paused is touched, nor anything younger than the time that is kept.
+Effects: lists the store, reads manifests and the ledger; `remove` deletes objects. Objects of a job
+that is loading, running or paused, and objects younger than the retention time, are never touched.
 """
 
 from __future__ import annotations
@@ -38,10 +38,10 @@ class Garbage:
 
 
 def keep_from_text(text: str) -> float:
-    """Seconds of "30d", "12h", "2w". Raises BadInput for what is none.
+    """Seconds of "30d", "12h", "2w". Raises BadInput for any other text.
 
-    Hours, days and weeks in whole numbers; no sum as "1d12h", and no bare number, so that nobody
-    takes days for seconds.
+    Whole hours, days or weeks; no sums as "1d12h", and no bare numbers, so that nobody mistakes days for
+    seconds.
     """
     match = _KEEP.fullmatch(text)
     if match is None:
@@ -50,11 +50,11 @@ def keep_from_text(text: str) -> float:
 
 
 def garbage(farm: Farm, keep_s: float, now_s: float) -> list[Garbage]:
-    """What may go, by kind. now_s: seconds since 1970, by the clock of the store's objects.
+    """Removable objects, by kind. now_s: seconds since 1970, by the clock of the store's objects.
 
-    keep_s: age from which an object may go, seconds. Only looks; `remove` deletes. What a live job
-    may still need is never in it: an object that no manifest names is kept as long as a live job
-    works on its house. Lists the whole store and asks it for the age of each candidate.
+    keep_s: minimum age, seconds. Only lists; `remove` deletes. Objects that a live job may need are never
+    included: an object without a manifest is kept while a live job works on its house. Lists the whole
+    store and queries the age of each candidate.
     """
     store = farm.store
     states = {job: _state_of_job(farm, job) for job in _jobs(store)}
@@ -80,10 +80,10 @@ def garbage(farm: Farm, keep_s: float, now_s: float) -> list[Garbage]:
 
 
 def remove(farm: Farm, found: Iterable[Garbage]) -> int:
-    """Delete what was found, and forget cancelled jobs of which nothing is left; how many objects.
+    """Delete objects, and forget cancelled jobs without any left; returns the number of objects.
 
-    found: of `garbage`, best of a moment ago: an object is deleted without another look at its age.
-    An object that is gone already is no error, but counts.
+    found: a recent result of `garbage`: ages are not checked again. Objects that are missing already are
+    counted too.
     """
     n = 0
     for kind in found:
@@ -92,7 +92,7 @@ def remove(farm: Farm, found: Iterable[Garbage]) -> int:
             n += 1
         if kind.kind == "cancelled jobs":
             for job in {key.split("/")[1] for key in kind.found}:
-                # Half of it may be younger: then it stays, and so does what is known of it.
+                # If some of its objects are younger, they and the job's record are kept.
                 if next(iter(farm.store.list(f"jobs/{job}/")), None) is None:
                     farm.ledger.forget(job)
     return n

@@ -1,4 +1,4 @@
-"""Every job of a farm as a row: how far, how fast, what it cost. Effects: reads the ledger."""
+"""Every job of a farm as a row: progress, rate, cost. Effects: reads the ledger."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ def job_rows(farm: Farm) -> list[dict[str, Any]]:
 
 
 def job_row(view: JobView, slots: Mapping[str, int]) -> dict[str, Any]:
-    """A job's row. slot_hours: spent by tasks that are done; slot_hours_left: expected.
+    """A job's row. slot_hours: of finished tasks; slot_hours_left: expected.
 
-    slots: stage -> tasks that workers can run at once, for the ETA. Of a job that is over "eta_s"
-    is None and "slot_hours_left" 0, whatever was left undone.
+    slots: stage -> tasks that workers can run at once, for the ETA. For an ended job "eta_s" is None and
+    "slot_hours_left" 0, even if tasks were not run.
     """
     stages = stage_views(view, slots)
-    # Of a job that is over nothing is to come, though tasks behind failed ones were never run.
+    # An ended job has no work left, although tasks behind failed ones never ran.
     is_over = view.state not in ("loading", "running", "paused")
-    # Tasks that are left, running ones too, times the mean of those done.
+    # Remaining tasks, including running ones, times the mean of finished ones.
     left_s = sum(s.mean_s * max(0, s.total - s.done - s.failed) for s in stages)
     return {
         "job": view.job_id,

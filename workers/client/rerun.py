@@ -1,7 +1,7 @@
-"""A task of a farm once more, in this process: its steps, log and error are seen at once.
+"""Run a task of a farm again in this process, with its steps, log and error on the terminal.
 
-Effects: those of the task's steps, which write into the farm's store what a worker would have
-written. The ledger is not touched: `retry` puts a task that failed for good back.
+Effects: those of the task's steps, which write to the farm's store as a worker would. The ledger is
+not changed: use `retry` for a task that failed permanently.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 
 
 def rerun(farm: Farm, job: str, text: str, on_step: Callable[[str], None]) -> Result:
-    """Run the task that text names; raises what its steps raise, BadInput where there is none.
+    """Run the task named by text; raises the errors of its steps, BadInput for an unknown task.
 
-    on_step: called with each step as it begins, and when storage is waited for.
+    on_step: called with each step as it begins, and when waiting for storage.
     """
     task = task_from_text(text)
     farm.check_task(job, task)
@@ -42,7 +42,7 @@ def _views(farm: Farm, job: str, task: TaskId) -> tuple[str, ...]:
 
 
 def _source_of_house(farm: Farm, job: str, house: str) -> str:
-    """What the house was submitted as, from the store."""
+    """The house's source as submitted, from the store."""
     for entry in houses_from_lines(farm.store.get(job_key(job, "houses.jsonl"))):
         if entry.house_id == house:
             return entry.source

@@ -18,9 +18,9 @@ from workers.ledger.user_table import UserTable
 
 
 class Rights:
-    """What one who asks may do.
+    """Rights of the caller.
 
-    token: names him. acting: who he is, where that was found out already. place: where he sits.
+    token: identifies the user. acting: the user, if already known. place: address of the client.
     """
 
     def __init__(
@@ -30,10 +30,10 @@ class Rights:
         self._place = place or platform.node()
 
     def who(self) -> User | None:
-        """Who asks; None on a farm without users. Raises BadInput for one it does not know.
+        """The calling user; None on a farm without users. Raises BadInput for an unknown one.
 
-        Asks the table of users in Redis on each call, so a user that was removed loses his rights
-        at once. Raises as well where the farm has users and no token is given.
+        Reads the table of users in Redis on each call, so a removed user loses all rights immediately. Raises
+        too if the farm has users and no token is given.
         """
         if self._acting is not None or not self._users.all():
             return self._acting

@@ -1,4 +1,4 @@
-"""What is known of a task, and what keeps it from running. Effects: reads the ledger."""
+"""State of a task, and its obstacle if it does not run. Effects: reads the ledger."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _TEXTS = {letter: name.lower() for name, letter in STATES.items()} | {
     STATES["LOADED"]: "loaded, its house not admitted yet",
     STATES["FAILED"]: "failed for good",
 }
-# What may have an obstacle.
+# States that may have an obstacle.
 _WAITING = {_TEXTS[STATES[name]] for name in ("LOADED", "READY", "QUEUED")}
 
 
@@ -87,9 +87,9 @@ def _row_of_task(
 def _facts_of_holder(
     ledger: RedisLedger, registry: Registry, view: JobView, row: dict[str, Any]
 ) -> dict[str, Any]:
-    """How long the lease of a running task lasts, and how long its holder has been silent."""
+    """Remaining lease of a running task, and time since its worker's last heartbeat."""
     stage = task_from_text(row["task"]).stage
-    # Light on a GPU has a lease of its own length.
+    # Light on a GPU has another lease time.
     gpu = stage == LIGHT and view.uses_gpu
     left_s = ledger.lease_left_s(view.job_id, row["task"], LIGHT_GPU if gpu else stage)
     seen = {w.name: w.age_s for w in registry.workers()}

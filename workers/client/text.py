@@ -17,10 +17,10 @@ _COUNTS: Final = {
 
 
 def status_text(status: Mapping[str, Any]) -> str:
-    """A few lines: the job, a row per stage, what is wrong.
+    """A few lines: the job, a row per stage, problems.
 
-    status: of `Farm.status`. Lines that have nothing to say (failures, refusals, storage in order)
-    are left out.
+    status: from `Farm.status`. Lines without information (failures, refusals, storage in order) are
+    omitted.
     """
     houses = status["houses"]
     lines = [
@@ -60,9 +60,9 @@ def status_text(status: Mapping[str, Any]) -> str:
 
 
 def explanation_text(rows: Sequence[Mapping[str, Any]]) -> str:
-    """A task a line, and below it what is known.
+    """One line per task, with its details below.
 
-    rows: of `Farm.explain`. What a row does not have is not printed.
+    rows: from `Farm.explain`. Missing fields are omitted.
     """
     lines = []
     for row in rows:
@@ -108,10 +108,10 @@ def failures_text(kinds: Sequence[Mapping[str, Any]]) -> str:
 
 
 def workers_text(rows: Sequence[Mapping[str, Any]]) -> str:
-    """A worker a line, whether it lives, and how many do.
+    """One line per worker with its state, and the number of live ones.
 
-    rows: with worker, state and age_s, and of the worker's own fields what it reported; "?" stands
-    for what an older one does not say.
+    rows: with worker, state and age_s, and the fields that the worker reported; "?" for fields missing in
+    older versions.
     """
     if not rows:
         return "no workers"

@@ -16,10 +16,10 @@ if TYPE_CHECKING:
 
 
 def limits_of(**given: Any) -> dict[str, Any]:
-    """Fields of a User that were given; BadInput for a number that is none of a quota.
+    """The given fields of a User; BadInput for an invalid number.
 
-    None means not given and is left out; 0 is a limit of a quota ("none"), never a share. given:
-    fields of User. `change_user` takes the answer.
+    None means not given and is dropped; 0 means no limit for a quota, and is invalid for a share. given:
+    fields of User. For `change_user`.
     """
     limits = {name: value for name, value in given.items() if value is not None}
     for name in ("max_slots", "slot_hours"):
@@ -65,10 +65,10 @@ def change_user(farm: Farm, name: str, limits: Mapping[str, Any]) -> None:
 
 
 def remove_user(farm: Farm, name: str) -> None:
-    """His token says nothing any more; his jobs go on. The last one may go, too.
+    """Invalidate a user's token; jobs go on. The last user may be removed too.
 
-    BadInput for an unknown user, and for the only admin while others are left. With the last user
-    the farm asks nobody who he is again.
+    BadInput for an unknown user, and for the only admin while others remain. Without users the farm
+    requires no tokens.
     """
     farm.rights.check_admin("users remove")
     users = farm.users.all()
@@ -80,10 +80,10 @@ def remove_user(farm: Farm, name: str) -> None:
 
 
 def user_rows(farm: Farm) -> list[dict[str, Any]]:
-    """A row per user: share, quotas, what his jobs hold now and took in the last days.
+    """One row per user: share, quotas, current slots, and slot-hours of the last days.
 
-    Reads the view of every active job. "slot_hours_used" is of the last SPENT_DAYS days and of
-    tasks that are done; limits of 0 mean none.
+    Reads the view of every active job. "slot_hours_used" covers the last SPENT_DAYS days and finished
+    tasks; limits of 0 mean none.
     """
     users, spent = farm.users.all(), farm.users.spent_h()
     views = [farm.ledger.view(job) for job in farm.ledger.active_jobs()]

@@ -58,7 +58,7 @@ class Dispatcher:
     """
 
     def __init__(self, config: FarmConfig, ledger: Ledger, send: Send, token: str) -> None:
-        self.slots: Mapping[str, int] = {}  # stage -> tasks the workers can run at once
+        self.slots: Mapping[str, int] = {}  # stage -> tasks that workers can run at once
         self.users: Mapping[str, User] = {}
         self._config = config
         self._ledger = ledger
@@ -67,12 +67,12 @@ class Dispatcher:
         self._turns = MessageTurns()
 
     def send_ready(self, views: Sequence[JobView]) -> int:
-        """Send what there is room for; how many tasks. views: most urgent first. Raises NotLeading.
+        """Send ready tasks up to the available capacity; returns their number.
 
-        Room is what slots can take soon, so a job of millions of tasks does not fill the broker.
-        Shares between users and priorities are kept over time, not in one call: what a job leaves
-        goes to others. Raises LedgerUnavailable where Redis or the broker does not answer; what was
-        not sent is sent again later.
+        views: most urgent first. Capacity is what slots can take soon, so that a job of millions of tasks does
+        not fill the broker. Shares between users and priorities hold over time, not per call: capacity that a
+        job does not use goes to others. Raises NotLeading, and LedgerUnavailable if Redis or the broker does
+        not answer; unsent tasks are sent later.
         """
         windows = self._windows(views)
         room = {pool: _free_in_window(views, pool, n) for pool, n in windows.items()}
@@ -82,18 +82,20 @@ class Dispatcher:
             pool: max(0, n - sum(of_job[pool] for of_job in given.values()))
             for pool, n in room.items()
         }
-        # Send each job what it is given. Not all of it may be there: a ready task may wait until it may be
-        # tried again. So what one job leaves goes to the next, and in the end to whoever has more.
+        # Send each job its quota. Fewer tasks may be available: a ready task may be waiting for its
+        # next
+        # attempt. So the rest of one job's quota goes to the next, and finally to any job with
+        # more.
         n_sent, with_more = self._send_round(views, given, spare, ceilings)
         if any(spare.values()):
             n_sent += self._send_round(with_more, {}, spare, ceilings)[0]
         return n_sent
 
     def send_lost_again(self, views: Sequence[JobView]) -> int:
-        """Send again what was lost between ledger and broker: old messages whose queue is empty.
+        """Resend tasks lost between ledger and broker: old messages with an empty queue.
 
-        Only a stage whose queue is empty and whose tasks waited `resend_s` seconds. A message too
-        many does no harm: the second claim is refused. Returns how many were sent, 0 when another
+        Only for a stage whose queue is empty and whose tasks have waited `resend_s` seconds. A duplicate
+        message is harmless: the second claim is refused. Returns the number of messages, 0 if another
         coordinator leads.
         """
         n_sent = 0
@@ -117,10 +119,10 @@ class Dispatcher:
         spare: dict[str, int],
         ceilings: _Ceilings,
     ) -> tuple[int, list[JobView]]:
-        """Send each job what it is given and what is spare; how many tasks, and the jobs with more.
+        """Dispatch each job's quota plus spare capacity. Returns the number of tasks and the jobs with more work.
 
-        given: job -> pool -> tasks. spare: pool -> tasks that may be sent of any job; reduced by what is
-        sent beyond what was given, and raised by what a job leaves.
+        given: job -> pool -> tasks. spare: pool -> tasks of any job; reduced by tasks beyond a quota, and
+        raised by unused quotas.
         """
         n_sent, with_more = 0, []
         for view in views:
@@ -195,7 +197,7 @@ class Dispatcher:
 
 
 class _Ceilings:
-    """How many more tasks of a job and of a user may be in flight, where they have a ceiling."""
+    """Remaining tasks in flight of a job and of a user, if limited."""
 
     def __init__(self, views: Sequence[JobView], users: Mapping[str, User]) -> None:
         self._of_job = {v.job_id: max(0, v.max_slots - v.n_in_flight) for v in views if v.max_slots}
@@ -228,7 +230,7 @@ class _Ceilings:
 
 
 def _free_in_window(views: Sequence[JobView], pool: str, window: int) -> int:
-    """How much of a window is free: neither queued nor running."""
+    """Free part of a window: neither queued nor running."""
     return max(0, window - sum(n_queued_or_running(view, pool) for view in views))
 
 
@@ -257,7 +259,7 @@ def celery_sender(app: Any) -> Send:
     import redis
     from kombu.exceptions import BatchPublishError, OperationalError
 
-    # A connection that is lost under a batch is no OperationalError.
+    # A connection lost during a batch does not raise OperationalError.
     away = (OperationalError, BatchPublishError, redis.ConnectionError, redis.TimeoutError, OSError)
 
     def send(messages: Iterable[tuple[str, str, str, str]]) -> None:
@@ -274,7 +276,7 @@ def celery_sender(app: Any) -> Send:
                         **_MESSAGE_OPTIONS,
                     )
         except away as error:
-            # What was not sent stays "q" in the ledger, and is sent again when it is old.
+            # Unsent tasks stay "q" in the ledger, and are resent when they are old.
             why = error.__cause__ if isinstance(error, BatchPublishError) else error
             raise LedgerUnavailable(f"the broker took no message: {why}") from error
 

@@ -1,7 +1,7 @@
-"""Alerts for a person on call: what goes wrong on a farm while its jobs run, found by regular looks.
+"""Alerts for a person on call: problems of a farm with running jobs, found by regular checks.
 
-Effect: the clock's. Failure rates, workers that died, queues that do not move, a store in trouble. The
-leader looks; a new leader starts without memory, so it may post what goes on once more.
+Effect: the clock's. Failure rates, dead workers, stuck queues, an unhealthy store. The leader checks; a
+new leader starts without state, so it may post ongoing problems once more.
 """
 
 from __future__ import annotations
@@ -46,10 +46,10 @@ class FarmAlerts:
         self._posted: dict[str, str] = {}  # alert that goes on -> its reason
 
     def look(self, views: Sequence[JobView], workers: Iterable[WorkerView], breaker: str) -> None:
-        """Compare with what was seen before. breaker: why claims are stopped, or "".
+        """Compare with the previous check. breaker: reason for stopped claims, or "".
 
-        views: of all active jobs; one that is missing ends its alerts. workers: all that the
-        registry knows. An alert is posted once, when it begins, and once more when it is over.
+        views: of all active jobs; a missing job ends its alerts. workers: all in the registry. An alert is
+        posted once when it begins, and once when it ends.
         """
         now = self._clock()
         found: dict[str, str] = {}
@@ -62,7 +62,7 @@ class FarmAlerts:
         self._trouble_at = None if not breaker else self._trouble_at or now
         if self._trouble_at is not None and now - self._trouble_at >= _STORE_S:
             found["store"] = breaker
-        # A job that is gone ends its alerts, too.
+        # A missing job ends its alerts too.
         self._jobs = {v.job_id: self._jobs[v.job_id] for v in views}
         for name in found.keys() - self._posted.keys():
             self._post_alert(name, "begins", found[name])

@@ -1,6 +1,6 @@
-"""How many tasks and slots of a job a pool has, from the counters of the ledger; no effects.
+"""Tasks and slots of a job in a pool, from the counters of the ledger; no effects.
 
-A pool is a stage, light on a GPU apart from light elsewhere (`workers.ids.pool_of`).
+A pool is a stage; light on a GPU is separate from other light (`workers.ids.pool_of`).
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ def is_in_pool(view: JobView, pool: str) -> bool:
 
 
 def is_stopped(view: JobView, stage: str) -> bool:
-    """Whether nothing of the stage is sent now, because the user's slot-hours are spent.
+    """True if no task of the stage is sent because the user's slot-hours are spent.
 
-    Merges are never stopped so: they take little and make what is done usable.
+    Merges are never stopped: they are cheap and make finished work usable.
     """
     return view.blocked_queues == (EVERYWHERE,) and stage in (GEOMETRY, GL, LIGHT)
 
@@ -62,9 +62,9 @@ def n_queued_or_running(view: JobView, pool: str) -> int:
 
 
 def n_slots(view: JobView, pool: str, state: str) -> int:
-    """About how many slots the job's tasks in a pool occupy (state RUNNING) or will (QUEUED).
+    """Approximate slots that the job's tasks in a pool occupy (state RUNNING) or will (QUEUED).
 
-    A slot claims several short tasks of a house at once, so there are fewer slots than tasks.
+    A slot claims several short tasks of a house together, so there are fewer slots than tasks.
     """
     stage = stage_of_pool(pool)
     n = view.counts.get(f"{stage}:{STATES[state]}", 0.0) if is_in_pool(view, pool) else 0.0
@@ -76,9 +76,9 @@ def n_slots(view: JobView, pool: str, state: str) -> int:
 
 
 def n_claimed_together(view: JobView, stage: str) -> int:
-    """How many tasks of a stage a slot claims at once: about TOGETHER_S of work, one at least.
+    """Number of tasks of a stage that a slot claims together: about TOGETHER_S of work, at least one.
 
-    From the mean of the job's own tasks; 1 before one has ended. Never more than MOST_TOGETHER.
+    From the mean of the job's own tasks; 1 before one has ended. At most MOST_TOGETHER.
     """
     seconds = mean_s([view], stage)
     return max(1, min(MOST_TOGETHER, int(TOGETHER_S / seconds))) if seconds else 1

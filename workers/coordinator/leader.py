@@ -59,12 +59,12 @@ _OVER_SHARE_S: Final = 1.0  # seconds a user may exceed his share before his job
 class Coordinator:
     """Leads the farm, or stands by until the leader is gone.
 
-    Any number may run; the ledger has one leader, and moves nothing for another. `run` calls `turn` until it
-    is stopped; a turn ends dead leases, keeps budgets, limits and shares, and sends ready tasks.
+    Several may run; the ledger has one leader, and refuses commands of others. `run` calls `turn` until it is
+    stopped; a turn ends dead leases, applies budgets, limits and shares, and sends ready tasks.
 
-    ledger, registry, users: in Redis, or in memory for tests; without users all jobs are nobody's and
-    share alike. send: puts messages on queues, each (queue, job, task, recipe digest). notice: called
-    now and then while it leads, to post news of jobs. clock: monotonic, s.
+    ledger, registry, users: in Redis, or in memory for tests; without users all jobs share alike. send: puts
+    messages on queues, each (queue, job, task, recipe digest). notice: called occasionally while leading, to
+    post news of jobs. clock: monotonic, s.
     """
 
     def __init__(
@@ -95,11 +95,10 @@ class Coordinator:
         self.leading = False
 
     def run(self, stop: threading.Event) -> None:
-        """Turn after turn until stop is set; Redis may go away and come back.
+        """Turn after turn until stop is set; survives outages of Redis.
 
-        stop: set by a signal; the loop ends within a turn and a pause. It never raises
-        LedgerUnavailable: it logs it, loses the lead and tries again. Several processes may run it
-        at once, of which one leads.
+        stop: set by a signal; the loop ends within a turn and a pause. It never raises LedgerUnavailable: it
+        logs it, loses the lead and retries. Several processes may run it, one of which leads.
         """
         while not stop.is_set():
             try:
@@ -120,11 +119,11 @@ class Coordinator:
             _log.warning("%s", error)
 
     def turn(self) -> int:
-        """One round of duties; how many messages were sent.
+        """One round of duties; returns the number of messages sent.
 
-        For tests and for `run`; the caller pauses between turns. 0 also while standing by and while
-        the breaker is open. Duties that are due less often (leases, rates, limits, notices) keep
-        their own clocks. Raises LedgerUnavailable.
+        For tests and for `run`; the caller pauses between turns. 0 also on standby and while the breaker is
+        open. Duties with longer periods (leases, rates, limits, notices) have separate clocks. Raises
+        LedgerUnavailable.
         """
         # A standby is alive as well.
         if self._is_due("alive", _REAP_EVERY_S):
@@ -204,7 +203,8 @@ class Coordinator:
     def _block_jobs(self, views: list[JobView]) -> list[JobView]:
         """The jobs with the queues where they are blocked now; writes what changed to the ledger."""
         blocks, found, now = find_blocked_jobs(views, self._users, self._spent_h), [], self._clock()
-        # Block only after a second over share; urgent jobs and spent slot-hours take effect at once.
+        # Block only after a second over share; urgent jobs and spent slot-hours take effect
+        # immediately.
         self._over_since = {job: self._over_since.get(job, now) for job in blocks}
         for view in views:
             block = blocks.get(view.job_id)
@@ -228,7 +228,7 @@ class Coordinator:
 
 
 def _notice(config: FarmConfig, ledger: RedisLedger) -> Callable[[], None]:
-    """A function that posts news to the configured webhook; it does nothing where there is none."""
+    """A function that posts news to the configured webhook; a no-op without one."""
     if not config.webhook.reveal():
         return lambda: None
 
@@ -244,9 +244,8 @@ def _notice(config: FarmConfig, ledger: RedisLedger) -> Callable[[], None]:
 def main() -> int:
     """`python -m workers.coordinator.leader`: lead, or stand by, until a signal ends it.
 
-    1, with a line on stderr, when configuration or scratch folder are wrong. It waits for Redis as
-    long as need be, serves metrics where a port is configured, and gives up the lead on SIGTERM or
-    SIGINT.
+    1, with a line on stderr, for an invalid configuration or scratch folder. It waits for Redis
+    indefinitely, serves metrics if a port is configured, and gives up the lead on SIGTERM or SIGINT.
     """
     from workers.queue.celery_app import make_app
 

@@ -114,7 +114,7 @@ class FarmCollector:
         yield from (rate, left, paused, held)
 
     def _users(self, views: list[JobView]) -> Iterator[Metric]:
-        """A row per user: who has what of the farm."""
+        """A row per user: current share of the farm."""
         users, spent = self._table.all(), self._table.spent_h()
         running = GaugeMetricFamily("pbrs_user_tasks_running", "tasks that run", labels=["user"])
         hours = GaugeMetricFamily(
@@ -175,7 +175,7 @@ def _done(views: list[JobView]) -> Metric:
 def _faults(views: list[JobView]) -> Metric:
     metric = CounterMetricFamily("pbrs_faults", "attempts that failed", labels=["job", "class"])
     for view in views:
-        # A class that has not failed yet is 0: Prometheus sees no rise of what was not there.
+        # Export 0 for classes without a failure: Prometheus sees no rise of a missing series.
         for name in get_args(FaultClass):
             metric.add_metric([view.job_id, name], view.counts.get(f"failures:{name}", 0))
     return metric
@@ -206,10 +206,10 @@ def _seconds(views: list[JobView]) -> Metric:
 
 
 def serve_metrics(config: FarmConfig, ledger: RedisLedger) -> Any:
-    """Serve /metrics on the configured port in a thread of its own.
+    """Serve /metrics on the configured port in a separate thread.
 
-    Gives what prometheus_client gives: the server and its thread, a daemon. Raises OSError where
-    the port is taken. There is no authentication: keep the port inside.
+    Returns prometheus_client's server and daemon thread. Raises OSError if the port is in use. There is no
+    authentication: keep the port internal.
     """
     registry = CollectorRegistry(auto_describe=False)
     registry.register(FarmCollector(ledger))

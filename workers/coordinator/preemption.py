@@ -13,11 +13,11 @@ from workers.ledger.task_ledger import Hold, JobView, WorkerView
 def choose_victims(
     views: Sequence[JobView], holds_of: Callable[[str], list[Hold]], workers: Iterable[WorkerView]
 ) -> list[Hold]:
-    """The holds to end: of the least urgent job first, and of it what began last.
+    """Choose the holds to end: of the least urgent job first, and its most recent ones.
 
-    As many slots are freed as queued tasks of urgent jobs need, less those that are free already or
-    end already. Only slots of workers that take the urgent tasks' queue count. Never chosen: other
-    urgent jobs' tasks, and merges. holds_of: the holds of a job. [] while no urgent task waits.
+    Frees as many slots as queued tasks of urgent jobs need, minus slots that are free or ending already. Only
+    slots of workers on the urgent tasks' queue count. Urgent jobs' tasks and merges are never chosen.
+    holds_of: the holds of a job. [] while no urgent task waits.
     """
     wanted = {
         pool: sum(n_slots(v, pool, "QUEUED") for v in views if v.is_urgent and v.state == "running")
@@ -61,12 +61,12 @@ def choose_victims(
 
 
 def _may_end(hold: Hold, of_job: Mapping[str, JobView]) -> bool:
-    """Whether a slot may end what it does: of no urgent job, and no merge."""
+    """True if a slot's tasks may be ended: no urgent job, no merge."""
     view = of_job[hold.job]
     pool = pool_of(task_from_text(hold.task).stage, gpu=view.uses_gpu)
     return pool in WORK_POOLS and not view.is_urgent
 
 
 def _first_of_workers(slots: Sequence[list[Hold]], workers: set[str], n: int) -> list[list[Hold]]:
-    """The first n slots that are these workers'."""
+    """The first n slots of these workers."""
     return [held for held in slots if held[0].worker in workers][:n]

@@ -52,7 +52,7 @@ class StageView:
     done: int
     running: int
     queued: int  # a message is on the queue
-    waiting: int  # everything else that is to come
+    waiting: int  # all other remaining tasks
     failed: int  # for good
     total: int  # expected, from the houses seen so far
     per_s: float
@@ -77,8 +77,8 @@ def views_per_hour(view: JobView) -> float:
 def stage_views(view: JobView, slots: Mapping[str, int]) -> list[StageView]:
     """The stages of a job: counts, rate, and an ETA from the rate or, at first, from p50.
 
-    slots: stage -> tasks that workers can run at once, 0 where none can. Stages that the job has
-    not (light of a job without it) are left out.
+    slots: stage -> tasks that workers can run at once, 0 if none can. Stages that the job does not have
+    (light of a job without it) are omitted.
     """
     return [
         _stage_view(view, stage, slots.get(stage, 0)) for stage in STAGES if _has_stage(view, stage)
@@ -124,9 +124,9 @@ def _eta_s(left: int, rate: float, p50_s: float, n_slots: int) -> float | None:
 
 
 def expected_total(view: JobView, stage: str) -> int:
-    """Tasks of a stage in the whole job; batches of houses not yet opened at the mean so far.
+    """Tasks of a stage in the whole job; batches of unopened houses are estimated by the mean so far.
 
-    0 while nothing is known. Houses that were given up have none that are still to come.
+    0 without data. Abandoned houses have no remaining tasks.
     """
     n_houses = int(view.fields.get("n_houses", 0))
     if stage == JOB:
@@ -148,8 +148,8 @@ def expected_total(view: JobView, stage: str) -> int:
 def durations(view: JobView, stage: str) -> dict[int, float]:
     """Histogram of a stage's task durations: k -> tasks that took 2^(k-1) to 2^k seconds.
 
-    Sparse: powers without tasks are missing. k is -3 for all that is shorter, so 1/8 s is the
-    finest edge. For `quantile_s`.
+    Sparse: powers without tasks are missing. k is -3 for anything shorter, so 1/8 s is the finest edge. For
+    `quantile_s`.
     """
     prefix = f"took:{stage}:"
     return {
@@ -162,7 +162,7 @@ def durations(view: JobView, stage: str) -> dict[int, float]:
 def mean_s(views: Iterable[JobView], stage: str) -> float:
     """Mean seconds of the stage's tasks over all these jobs, 0 before one has ended.
 
-    views: of several jobs, when one alone has too few tasks to say. Failed attempts are not in it.
+    views: of several jobs, if one alone has too few tasks. Failed attempts are excluded.
     """
     seconds, n = 0.0, 0.0
     for view in views:

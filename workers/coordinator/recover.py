@@ -23,7 +23,7 @@ from workers.ledger.redis_ledger import RedisLedger
 from workers.ledger.task_ledger import HouseState
 from workers.runner import StepRunner
 
-_THREADS: Final = 16  # storage answers slowly but many at once
+_THREADS: Final = 16  # storage is slow but handles many requests at once
 _CHUNK: Final = 1000  # houses in memory at a time
 
 
@@ -35,10 +35,10 @@ def rebuild(
     houses: list[HouseEntry],
     progress: Callable[[str], None] = lambda _line: None,
 ) -> None:
-    """Enter every house of the job as far as its markers say. The job must have just been created.
+    """Enter every house of the job with the progress of its markers. The job must have just been created.
 
-    Where markers may be of another recipe or version every house begins anew: its tasks look into
-    each marker, and what holds is not made again.
+    If markers may be of another recipe or version, every house starts from the beginning: its tasks read
+    each marker, and valid ones are not repeated.
     """
     # The markers' names of all houses, then a look at each that has begun.
     are_current = bool(houses) and are_markers_current(store, spec)
@@ -124,7 +124,7 @@ def _house_state(
     survey = runner.survey(spec, house.house_id, names) if names else None
     if survey is None or survey.batches is None:
         return None
-    # Each batch stands at its first stage that is not done, the house where its batches allow.
+    # Each batch is at its first unfinished stage, the house at the stage that its batches allow.
     units: dict[str, tuple[str, str]] = {}
     for unit, stage in survey.missing.items():
         units[unit] = (stage, "l") if stage else (spec.batch_stages[-1], "d")

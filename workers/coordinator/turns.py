@@ -30,14 +30,14 @@ from workers.ledger.task_ledger import EVERYWHERE, SPENT_DAYS, JobView, User
 
 _TASKS_PER_RANK: Final = 9  # tasks of a job for one of a job of the next lower rank
 _MOST_RANK: Final = 2  # ranks below this one get as much as it does
-_URGENT: Final = "!"  # stands for the user of urgent jobs; no user's name
+_URGENT: Final = "!"  # the user of urgent jobs; not a valid user name
 _NOBODY: Final = User("")
 
 
 class Loads:
-    """What each user holds, and which of several waiting users is next.
+    """Load of each user, and the choice among several waiting users.
 
-    held: user -> messages in flight, or slots; counted on by `serve`. share_of: a user's share, > 0.
+    held: user -> messages in flight, or slots; updated by `serve`. share_of: a user's share, > 0.
     """
 
     def __init__(self, held: Counter[str], share_of: Callable[[str], float]) -> None:
@@ -45,7 +45,7 @@ class Loads:
         self.share_of = share_of
 
     def load(self, user: str) -> float:
-        """What the user holds, divided by his share."""
+        """The user's held slots, divided by the share."""
         return self.held[user] / self.share_of(user)
 
     def serve(self, waiting: Iterable[str], has_more: Callable[[str], bool]) -> Iterator[str]:
@@ -169,10 +169,10 @@ class _JobsInTurn:
 
 
 class MessageTurns:
-    """Says how many tasks of each job are sent next; one per leading coordinator.
+    """Decides how many tasks of each job are sent next; one per leading coordinator.
 
-    It remembers what each job was sent so far, as passes: `split` proposes, and `charge` counts what was
-    really sent.
+    It remembers the number sent to each job as passes: `split` proposes, and `charge` counts tasks actually
+    sent.
     """
 
     def __init__(self) -> None:
@@ -202,10 +202,10 @@ class MessageTurns:
         return given
 
     def charge(self, pool: str, job: str, n_sent: int) -> None:
-        """So many tasks of the job were sent.
+        """Count sent tasks of a job.
 
-        Call it with what was really sent, which may be less than `split` gave: the rest is not held
-        against the job. A job that is not in the pool's turns is passed over.
+        Call it with the number actually sent, which may be less than `split` gave: the rest is not charged. A job
+        without turns in the pool is ignored.
         """
         if job in self._passes.get(pool, {}):
             self._passes[pool][job] += n_sent * self._strides[pool][job]
@@ -262,7 +262,7 @@ def _user_of(view: JobView) -> str:
 
 
 def _count_in_flight(views: Sequence[JobView], pool: str) -> Counter[str]:
-    """User -> tasks in a pool that are queued or run; 0 for who only has tasks ready there."""
+    """User -> tasks in a pool that are queued or running; 0 for users with only ready tasks."""
     found: Counter[str] = Counter()
     for view in views:
         n = n_queued_or_running(view, pool)

@@ -1,6 +1,6 @@
 """Posts to a URL when a job ends or pauses itself, one JSON object each. Effects: requests, the ledger.
 
-The ledger keeps of each job what was posted last, so a new leader repeats nothing and misses nothing.
+The ledger stores the last post of each job, so a new leader repeats and misses nothing.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ from workers.ledger.task_ledger import WITH_FAILURES, JobView, Ledger, LedgerUna
 _log = logging.getLogger("pbrs.webhook")
 _TIMEOUT_S: Final = 10.0
 _MOST_TRIES: Final = 5
-_NEWEST: Final = 50  # jobs that are looked at
+_NEWEST: Final = 50  # maximum jobs to check
 _POSTED_STATES: Final = ("done", WITH_FAILURES, "paused", "cancelled")
 
 Post = Callable[[dict[str, Any]], None]
 
 
 class Webhook:
-    """Posts each new end or pause of a job once, whoever leads.
+    """Posts each new end or pause of a job once, across leaders.
 
-    ledger: remembers what was posted. post: takes one JSON object; may raise OSError, and is tried five
+    ledger: stores which events were posted. post: takes one JSON object; may raise OSError, and is tried five
     times for one event.
     """
 
@@ -40,10 +40,10 @@ class Webhook:
         self._tries: Counter[tuple[str, str]] = Counter()
 
     def look(self, views: list[JobView]) -> None:
-        """Post what is new of these jobs.
+        """Post new events of these jobs.
 
-        What was posted is kept in the ledger, so that a new leader does not repeat it. A post that
-        fails is tried again at later looks, five times in all.
+        Posts are recorded in the ledger, so that a new leader does not repeat them. A failed post is retried at
+        later calls, five times in all.
         """
         for view in views:
             notified = view.fields.get("notified", "")
@@ -66,7 +66,7 @@ class Webhook:
 
 
 def notice(view: JobView) -> dict[str, Any]:
-    """What is posted of a job; `text` is what chat programs show.
+    """Event of a job; `text` is for chat programs.
 
     Plain JSON values. The keys are a contract with receivers: add, never rename.
     """
@@ -91,10 +91,10 @@ def notice(view: JobView) -> dict[str, Any]:
 
 
 def poster(url: Secret) -> Post:
-    """A Post to the URL. Raises BadInput for one that is no http or https.
+    """A Post to the URL. Raises BadInput for a scheme other than http or https.
 
-    The function waits for the answer and raises OSError for a failed one, as urllib does. The URL
-    is a secret: chat programs put their token in it.
+    The function waits for the answer and raises OSError for a failed one, as urllib does. The URL is a
+    secret: chat programs put their token in it.
     """
     if urlsplit(url.reveal()).scheme not in ("http", "https"):
         raise BadInput("environment", "PBRS_WEBHOOK", "expected an http:// or https:// URL")
@@ -112,11 +112,11 @@ def poster(url: Secret) -> Post:
 def watch_jobs(
     webhook: Webhook, ledger: Ledger, look_at: Callable[[list[JobView]], None] = lambda _views: None
 ) -> Callable[[], None]:
-    """What the leader calls now and then: a look at the newest jobs, in a thread of its own.
+    """Function for the leader: check the newest jobs, in a separate thread.
 
-    look_at: is shown the same jobs.
+    look_at: called with the same jobs.
 
-    A URL that does not answer holds up no task; while one look lasts no other begins.
+    A slow URL delays no task; checks do not overlap.
     """
     # Taken by begin, given back by the thread that it starts.
     busy = threading.Lock()

@@ -1,1 +1,1 @@
-"""What is done, leased and waiting: one interface, and Redis behind it."""
+"""State of all tasks (done, leased, waiting): one interface, and its implementation in Redis."""

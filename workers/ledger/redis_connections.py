@@ -1,9 +1,9 @@
-"""Connections to Redis that are lost where Redis refuses for a while. Effects: sockets.
+"""Treat temporary refusals of Redis as lost connections. Effects: sockets.
 
-A replica that has just lost its lead answers READONLY, a full disk MISCONF, a server that starts LOADING: nothing
-is wrong with what was asked, and the same will be right later, maybe of another server behind the same name. redis-py
-raises a dozen classes for these, kombu calls most of them errors of the caller, and Celery's worker ends at one. Here
-they all become a connection that was lost, which the ledger, kombu and Celery wait for and try again.
+A replica that has just lost its lead answers READONLY, a full disk MISCONF, a starting server LOADING: the request is
+valid and will succeed later, perhaps on another server of the same name. redis-py raises a dozen classes for these,
+kombu treats most of them as errors of the caller, and Celery's worker ends at one. Here all of them become a lost
+connection, on which the ledger, kombu and Celery wait and retry.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _PREFIX: Final = re.compile(rf"(?:^|: -?)({'|'.join(PASSING)})(?= |$)")
 
 
 class RefusedForNow(redis.ConnectionError):
-    """Redis is there and refuses what it will do again later; `prefix` is its word for why."""
+    """Redis is reachable and refuses temporarily; `prefix` is its error word."""
 
     def __init__(self, prefix: str, text: str) -> None:
         super().__init__(text, status_code=prefix)

@@ -87,7 +87,7 @@ def redis_client(config: FarmConfig, n_retries: int = 5) -> Any:
 
 
 def lua_constants() -> str:
-    """What Lua and Python must agree on, as the first lines of every script."""
+    """Constants shared by Lua and Python, as the first lines of every script."""
     lines = [f"local {name} = '{letter}'" for name, letter in STATES.items()]
     lines += [f"local {name.upper()}_STAGE = '{name}'" for name in STAGES]
     lines += [f"local STAGES = {{ {', '.join(f'{s!r}' for s in STAGES)} }}"]
@@ -138,7 +138,7 @@ class RedisLedger:
 
         store_id: of the store that holds it; workers of another one refuse its tasks.
         """
-        # What scripts read of the job; the rest of the spec stays in storage.
+        # The fields that scripts read; the rest of the spec stays in storage.
         rules = spec.rules
         fields: dict[str, object] = {
             "version": spec.version,
@@ -165,8 +165,8 @@ class RedisLedger:
     def add_houses(self, job: str, first: int, houses: Sequence[HouseEntry]) -> None:
         """Append fresh houses to the job's order; `first` is the index of the first of them.
 
-        The caller counts `first` on from call to call; nothing checks it, and repeating a call adds
-        the houses twice. For a job that is still loading: `open` follows.
+        The caller increments `first` from call to call, unchecked; repeating a call adds the houses twice. For a
+        job that is still loading: `open` follows.
         """
         p = self._p(job)
         with self.errors():
@@ -183,10 +183,10 @@ class RedisLedger:
                 pipe.execute()
 
     def load_houses(self, job: str, houses: Iterable[HouseState]) -> int:
-        """Enter houses as storage has them, in the job's order; how many were new.
+        """Enter houses with their progress in storage, in the job's order; returns the number of new ones.
 
-        A house that the ledger knows already is left as it is, so a call that was cut off may be
-        repeated. For `recover`: fresh houses are added with `add_houses`.
+        Known houses are not changed, so an interrupted call may be repeated. For `recover`: fresh houses are added
+        with `add_houses`.
         """
         # Many calls in one round trip; each script is one house, and atomic.
         n_new = 0
@@ -218,15 +218,15 @@ class RedisLedger:
             pipe.execute()
 
     def forget(self, job: str) -> None:
-        """Remove all the ledger knows of the job; storage is not touched.
+        """Remove the job from the ledger; storage is not touched.
 
-        For a job that is over: tasks that run are not waited for. Scans all keys of the job, so it
-        takes long for a large one, but never blocks Redis.
+        For an ended job: running tasks are not waited for. Scans all keys of the job, which is slow for a large one
+        but never blocks Redis.
         """
         with self.errors():
             self.client.zrem(f"{self._g}jobs", job)
             self.client.zrem(f"{self._g}known", job)
-            # The farm's leases of this job, then every key of its own.
+            # The farm's leases of this job, then all its own keys.
             for name in POOLS:
                 key = f"{self._g}lease:{name}"
                 members = self.client.zscan_iter(key, match=f"{job}|*")
@@ -255,12 +255,12 @@ class RedisLedger:
     def claim_many(
         self, job: str, tasks: Sequence[str], *, token: str, recipe: str, direct: bool = False
     ) -> list[Claim]:
-        """May this worker run the tasks? An answer each; the attempts are counted before the answers.
+        """Claim tasks for this worker: a verdict each; attempts are counted before the answer.
 
-        tasks: of one job, "<house>/<unit>/<stage>". token: of this claim; what was claimed by it is kept and
-        ended by it. recipe: digest that this worker renders by. direct: tasks without a message, too. A verdict
-        other than "run" changes nothing, but that a task may be sent again later; docs/farm/inside.md has a
-        table of verdicts. A task that failed before is claimed alone: it may take others with it.
+        tasks: of one job, "<house>/<unit>/<stage>". token: identifies this claim; heartbeat and finish must present
+        it. recipe: digest of this worker's recipe. direct: also tasks without a message. Verdicts other than "run"
+        change nothing, except that a task may be sent again later; docs/farm/inside.md has a table of verdicts. A
+        task that failed before is claimed alone, since it may crash others claimed with it.
         """
         from workers.job import work_version
 
@@ -288,10 +288,10 @@ class RedisLedger:
     def finish_many(
         self, job: str, ends: Mapping[str, Finished], token: str, go_on: GoOn | None = None
     ) -> dict[str, Claim]:
-        """Done: what follows becomes ready. Tasks of the last one's house that are claimed now.
+        """Mark tasks as done; their successors become ready. Returns the newly claimed tasks of the last one's house.
 
-        A lost lease is of no account: what it made is in the store. go_on: claim more at once, where
-        others have enough to do, or where the house's scene is loaded.
+        A lost lease does not matter: the results are in the store. go_on: claim more immediately, if others have
+        enough work, or if the house's scene is loaded.
         """
         from workers.job import work_version
 
@@ -307,11 +307,11 @@ class RedisLedger:
         return {task: Claim(v, detail, inputs, token) for task, v, detail, inputs in rows}
 
     def fail(self, job: str, task: str, token: str, fault: Fault, *, delay_s: float) -> str:
-        """Ended badly: stale, handed back, retry, failed (for good) or cancelled.
+        """Mark a task as failed: returns stale, handed back, retry, failed (permanently) or cancelled.
 
-        "stale" says that the lease is somebody else's by now and nothing was changed. A class of
-        UNCOUNTED gives the attempt back ("handed back"), "data" fails for good at once, all others
-        when the job's attempts are used up. delay_s: before the task may be tried again.
+        "stale": the lease belongs to another worker and nothing was changed. A class of UNCOUNTED gives the attempt
+        back ("handed back"), "data" fails permanently, all others when the job's attempts are used up. delay_s:
+        before the next attempt.
         """
         args = (fault.fault, fault.fingerprint, fault.json(), self.config.worker)
         return str(self._run("fail", job, task, token, *args, delay_s, self.config.cooldown_s))
@@ -327,10 +327,7 @@ class RedisLedger:
         return bool(self._run("lead", "", token, _LEAD_S))
 
     def resign(self, token: str) -> None:
-        """Give up the lead, if it is ours.
-
-        A standby may lead at once, it need not wait for the lead to run out.
-        """
+        """Give up the lead, if it is ours, so that a standby need not wait for its expiry."""
         with self.errors():
             if self.client.get(f"{self._g}leader") == token:
                 self.client.delete(f"{self._g}leader")
@@ -348,9 +345,8 @@ class RedisLedger:
     ) -> list[str] | None:
         """Admit houses and take ready tasks to be sent, at most room[stage]; None: not leading.
 
-        max_open: of houses of the job in work at once. Tasks of the answer are queued from now on:
-        what the caller cannot send, `resend` finds again. Of a job that does not run only its last
-        merge is given.
+        max_open: houses of the job in work at once. The returned tasks are queued from now on: `resend` finds those
+        that the caller fails to send. A job that is not running only gives its last merge.
         """
         pairs = [x for pair in room.items() for x in pair]
         return _tasks(self._run("dispatch", job, token, max_open, *pairs))
@@ -375,10 +371,9 @@ class RedisLedger:
                 self.client.hset(f"{self._p(job)}job", mapping=fields)
 
     def preempt(self, job: str, token: str, holds: Sequence[Hold]) -> int:
-        """Let these tasks end at their next heartbeat; how many shall that did not before, -1: not leading.
+        """Let these tasks end at their next heartbeat; returns the number of new ones, -1: not leading.
 
-        holds: of `holds`, the tokens of which are compared, so a task that was claimed again
-        meanwhile is spared. They end by themselves at their next heartbeat, and their attempts are
+        holds: from `holds`; tokens are compared, so a task claimed again in the meantime is spared. Attempts are
         given back.
         """
         pairs = [x for hold in holds for x in (hold.task, hold.token)]
@@ -396,7 +391,7 @@ class RedisLedger:
     def set_notified(self, job: str, outcome: str) -> None:
         """Keep which end or pause of the job was posted to the webhook last, "" for none."""
         with self.errors():
-            # A job that was forgotten meanwhile stays so.
+            # A job forgotten in the meantime stays forgotten.
             if self.client.exists(f"{self._p(job)}job"):
                 self.client.hset(f"{self._p(job)}job", "notified", outcome)
 
@@ -413,9 +408,9 @@ class RedisLedger:
     # Reading
 
     def view(self, job: str) -> JobView | None:
-        """The job as it is now; a handful of O(1) reads whatever its size.
+        """The job's current state; a handful of O(1) reads for any size.
 
-        None for a job that the ledger does not know. The answer does not follow later changes.
+        None for an unknown job. A value: it does not follow later changes.
         """
         p = self._p(job)
         with self.errors():
@@ -451,9 +446,9 @@ class RedisLedger:
             return dict(self.client.hgetall(f"{self._p(job)}h:{house}"))
 
     def finished(self, job: str, houses: Iterable[str]) -> list[str]:
-        """Those of the houses that are done.
+        """The finished ones of the houses.
 
-        A round trip for each thousand houses. A house that is quarantined is not among them.
+        One round trip per thousand houses. Quarantined houses are not included.
         """
         done: list[str] = []
         for chunk in _in_chunks(houses):
@@ -471,10 +466,10 @@ class RedisLedger:
             return batches_from_text(self.client.hget(f"{self._p(job)}views", house) or "")
 
     def task_facts(self, job: str, task: str) -> dict[str, str]:
-        """What is known of one task beside its state: claim, attempts, tried, not before, fault.
+        """Details of one task besides its state, as text.
 
-        Only what is known is there: "claim", "attempts", "tried" (workers, by commas), "fault"
-        (JSON), "not_before" and "sent" (Redis' clock, seconds), all as text.
+        Only known ones: "claim", "attempts", "tried" (workers, by commas), "fault" (JSON), "not_before" and "sent"
+        (Redis' clock, seconds).
         """
         p = self._p(job)
         with self.errors():
@@ -487,10 +482,9 @@ class RedisLedger:
         return {n: str(v) for n, v in zip(names, values, strict=True) if v is not None}
 
     def lease_left_s(self, job: str, task: str, lease: str) -> float | None:
-        """Seconds until the lease of a running task ends, by the queue's name; None without one.
+        """Seconds until the lease of a running task ends, by the lease's name; None without one.
 
-        lease: light on GPUs has a name of its own. Negative where it ran out and was not reaped
-        yet.
+        lease: light on GPUs has a separate name. Negative if it expired and was not reaped yet.
         """
         with self.errors():
             end = self.client.zscore(f"{self._g}lease:{lease}", f"{job}|{task}")
@@ -544,10 +538,9 @@ class RedisLedger:
                 time.sleep(_AWAY_S)
 
     def now(self) -> float:
-        """Redis' own clock, the only one the farm goes by.
+        """Redis' own clock, the only one that the farm uses, in seconds since 1970.
 
-        Seconds since 1970. Machines' clocks may differ by minutes, so never subtract time.time()
-        from it.
+        Machines' clocks may differ by minutes, so never subtract time.time() from it.
         """
         seconds, micros = self.client.time()
         return float(seconds) + float(micros) / 1e6

@@ -1,7 +1,7 @@
-"""What the farm asks of a ledger, whatever keeps it; values and one interface, no effects.
+"""Interface of a ledger, independent of its storage, and its values; no effects.
 
-The ledger knows which task may run, who runs it, how often it was tried and what follows it. It is
-a cache of the truth in storage: `recover` rebuilds it. Another backend replaces redis_ledger.py.
+The ledger tracks which tasks may run, their workers, attempts and successors. It is a cache of the truth in
+storage: `recover` rebuilds it. Another backend replaces redis_ledger.py.
 """
 
 from __future__ import annotations
@@ -30,9 +30,11 @@ FaultClass = Literal[
 ]
 # fmt: on
 
-TOGETHER_S: Final = 30.0  # of work that a slot claims at once: long beside a claim, short to lose
+TOGETHER_S: Final = (
+    30.0  # of work that a slot claims at once: long compared to a claim, short enough to lose
+)
 MOST_TOGETHER: Final = MOST_IN_GROUP  # tasks of one house that a slot claims at once
-EVERYWHERE: Final = "*"  # stands for every queue where a job is blocked
+EVERYWHERE: Final = "*"  # all queues, for a blocked job
 ALIVE_S: Final = 45.0  # a worker whose last heartbeat is no older than this is there
 # Classes of fault that do not count against the task: the attempt is given back.
 UNCOUNTED: Final = ("preempted", "storage", "version", "drained")
@@ -100,7 +102,7 @@ def fault_from_json(text: str) -> Fault:
 
 @dataclass(frozen=True, slots=True)
 class Finished:
-    """How a task ended well: what it took and what it found, for what follows it."""
+    """Result of a finished task: its duration, and data for its successors."""
 
     seconds: float
     batches: tuple[tuple[str, ...], ...] = ()  # of views, only after geometry
@@ -109,11 +111,11 @@ class Finished:
 
 @dataclass(frozen=True, slots=True)
 class GoOn:
-    """What a slot would take next without a message."""
+    """Candidates for a slot's next tasks without a message."""
 
     recipe: str  # digest of the job's recipe
     queues: tuple[str, ...]  # that its worker takes from
-    is_long: bool = False  # the last task loaded a scene that is worth another one of its house
+    is_long: bool = False  # the last task loaded a scene that is worth reusing for its house
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,7 +124,7 @@ class Hold:
 
     job: str
     task: str
-    token: str  # of the slot's hold; tasks that were claimed together have one
+    token: str  # of the slot's hold; tasks claimed together share one
     worker: str
     since: float  # by Redis' clock
     is_preempted: bool = False  # it shall end
@@ -145,7 +147,7 @@ class User:
     name: str
     token_sha256: str = ""
     share: float = 1.0  # of the slots, in proportion to the others who want some
-    max_slots: int = 0  # tasks of all his jobs in flight at once, 0 = any
+    max_slots: int = 0  # tasks of all the user's jobs in flight, 0 = unlimited
     slot_hours: float = 0.0  # that his jobs may take in SPENT_DAYS, 0 = any
     is_admin: bool = False  # may steer every job, drain workers and change users
     may_preempt: bool = False  # may submit urgent jobs
@@ -174,7 +176,7 @@ class JobView:
     """
 
     job_id: str
-    fields: Mapping[str, str]  # what it was entered with, its state and the reason for it
+    fields: Mapping[str, str]  # the job's entry, its state and the reason for it
     counts: Mapping[str, float]  # "gl:q", "done:gl", "houses:open", ...
     rates: Mapping[str, float]  # stage -> tasks per second
     n_waiting_houses: int
@@ -186,7 +188,7 @@ class JobView:
 
     @property
     def outcome(self) -> str:
-        """The state, and of a job that is done whether tasks of it failed for good."""
+        """The state; for a finished job also whether tasks failed permanently."""
         return WITH_FAILURES if self.state == "done" and self.n_failed else self.state
 
     @property
@@ -196,7 +198,7 @@ class JobView:
 
     @property
     def max_slots(self) -> int:
-        """Tasks of it that may be in flight at once, 0 for as many as there are slots."""
+        """Maximum tasks in flight, 0 for as many as there are slots."""
         return int(self.fields.get("max_slots") or 0)
 
     @property
@@ -206,7 +208,7 @@ class JobView:
 
     @property
     def spent_h(self) -> float:
-        """Slot-hours of its tasks that are done."""
+        """Slot-hours of its finished tasks."""
         return sum(n for name, n in self.counts.items() if name.startswith("seconds:")) / 3600
 
     @property
@@ -216,7 +218,7 @@ class JobView:
 
     @property
     def user(self) -> str:
-        """Whose job it is, "" for nobody's."""
+        """Owner of the job, "" for none."""
         return self.fields.get("user", "")
 
     @property
@@ -246,7 +248,7 @@ class JobView:
 
     @property
     def n_in_flight(self) -> float:
-        """Tasks that are queued or run."""
+        """Tasks that are queued or running."""
         return self.n_running + self._n_in("QUEUED")
 
     def _n_in(self, state: str) -> float:
@@ -306,7 +308,7 @@ class Ledger(Protocol):
     ) -> dict[str, Claim]: ...
     def fail(self, job: str, task: str, token: str, fault: Fault, *, delay_s: float) -> str: ...
 
-    # What the coordinator does; only the leader's token moves anything
+    # Commands of the coordinator; they need the leader's token
     def lead(self, token: str) -> bool: ...
     def resign(self, token: str) -> None: ...
     def reap(self, token: str) -> int: ...
@@ -331,10 +333,10 @@ class Ledger(Protocol):
 
 
 class WorkerRegistry(Protocol):
-    """Who works on the farm, and whether storage is healthy, as slots and the coordinator see it.
+    """Workers of the farm, and the health of storage, as seen by slots and the coordinator.
 
-    slots: stage -> tasks that living workers can run at once. The breaker is open while storage is unhealthy:
-    then nothing is claimed or sent; it closes by itself.
+    slots: stage -> tasks that live workers can run at once. The breaker is open while storage is unhealthy: then
+    nothing is claimed or sent; it closes automatically.
     """
 
     def slots(self) -> dict[str, int]: ...

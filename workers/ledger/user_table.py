@@ -24,7 +24,7 @@ from workers.ledger.task_ledger import SPENT_DAYS, User
 KEY: Final = "jobs/users.json"
 _NAME: Final = re.compile(r"[a-z0-9][a-z0-9_.\-]{0,39}")
 _DAY_S: Final = 86400
-_MOST_CHANGES: Final = 1000  # lines of the audit that are kept
+_MOST_CHANGES: Final = 1000  # maximum lines of the audit
 
 
 class UserTable:
@@ -48,10 +48,9 @@ class UserTable:
         return {name: user_from_row(json.loads(row)) for name, row in sorted(rows.items())}
 
     def named_by(self, token: str) -> User | None:
-        """Whose token it is; takes the same time for every wrong one of a table.
+        """The user with a token; takes constant time for all invalid tokens.
 
-        None where no user has it. Tokens themselves are kept nowhere, only their digests are
-        compared.
+        None for an unknown token. Only digests of tokens are stored and compared.
         """
         digest, found = token_digest(token), None
         for user in self.all().values():
@@ -60,20 +59,19 @@ class UserTable:
         return found
 
     def save(self, users: Mapping[str, User], store: Store) -> None:
-        """Let these be the farm's users: in the store first, then in Redis.
+        """Replace the farm's users: in the store first, then in Redis.
 
-        users: all of them: whoever is missing is removed. Two admins who save at once lose one
-        change: the last one counts.
+        users: the complete table: missing users are removed. If two admins save at the same time, the last one wins.
         """
         rows = {name: json.dumps(asdict(user)) for name, user in sorted(users.items())}
         store.put(KEY, f"{json.dumps([json.loads(r) for r in rows.values()], indent=1)}\n".encode())
         self._enter(rows)
 
     def restore(self, store: Store) -> bool:
-        """Take the store's users where Redis has none; whether there were any.
+        """Load the store's users if Redis has none; returns whether there were any.
 
-        A table in Redis is never overwritten, even if the store's is another. Called when a
-        coordinator starts and by `recover`.
+        A table in Redis is never overwritten, even if the store's differs. Called at the start of a coordinator and
+        by `recover`.
         """
         if self.all():
             return False
@@ -94,9 +92,9 @@ class UserTable:
             pipe.execute()
 
     def spent_h(self) -> dict[str, float]:
-        """User -> slot-hours that his jobs' tasks took in the last SPENT_DAYS days, those that are done.
+        """User -> slot-hours of the finished tasks in the last SPENT_DAYS days.
 
-        Days are those of UTC. Users who took nothing are missing. Raises LedgerUnavailable.
+        Days are in UTC. Users without any are missing. Raises LedgerUnavailable.
         """
         client = self._ledger.client
         with self._ledger.errors():
@@ -151,9 +149,9 @@ def new_user(name: str, **limits: Any) -> tuple[User, str]:
 
 
 def known_user(users: Mapping[str, User], name: str) -> User:
-    """The user of that name; BadInput where there is none.
+    """The user with a name; BadInput for an unknown one.
 
-    users: as `UserTable.all` gives them. The error offers a name that is spelt nearly so.
+    users: from `UserTable.all`. The error suggests a similar name.
     """
     if name not in users:
         raise BadInput("users", repr(name[:60]), "no such user", hint=did_you_mean(name, users))
@@ -161,5 +159,5 @@ def known_user(users: Mapping[str, User], name: str) -> User:
 
 
 def token_digest(token: str) -> str:
-    """What is kept of a token: it is random, so its plain digest does not reveal it."""
+    """Stored form of a token: tokens are random, so a plain digest does not reveal them."""
     return hashlib.sha256(token.encode("utf-8", "replace")).hexdigest()

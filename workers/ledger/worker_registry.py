@@ -1,6 +1,6 @@
-"""Who works on the farm: registration, heartbeats, draining, and the storage breaker.
+"""Registry of workers: registration, heartbeats, draining, and the storage breaker.
 
-Effects: Redis. The ledger's scripts read what stands here (drain, cooling_until, breaker).
+Effects: Redis. The ledger's scripts read its keys (drain, cooling_until, breaker).
 """
 
 from __future__ import annotations
@@ -35,11 +35,11 @@ class Registry:
     def heartbeat(
         self, *, takes_work: bool = True, is_leaving: bool = False, memory_mb: float = 0.0
     ) -> bool:
-        """This worker is alive; True when it is asked to leave.
+        """Send a heartbeat; True if the worker is asked to leave.
 
         takes_work: False while it is drained and waits to be asked back; it has no slot then.
-        is_leaving: it takes nothing more and finishes what it runs.
-        memory_mb: what its processes hold now, 0 when that is not known.
+        is_leaving: it takes no more tasks and finishes the running ones.
+        memory_mb: current memory of its processes, 0 if unknown.
         """
         config, client = self._ledger.config, self._ledger.client
         key = f"{self._g}worker:{config.worker}"
@@ -77,10 +77,10 @@ class Registry:
             return bool(was_drained)
 
     def leave(self) -> None:
-        """This worker is gone on purpose.
+        """Remove this worker from the registry.
 
-        Its tasks must have ended before: they are not handed back here. A worker that dies is told
-        by its silence instead.
+        Its tasks must have ended before: they are not handed back here. A worker that dies is detected by its
+        missing heartbeat instead.
         """
         config, client = self._ledger.config, self._ledger.client
         with self._ledger.errors():
@@ -89,10 +89,10 @@ class Registry:
             client.delete(f"{self._g}worker:{config.worker}")
 
     def drain(self, worker: str, *, undo: bool = False) -> bool:
-        """Ask a worker to finish what it runs and leave; False when there is no such worker.
+        """Ask a worker to finish its tasks and leave; False for an unknown worker.
 
-        undo: take the request back. It holds for the worker's name for some time, so a machine that
-        starts the worker again does not take work either.
+        undo: withdraw the request. It applies to the worker's name for some time, so a restarted worker does not
+        take work either.
         """
         client, drained = self._ledger.client, self._drained(worker)
         with self._ledger.errors():
@@ -152,8 +152,8 @@ class Registry:
     def slots(self) -> dict[str, int]:
         """Stage -> tasks that workers seen in the last ALIVE_S seconds can run at once.
 
-        A stage that nobody serves is missing. Slots that serve several stages count for each, so
-        the sum is more than the farm has.
+        Stages without a worker are missing. Slots for several stages count for each, so the sum is more than the
+        farm has.
         """
         # A worker's slots serve every stage of every queue it takes.
         slots: dict[str, int] = {}
@@ -165,9 +165,9 @@ class Registry:
         return slots
 
     def open_breaker(self, reason: str) -> None:
-        """Storage is unhealthy: no claims and no messages until the breaker closes by itself.
+        """Storage is unhealthy: stop claims and messages until the breaker closes automatically.
 
-        reason: cut to 300 characters. Called again it stays open for as long from then on.
+        reason: cut to 300 characters. Another call restarts the period.
         """
         with self._ledger.errors():
             self._ledger.client.set(

@@ -32,7 +32,7 @@ def class_of(error: BaseException) -> FaultClass:
     By the error's type alone. "machine" and "resource" count against the worker, too; "storage" is
     nobody's and costs no attempt.
     """
-    # From the outermost: what is nobody's fault, the input's, the machine's, ours.
+    # In order: nobody's fault, the input's, the machine's, ours.
     if isinstance(error, StoreRefused | Transient):
         return "storage"
     if isinstance(error, BadInput | BadRecipe):
@@ -45,10 +45,10 @@ def class_of(error: BaseException) -> FaultClass:
 
 
 def fingerprint(error: BaseException) -> str:
-    """Equal for faults alike: type, place in our code, and the message without its numbers.
+    """Identifier of similar faults: type, place in our code, and the message without its numbers.
 
-    For grouping, so it must not differ between machines or versions of libraries: the innermost
-    frame of our own code names the place, without a line number.
+    For grouping, so it is equal on all machines and library versions: the innermost frame of our own code
+    names the place, without a line number.
     """
     # The innermost frame in our own code; library frames differ by version.
     place = ""

@@ -40,7 +40,8 @@ class Heartbeat(bootsteps.StartStopStep):  # type: ignore[misc]
     def stop(self, _parent: Any) -> None:
         if self._timer is not None:
             self._timer.cancel()
-        # What runs is finished first: the supervisor is seen for this worker from here on.
+        # Running tasks are finished first: from here on the supervisor sends this worker's
+        # heartbeat.
         touch(self._config.leaving_file)
         self._heartbeat()
 

@@ -1,6 +1,6 @@
-"""The farm's real runner: tasks to the steps of run/steps.py, the same a local run does.
+"""The farm's real runner: maps tasks to the steps of run/steps.py, as in a local run.
 
-Effects: those of the steps, and a scratch file for a house's source. Markers decide what is done.
+Effects: those of the steps, and a scratch file for a house's source. Markers record finished steps.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ def runner(config: FarmConfig, on_waiting: OnText) -> HouseRunner:
     def with_patience(inner: Store) -> Store:
         return RetryingStore(inner, config.storage_patience_s, on_waiting)
 
-    # Patience lies below the layout, which may ask the store twice for a key.
+    # Retries are below the layout, which may query the store twice for a key.
     if isinstance(store, LaidOutStore):
         patient: Store = store.around(with_patience)
     else:
@@ -69,9 +69,9 @@ def runner(config: FarmConfig, on_waiting: OnText) -> HouseRunner:
 class HouseRunner:
     """Implements workers.runner.StepRunner: the steps of run/steps.py over the farm's store.
 
-    It keeps the house it worked on last loaded, so tasks of one house should come one after another. What the
-    markers say is done is not done again; a run that was killed goes on where it was. store: waits while
-    storage does not answer (`runner` wraps it so). n_threads: cores for one task.
+    It keeps its last house loaded, so tasks of one house should be consecutive. Steps with markers are not
+    repeated; a killed run resumes. store: wrapped by `runner` to wait while storage does not answer. n_threads:
+    cores for one task.
     """
 
     def __init__(self, store: Store, *, n_threads: int) -> None:
@@ -82,11 +82,10 @@ class HouseRunner:
         self._spec: Callable[[str], JobSpec] = lru_cache(maxsize=4)(self._read_spec)
 
     def run(self, request: TaskRequest, on_step: OnText) -> Result:
-        """One task; raises what its steps raise.
+        """Run one task; raises the errors of its steps.
 
-        on_step: called with each step's name when it begins, for the log and the watchdog. What is
-        done already is not made again. The errors are those of the package's tree; `class_of` says
-        whose fault it is.
+        on_step: called with each step's name when it begins, for the log and the watchdog. Finished steps are not
+        repeated. The errors are those of the package's tree; `class_of` classifies them.
         """
         spec = self._spec(request.job_id)
         with one_task(self._store, reads_whole=request.stage in (GL, LIGHT)) as store:
@@ -96,7 +95,7 @@ class HouseRunner:
         if request.stage == GEOMETRY:
             return self._geometry(store, request, spec, on_step)
         if request.stage in (GL, LIGHT):
-            # What light needs of the house: the first batch that comes here makes it.
+            # Light's inputs from the house: the first batch that needs them makes them.
             if request.stage == LIGHT:
                 for step in plan.needed_of_house("light", request.house):
                     self._step(store, request, spec, on_step, step)
@@ -119,10 +118,10 @@ class HouseRunner:
         return Result(n_views=len(request.views), left_out=left_out)
 
     def survey(self, spec: JobSpec, house: str, done: frozenset[str]) -> Survey:
-        """What the markers' names say of a house: see workers.runner.Survey.
+        """Progress of a house by its markers' names: see workers.runner.Survey.
 
-        done: names of the house's markers, as `done_steps` gives them. Reads the cameras of the
-        house from the store once its geometry is done.
+        done: names of the house's markers, from `done_steps`. Reads the cameras of the house from the store once
+        its geometry is done.
         """
         # Without its cameras nobody knows the views of the house.
         if not done.issuperset(steps_before_views(spec, house)):
@@ -268,7 +267,7 @@ class HouseRunner:
 
 
 def want_of(spec: JobSpec) -> Wanted:
-    """What a job asks of each house; BadInput for a layer that this worker has not."""
+    """A job's request for each house; BadInput for a layer unknown to this worker."""
     return wanted_of(spec)
 
 

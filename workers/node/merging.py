@@ -1,6 +1,6 @@
-"""House -> shard -> job: manifests merged upward, and what is missing written down.
+"""House -> shard -> job: merge manifests upward, and report missing parts.
 
-Effects: the store's. Every object here is rebuilt from those below it, so merging twice is once.
+Effects: the store's. Every object is rebuilt from those below it, so merging is idempotent.
 """
 
 from __future__ import annotations
@@ -47,18 +47,17 @@ def merge_shard(store: Store, spec: JobSpec, shard: int, on_step: OnText) -> Non
 
 
 def merge_job(store: Store, spec: JobSpec, on_step: OnText) -> None:
-    """Write the root's manifest.jsonl and the job's report.json, which says what is missing.
+    """Write the root's manifest.jsonl and the job's report.json, which lists missing parts.
 
-    Rows of other jobs' houses in the same root are kept. Over a job that still runs, houses that
-    have no manifest yet are missing, and the report says so. What is held is a shard's rows, and the
-    root's former manifest where there is one.
+    Rows of other jobs' houses in the same root are kept. For a running job, houses without a manifest are
+    reported as missing. Holds a shard's rows in memory, and the root's former manifest if there is one.
     """
     houses = house_ids(store, spec)
     own = set(houses)
     missing: list[str] = []
     dressed: list[dict[str, str]] = []
     n_objects = 0
-    # Merge two streams that are sorted by house: nothing but a shard's rows is held.
+    # Merge two streams sorted by house, holding only a shard's rows.
     with TemporaryFile() as file:
         for house, part in _merge_by_house(store, own, _new_rows(store, spec, houses, on_step)):
             if part is None:
@@ -69,7 +68,7 @@ def merge_job(store: Store, spec: JobSpec, on_step: OnText) -> None:
                 n_objects += part.count(b"\n") if house in own else 0  # a row an object
         _put_file(store, keys.MANIFEST, file)
     write_attribution_of(store, dressed)
-    # Say what is missing and what failed for good.
+    # List missing parts and permanent failures.
     report: dict[str, Any] = {
         "job": spec.job_id,
         "houses": len(houses),
@@ -102,12 +101,12 @@ def _put_file(store: Store, key: str, file: IO[bytes]) -> None:
 def _new_rows(
     store: Store, spec: JobSpec, houses: list[str], on_step: OnText
 ) -> Iterator[tuple[str, bytes | None]]:
-    """House -> its manifest, through its shard's where that is there; None when it has none."""
+    """House -> its manifest, from its shard's if it exists; None if it has none."""
     size = spec.rules.shard_size
     for first in range(0, len(houses), size):
         on_step(f"merge shard {first // size}")
         members = houses[first : first + size]
-        # A house that was finished after its shard was merged has its own manifest.
+        # A house finished after the merge of its shard has a separate manifest.
         merged = get_or_none(store, shard_key(spec.job_id, first // size))
         found = dict(lines_by_house(merged)) if merged is not None else {}
         for house in members:

@@ -1,4 +1,4 @@
-"""What a render process of the farm does with a task: the configured runner's work.
+"""Task handler of a render process of the farm: runs the configured runner.
 
 Effects: the runner's. A request is a workers.runner.TaskRequest as JSON; the last message's body is a
 Result, or the class and fingerprint of the fault.

@@ -46,7 +46,7 @@ _log = logging.getLogger("pbrs.slot")
 _NO_LOG: Final = {*UNCOUNTED, "cancelled", "lost"}
 # Refusals that another worker may not meet: wait, so that it comes first.
 _WAIT_AFTER_REJECTION: Final = {"version", "recipe", "store", "draining", "cooling", "elsewhere"}
-# Ends of a task after which the others that were claimed with it are not begun.
+# Ends of a task after which the other tasks of its claim are not started.
 _ENDS_ALL: Final = {"preempted", "cancelled"}
 _POLL_S: Final = 1.0
 _REPORT_EVERY_S: Final = 5.0
@@ -74,10 +74,10 @@ class _Claimed:
 
 
 def make_slot(config: FarmConfig) -> Slot:
-    """The slot of this pool process, with its ledger in Redis and a render process of its own.
+    """The slot of this pool process, with its ledger in Redis and its own render process.
 
-    Effects: makes a folder for its log and starts a process. Call it after the fork of the pool,
-    once per pool process: the connections and the child must not be shared.
+    Effects: creates a folder for its log and starts a process. Call it after the fork of the pool, once per pool
+    process: the connections and the child must not be shared.
     """
     from workers.ledger.redis_ledger import RedisLedger
     from workers.ledger.worker_registry import Registry
@@ -96,15 +96,15 @@ def make_slot(config: FarmConfig) -> Slot:
 class Slot:
     """One pool process of a worker: claims the tasks of a message, has them rendered, reports them.
 
-    A slot runs one task at a time, in a render process of its own, which it kills where a deadline, a lost lease or
-    a preemption asks for it. While a task runs, heartbeats keep its lease and those of the tasks that were
-    claimed with it. After the last task of a message it may go on with others of the same house.
+    A slot runs one task at a time, in its own render process, which it kills on a deadline, a lost lease or a
+    preemption. While a task runs, heartbeats keep its lease and those of the tasks claimed with it. After the
+    last task of a message it may continue with others of the same house.
 
-    Not for tests of rendering: run `HouseRunner` for these. `make_slot` makes the slot of a farm; tests give a
-    ledger and a registry in memory, and a clock of their own.
+    Not for tests of rendering: run `HouseRunner` for these. `make_slot` makes the slot of a farm; tests pass a
+    ledger and a registry in memory, and a test clock.
 
-    ledger: may be away for up to ten minutes (_RETRY_S), then LedgerUnavailable is raised. process: started.
-    clock: seconds that only grow. sleep: waits for so many seconds.
+    ledger: outages up to ten minutes (_RETRY_S) are tolerated, then LedgerUnavailable is raised. process:
+    started. clock: monotonic seconds. sleep: waits for a number of seconds.
     """
 
     def __init__(
@@ -159,7 +159,7 @@ class Slot:
         while held:
             first, *held = held
             if self._is_preempted() and held:
-                # What has not begun is given back at once, with what runs.
+                # Return tasks that have not started immediately, together with the running one.
                 self._hand_back(held)
                 held = []
             request = _request(first)
@@ -177,7 +177,7 @@ class Slot:
             end = Finished(ended.seconds, result.batches, result.n_views or len(request.views))
             self._ended[str(first.task)] = end
             _log.info("%s of job %s: done in %.1f s", first.task, first.job, ended.seconds)
-            # What follows need not wait for the last of many.
+            # Successors need not wait for the last of many tasks.
             if held and self._clock() >= self._report_at:
                 self._report(first, None)
             if not held:
@@ -190,14 +190,14 @@ class Slot:
         return {}
 
     def _report(self, held: _Claimed, go_on: GoOn | None) -> dict[str, Claim]:
-        """Report what is done to the ledger; the tasks that it grants in return."""
+        """Report finished tasks to the ledger; returns newly granted tasks."""
         ends, self._report_at = self._ended, self._clock() + _REPORT_EVERY_S
         self._ended = {}
         report = partial(self._ledger.finish_many, held.job, ends, held.claim.token, go_on)
         return self._retry(report)
 
     def _hand_back(self, held: Sequence[_Claimed]) -> None:
-        """Give back what was claimed and not begun; nothing is counted."""
+        """Return claimed tasks that were not started, uncounted."""
         for one in held:
             fault = Fault("preempted", "preempted: not begun", "not begun", self._config.worker)
             give = partial(
@@ -251,7 +251,7 @@ class Slot:
             self._put(fault.log, self._process.log_tail())
         if fault.fault == "storage":
             self._open_breaker(ended.text)
-        # Later and later, and not all at once.
+        # Increasing delays with jitter.
         delay_s = 0.0
         if fault.fault != "preempted":
             delay_s = self._config.retry_delay_s * held.attempt * random.uniform(0.7, 1.3)
@@ -267,7 +267,7 @@ class Slot:
             self._put(failed_key(held.job, task), fault.json())
 
     def _fault(self, held: _Claimed, ended: Ended) -> Fault:
-        """What the ledger keeps of a task that ended badly."""
+        """Record of a failed task for the ledger."""
         kind, text = ended.cause, ended.text
         if kind == REPORTED:
             kind, text = str(ended.body["fault"]), str(ended.body["fingerprint"])

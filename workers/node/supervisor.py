@@ -1,7 +1,7 @@
-"""A worker's outermost process (PID 1 in a container): starts Celery, and leaves in good order.
+"""A worker's outermost process (PID 1 in a container): starts Celery, and shuts down in order.
 
-Effects: starts and ends processes; files on scratch. TERM: take no more, finish what runs; when
-the grace is nearly over, give it back to the ledger, uncounted. INT, QUIT: give it back at once.
+Effects: starts and ends processes; files on scratch. TERM: take no more tasks, finish the running ones; when
+the grace is nearly over, return them to the ledger, uncounted. INT, QUIT: return them immediately.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from workers.store_identity import store_id
 _log = logging.getLogger("pbrs.supervisor")
 _PREEMPT_S: Final = 20.0  # what giving everything back may take
 _POLL_S: Final = 0.2
-_SEEN_EVERY_S: Final = 10.0  # of a worker that finishes what it runs
+_SEEN_EVERY_S: Final = 10.0  # heartbeat of a worker that is finishing its tasks
 _DRAINED_POLL_S: Final = 5.0  # between two looks of a drained worker whether it is wanted again
 _ASK_EVERY_S: Final = 10.0  # whether a job has work
 _STORE_S: Final = 5.0  # how long the store may take to say which it is
@@ -45,17 +45,17 @@ PREEMPTED_NOTE: Final = "preempted"
 
 @dataclass(slots=True)
 class _Orders:
-    """What signals asked for."""
+    """Requests by signals."""
 
     leave_at: float | None = None  # when leaving began
     was_signalled: bool = False  # it leaves because of a signal, not because its time is over
     at_once: bool = False  # without finishing what runs
-    done: set[str] = field(default_factory=set)  # what was done already on the way out
+    done: set[str] = field(default_factory=set)  # finished steps of the shutdown
 
     def on_signal(self, number: int, _frame: FrameType | None) -> None:
         self.was_signalled = True
         self.leave_at = self.leave_at or time.monotonic()
-        # Ctrl-C in a terminal, or a second signal of a scheduler that is in a hurry.
+        # Ctrl-C in a terminal, or a second signal of an impatient scheduler.
         self.at_once = self.at_once or number in (signal.SIGINT, signal.SIGQUIT)
 
 
@@ -87,10 +87,10 @@ def command(config: FarmConfig) -> list[str]:
 
 
 def check_machine(config: FarmConfig) -> None:
-    """What a worker needs before it takes work: Redis and room on scratch. Raises PbrsError.
+    """Check a worker's requirements: Redis and space on scratch. Raises PbrsError.
 
-    Waits for Redis as long as need be and touches the liveness file meanwhile. LLVM and OpenGL are
-    not tried here: the render process finds out.
+    Waits for Redis indefinitely and touches the liveness file in the meantime. LLVM and OpenGL are not tested
+    here: the render process reports them.
     """
     RedisLedger(config).wait_until_there(meanwhile=lambda: touch(config.heartbeat_file))
     if not config.store_url:
@@ -111,7 +111,7 @@ def sweep(config: FarmConfig) -> None:
     config.preemption_file.unlink(missing_ok=True)
     config.heartbeat_file.unlink(missing_ok=True)
     config.leaving_file.unlink(missing_ok=True)
-    # Logs of pool processes that are gone; "pbrs-<worker>-<pid>".
+    # Logs of dead pool processes; "pbrs-<worker>-<pid>".
     for folder in config.scratch.glob(f"pbrs-{config.worker}-*"):
         pid = folder.name.rpartition("-")[2]
         if pid.isdigit() and not is_running(int(pid)):
@@ -125,11 +125,11 @@ def supervise(
     idle_s: float | None = None,
     preempted_code: int | None = None,
 ) -> int:
-    """Run a worker until a signal asks it to leave; Celery's exit status.
+    """Run a worker until a signal asks it to leave; returns Celery's exit status.
 
-    until_s: leave by itself after so many seconds, the grace before them (Slurm's wall time).
-    idle_s: leave when no job had work for so many seconds. preempted_code: the status in place of
-    Celery's where a signal made it leave, for schedulers that take 0 for the end.
+    until_s: leave after this many seconds, with the grace before them (Slurm's wall time). idle_s: leave when no
+    job had work for this many seconds. preempted_code: the status instead of Celery's after a signal, for
+    schedulers that treat 0 as the end.
     """
     orders = _Orders()
     for number in (signal.SIGTERM, signal.SIGINT, signal.SIGQUIT):
@@ -165,7 +165,7 @@ def supervise(
             orders.leave_at = orders.leave_at or time.monotonic()
         if idle_s is not None and idleness.seconds() >= idle_s:
             orders.leave_at = orders.leave_at or time.monotonic()
-        # A Slurm job that was preempted puts itself back into the queue, one that is over does not.
+        # A preempted Slurm job requeues itself, an ended one does not.
         if orders.was_signalled:
             touch(config.scratch / PREEMPTED_NOTE)
         if orders.leave_at is not None:
@@ -174,7 +174,7 @@ def supervise(
 
 
 class Idleness:
-    """How long no job of the farm has had work, as far as Redis says; asks every ten seconds."""
+    """Time without work for any job of the farm, according to Redis; polled every ten seconds."""
 
     def __init__(self, ledger: RedisLedger, clock: Callable[[], float] = time.monotonic) -> None:
         self._ledger, self._clock = ledger, clock
@@ -236,7 +236,7 @@ def _with_store_id(config: FarmConfig) -> FarmConfig:
 def _leave(
     config: FarmConfig, celery: subprocess.Popen[bytes], orders: _Orders, since_s: float
 ) -> None:
-    """The next thing to do on the way out, each once."""
+    """The next step of the shutdown, each once."""
     # Name, seconds after leaving began, what to do.
     steps: list[tuple[str, float, Callable[[], None]]] = [
         ("be seen leaving", 0.0, lambda: touch(config.leaving_file)),

@@ -1,4 +1,4 @@
-"""Views into batches that are one task each: a room's views, so many that the work is worth it; pure."""
+"""Group views into batches, one task each: a room's views, with enough work per batch; pure."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import math
 from collections.abc import Sequence
 from typing import Final
 
-TARGET_S: Final = 120.0  # work in a batch: above the cost of a task, below what is lost with it
-MAX_S: Final = 300.0  # work in a batch of one room, whose views share what is loaded
+TARGET_S: Final = 120.0  # work in a batch: above the overhead of a task, below an acceptable loss
+MAX_S: Final = 300.0  # work in a batch of one room, whose views share loaded data
 
 
 def batches_from_views(
@@ -20,7 +20,7 @@ def batches_from_views(
     """
     per_batch = max(1, round(TARGET_S / seconds_per_view))
     most = max(1, math.floor(MAX_S / seconds_per_view))
-    # A job of few houses is cut finer, or slots would stand idle.
+    # Split jobs of few houses further, or slots would be idle.
     if min_batches > 1:
         per_batch = min(per_batch, math.ceil(len(views) / min_batches)) or 1
         most = min(most, per_batch)

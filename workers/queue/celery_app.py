@@ -1,8 +1,8 @@
-"""The Celery application: how messages travel. Effects: on import, reads the environment.
+"""The Celery application: transport of messages. Effects: on import, reads the environment.
 
-Celery carries the work; whether it is done, and whether it is tried again, the ledger decides. So
-there are no results, no chords, no countdowns and no Celery retries. Why each setting is as it is
-stands in docs/farm/inside.md.
+Celery transports tasks; the ledger decides whether they are done and whether they are retried. So there are
+no results, no chords, no countdowns and no Celery retries. docs/farm/inside.md gives the reason for each
+setting.
 """
 
 from __future__ import annotations
@@ -38,13 +38,13 @@ def _decode(data: str | bytes) -> Any:
     return json.loads(data)
 
 
-# The only content type that is decoded: JSON of bounded size, never a pickle.
+# The only decoded content type: JSON of bounded size, never a pickle.
 register(
     "pbrs-json", _encode, _decode, content_type="application/x-pbrs-json", content_encoding="utf-8"
 )
 
 
-# Why each stands as it does: docs/farm/inside.md.
+# Reasons for each setting: docs/farm/inside.md.
 _SETTINGS: Final[dict[str, Any]] = {
     "accept_content": ["pbrs-json"],
     "task_serializer": "pbrs-json",
@@ -121,7 +121,7 @@ def _forget_tasks_of_celery(**_: object) -> None:
 
 @worker_init.connect  # type: ignore[untyped-decorator]
 def _be_seen_alive_while_the_broker_is_away(**_: object) -> None:
-    """Celery's loop stands still while it tries to connect, for longer than the liveness probe waits."""
+    """Celery's loop blocks while it tries to connect, for longer than the liveness probe waits."""
     from workers.queue.redis_transport import Transport
 
     file = config_from_environment().heartbeat_file

@@ -1,9 +1,9 @@
-"""Celery's way to Redis, with one client a channel, deaf to what is no message. Effects: kombu's.
+"""Celery's transport for Redis, with one client per channel, robust against invalid messages. Effects: kombu's.
 
-kombu makes a redis-py client, with a table of some hundred callbacks, for each message taken and
-each acknowledged: a fifth of what a worker's parent process does for a short task. An element of a
-queue that is no JSON, or no envelope, would end the worker that takes it: it is dropped, and said.
-So would a Redis that refuses writes for a while: it is a broker that is away until it takes them again.
+kombu makes a redis-py client, with a table of some hundred callbacks, for each message taken and each
+acknowledged: a fifth of the work of a worker's parent process for a short task. An element of a queue that is
+not JSON, or not an envelope, would end the worker that takes it: it is dropped and logged. So would a Redis that
+temporarily refuses writes: it counts as an unavailable broker until it accepts them again.
 """
 
 from __future__ import annotations
@@ -31,8 +31,9 @@ class Channel(kombu_redis.Channel):  # type: ignore[misc]
 
     def __init__(self, *args: Any, **options: Any) -> None:
         super().__init__(*args, **options)
-        # A channel to a Redis that refuses writes would be lost at its first message, and made again at once:
-        # without it there is no connection yet, and Celery waits longer from try to try.
+        # A channel to a Redis that refuses writes would be lost at its first message, and recreated
+        # immediately.
+        # With this test there is no connection yet, and Celery's delays grow.
         try:
             self.client.set("takes-writes", "1", px=1)
         except self.connection_errors:
