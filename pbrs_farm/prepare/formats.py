@@ -81,10 +81,9 @@ def plugin_of_file(path: Path) -> str | None:
 
 
 def format_of_file(path: Path, *, surely: bool = False) -> Format | None:
-    """The format of a file or of the folder of a home; None where nothing here reads it.
+    """The format of a file or of the folder of a home; None without one.
 
-    surely: a suffix that files of other kinds bear, too, does not do. Raises BadHouse for a file
-    that cannot be opened.
+    surely: a suffix that files of other kinds share is not enough. Raises BadHouse for an unreadable file.
     """
     look = _Look(path)
     found = next((one for one in formats() if look.is_of(one)), None)

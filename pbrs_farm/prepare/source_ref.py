@@ -51,21 +51,14 @@ class SourceRef(Record):
 
     @property
     def unedited(self) -> SourceRef:
-        """The same house before its edits.
-
-        Itself where it has no edits. Its id is that of the house before them, dressed or not.
-        """
+        """The same house, dressed or not, before its edits."""
         if not self.edits:
             return self
         own = self.house_id.removesuffix(edited_id("", self.edits))
         return self.model_copy(update={"house_id": own, "edits": ()})
 
     def edited(self, *edits: Edit) -> SourceRef:
-        """The same house with these edits after its own.
-
-        Edits come after those that it has; the id follows from all of them together. Nothing is
-        read or checked here.
-        """
+        """The same house with these edits after its own."""
         every = (*self.edits, *edits)
         house_id = edited_id(self.unedited.house_id, every)
         return self.model_copy(update={"house_id": house_id, "edits": every})

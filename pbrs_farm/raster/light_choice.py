@@ -28,10 +28,7 @@ _N_FLOOR_POINTS = 2000  # of a house, for its scale
 
 
 def light_table(house: House) -> F32:
-    """(L, 16) every light of the house, columns as above.
-
-    Float32, (0, 16) for a house without lamps. Items' order, and within an item that of its lights.
-    """
+    """(L, 16) float32 of every light of the house, columns as above, in the items' order."""
     rows = [_row_of_light(part) for item in house.items for part in item.lights]
     return np.array(rows, np.float32).reshape(-1, LIGHT_FLOATS)
 

@@ -41,10 +41,9 @@ def far_plane(camera: Camera, low: F64, high: F64) -> float:
 
 
 def boxes_in_view(clip: Matrix4, low: F64, high: F64) -> Bools:
-    """(N,) bool: the box is not wholly outside one plane of the view frustum.
+    """(N,) bool: the box low..high (N, 3) is not wholly outside one plane of the view frustum.
 
-    clip: of clip_from_world. low, high: (N, 3) corners in metres. A box outside by several planes together,
-    but by no single one, counts as in view: that costs a draw call and no pixel.
+    A box outside by several planes together counts as in view: that costs a draw call and no pixel.
     """
     # Read the six planes off the clip matrix (Gribb and Hartmann 2001).
     planes = np.concatenate([clip[3] + clip[:3], clip[3] - clip[:3]])
@@ -55,9 +54,6 @@ def boxes_in_view(clip: Matrix4, low: F64, high: F64) -> Bools:
 
 
 def distance_to_boxes(eye: F64, low: F64, high: F64) -> F64:
-    """(N,) distance from eye to the nearest point of each box.
-
-    low, high: (N, 3), metres, axis-aligned. 0 for boxes that the eye is in.
-    """
+    """(N,) distance from eye to the nearest point of each box low..high (N, 3), metres; 0 inside."""
     gap = np.maximum(np.maximum(low - eye, eye - high), 0.0)
     return np.asarray(np.sqrt(np.einsum("nk,nk->n", gap, gap)))

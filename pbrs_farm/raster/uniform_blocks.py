@@ -63,10 +63,7 @@ def light_blocks(house: House, n_best: int) -> F32:
 
 
 def aligned_rows(rows: F32, alignment_bytes: int) -> F32:
-    """Rows padded with 0 so that each starts at a multiple of alignment_bytes.
-
-    rows: (N, K) float32; alignment_bytes: the driver's required alignment, a multiple of 4. Padding is 0.
-    """
+    """Rows (N, K) float32 padded with 0 so that each starts at a multiple of alignment_bytes."""
     step = -(-rows.shape[1] * 4 // alignment_bytes) * alignment_bytes // 4
     padded = np.zeros((len(rows), step), np.float32)
     padded[:, : rows.shape[1]] = rows

@@ -65,19 +65,13 @@ def rays_of_pixels(camera: Camera) -> tuple[F32, F32, Mask | None]:
 
 
 def faces_as_picture(face: I32, camera: Camera, blind: Mask | None) -> I32:
-    """(H, W) of the faces (N,) that the rays of rays_of_pixels hit; -1 where a pixel has no ray.
-
-    blind: as `rays_of_pixels` gives it, None for a lens that sees all pixels.
-    """
+    """(H, W) of the faces (N,) hit by rays_of_pixels, -1 for blind pixels (None: there are none)."""
     picture = face.reshape(camera.intrinsics.height_px, camera.intrinsics.width_px)
     return picture if blind is None else np.where(blind, np.int32(-1), picture)
 
 
 def counted_labels(face: I32, face_label: NDArray[np.uint32], n_labels: int) -> NDArray[np.int64]:
-    """(n_labels,) pixels of each label; label 0 takes the rays that miss.
-
-    face: any shape, -1 = miss. Longer than n_labels where a label is not below it.
-    """
+    """(n_labels,) pixels of each label; label 0 takes the rays that miss. face: any shape, -1 = miss."""
     label = np.where(face >= 0, face_label[face], np.uint32(0))
     return np.bincount(label.ravel(), minlength=n_labels)
 

@@ -150,10 +150,7 @@ def mitsuba(variant: str | None = None) -> Any:
 
 
 def set_threads(n_threads: int) -> None:
-    """Let Dr.Jit use n_threads cores of this process; raises MachineFailed without Dr.Jit.
-
-    For the process as a whole, from now on: call it once, before rendering.
-    """
+    """Let Dr.Jit use n_threads cores of this process, once, before rendering; MachineFailed without it."""
     choose_variant()
     importlib.import_module("drjit").set_thread_count(n_threads)
 

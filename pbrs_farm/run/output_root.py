@@ -109,10 +109,9 @@ def pull(of: Store, folder: Path, tell: Callable[[int], None] = lambda _n: None)
 
 @contextmanager
 def as_files(word: str, settings: StoreSettings) -> Iterator[Path]:
-    """The folder of an output root; for a URL or a packed root a temporary copy.
+    """The folder of an output root; for a URL or a packed root a temporary copy of all of it.
 
-    A copy of a remote or packed root is whole: mind its size. Changes to the copy are lost. A folder that is
-    no root is yielded as it is.
+    A folder that is no root is yielded as it is.
     """
     if "://" not in word and not (Path(word) / LAYOUT).is_file():
         yield Path(word)

@@ -40,10 +40,7 @@ class LampFactor:
 
 
 def linear_aovs(radiance: RadianceExr) -> LinearAovs:
-    """The images of a radiance.exr for `develop`, as stored; BadInput if one is missing.
-
-    float32 (H, W, 3) each: outdoor, indoor, albedo and normal, not denoised.
-    """
+    """The images of a radiance.exr for `develop`, as stored, (H, W, 3) float32; BadInput if one is missing."""
     image = radiance.image
     return LinearAovs(image("outdoor"), image("indoor"), image("albedo"), image("normal"))
 

@@ -47,18 +47,12 @@ _EDGE, _LAMP, _LAMP_EDGE = "#9aa5b1", "#ffcc33", "#8a6500"
 
 
 def camera_map_svg(house: House, sampling: Sampling) -> str:
-    """The map as SVG; candidates and winners carry titles a browser shows.
-
-    The candidates are those of sampling.traces. Write the text as UTF-8.
-    """
+    """The map as SVG; candidates (sampling.traces) and winners carry titles that a browser shows."""
     return camera_map(house, sampling).svg()
 
 
 def camera_map_rgb(house: House, sampling: Sampling) -> NDArray[np.uint8]:
-    """The map as (H, W, 3) uint8 sRGB.
-
-    Painted with Pillow and its own font, so pixels may differ between versions of it.
-    """
+    """The map as (H, W, 3) uint8 sRGB, by Pillow and its font: pixels may differ between its versions."""
     return camera_map(house, sampling).rgb()
 
 
@@ -78,10 +72,7 @@ def camera_map(house: House, sampling: Sampling) -> Drawing:
 
 
 def plan_svg(house: House, views: Sequence[View] = ()) -> str:
-    """A house's plan as SVG: rooms with their names, outlines of items, lamps, and views if given.
-
-    For a look at a house before cameras are chosen; one drawing of all levels.
-    """
+    """A house's plan as SVG: rooms with their names, outlines of items, lamps, and views if given."""
     marks, width, bottom = _levels_to_draw(house, views, (), is_plan=True)
     return Drawing(math.ceil(width), math.ceil(bottom + _MARGIN), tuple(marks)).svg()
 

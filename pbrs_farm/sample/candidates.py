@@ -132,10 +132,7 @@ def grid_candidates(grid: Grid, fields: CameraFields, names: tuple[str | int, ..
 
 
 def n_cells(grid: Grid, cell_m: float) -> tuple[int, int]:
-    """Cells along x and z that cover the grid, at least one each.
-
-    A cell that reaches over the edge counts whole; a nanometre over does not make another.
-    """
+    """Cells along x and z that cover the grid, at least one each."""
     return (
         max(1, int(np.ceil((grid.x_max - grid.x_min) / cell_m - 1e-9))),
         max(1, int(np.ceil((grid.z_max - grid.z_min) / cell_m - 1e-9))),

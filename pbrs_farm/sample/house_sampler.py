@@ -106,10 +106,9 @@ def _camera_report(
 
 
 def add_rig_views(views: Iterable[View], rig: RigFields | None) -> tuple[View, ...]:
-    """The views of all cameras of a rig at the place of each view.
+    """The views of all cameras of a rig at the place and with the intrinsics of each view.
 
-    The first camera's view keeps the id. All have the intrinsics of the view. Without a rig the views are
-    unchanged.
+    The first camera's view keeps the id. Without a rig the views are unchanged.
     """
     if rig is None:
         return tuple(views)

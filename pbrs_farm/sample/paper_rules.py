@@ -21,10 +21,7 @@ _CHUNK = 4096  # candidates per batch, to bound memory
 
 
 def room_grid(room: Room) -> Grid:
-    """The grid over a room's polygon; eye heights count from the floor's surface.
-
-    The polygon's box, not its shape: cells outside the room are rejected later.
-    """
+    """The grid over the box of a room's polygon; eye heights count from the floor's surface."""
     (x0, z0), (x1, z1) = room.polygon.min(0), room.polygon.max(0)
     return Grid(float(x0), float(z0), float(x1), float(z1), room.floor_y)
 

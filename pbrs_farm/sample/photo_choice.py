@@ -88,10 +88,7 @@ class RoomCandidates:
         return np.asarray(self.score[numbers] - self.foreground[numbers])
 
     def ranked(self, sector: int) -> NDArray[np.intp]:
-        """Numbers of a sector's candidates that no rule rejected, best first.
-
-        Equal scores keep the order of number, so the answer is deterministic.
-        """
+        """Indices of a sector's candidates that no rule rejected, best first."""
         mine = (self.candidates.sector == sector) & np.isfinite(self.score)
         which = np.flatnonzero(mine)
         return which[np.argsort(-self.score[which], kind="stable")]

@@ -188,10 +188,7 @@ def framing_cost(seen: PhotoShares, tilt_deg: F64) -> F64:
 
 
 def foreground_cost(seen: PhotoShares) -> F64:
-    """(N,) total cost of objects close to the lens, by the prices in FOREGROUND.
-
-    It is subtracted from a view's score; no view is excluded for it.
-    """
+    """(N,) total cost of objects close to the lens, by FOREGROUND; it is subtracted from a view's score."""
     nearer = zip(FOREGROUND, seen.foreground.T, strict=True)
     costs = [f.cost * np.maximum(share - f.free, 0) for f, share in nearer]
     return np.asarray(np.sum(costs, axis=0))

@@ -96,10 +96,7 @@ def room_of(house: House, camera: Camera) -> Room | None:
 
 
 def sector_of(camera: Camera, n_sectors: int) -> int:
-    """Number of the sector the camera looks into; azimuth counts from +x towards +z.
-
-    Sector 0 begins at +x. Straight down or up counts as azimuth 0.
-    """
+    """Number of the sector the camera looks into; azimuth counts from +x towards +z, 0 for up and down."""
     x, _y, z = camera.towards
     azimuth = math.atan2(z, x) % (2 * math.pi)
     return min(int(azimuth / (2 * math.pi) * n_sectors), n_sectors - 1)

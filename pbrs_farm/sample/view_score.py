@@ -49,10 +49,7 @@ def released_columns(house: House, room: Room) -> NDArray[np.intp]:
 def paper_score(
     counts: NDArray[np.uint32], columns: NDArray[np.intp], min_fraction: float
 ) -> Scored:
-    """Paper section 3.1: share of the picture covered by objects, and how many are large enough.
-
-    counts: (N, n_items + 1) pixels; large enough: at least min_fraction of all pixels.
-    """
+    """Paper section 3.1: share of the picture covered by objects, and how many are at least min_fraction."""
     pixels = counts.sum(1, dtype=np.int64)
     objects = counts[:, columns]
     n_objects = (objects >= min_fraction * pixels[:, None]).sum(1)

@@ -358,10 +358,7 @@ class LightScene:
     def emitters(
         self, camera: Camera, fields: LightFields, seed: int
     ) -> tuple[Emitters, EmitterWeights]:
-        """The emitters with the sampling weights of a camera's view, for `path_tracer.trace`.
-
-        Not for scalar variants. The weights of the next call replace these.
-        """
+        """The emitters with the sampling weights of a camera's view, until the next call; not for scalar variants."""
         return self._view_emitters.measure(camera, fields, seed)
 
     @cached_property

@@ -52,10 +52,7 @@ def uniform_weights(n_lamps: int, n_portals: int) -> EmitterWeights:
 
 
 def weights_by_distance(spheres: F64, place: F64, n_portals: int) -> EmitterWeights:
-    """Lamps by 1 / distance squared (1 m at least) from a place (3,), outdoor techniques alike.
-
-    spheres: (L, 4) centre and radius of each lamp.
-    """
+    """Lamps by 1 / distance squared (1 m at least) from a place (3,), outdoor techniques alike."""
     squared = ((spheres[:, :3] - place) ** 2).sum(1)
     lamps = _with_floors(1 / np.maximum(squared, 1), lamp_floors(len(spheres)))
     return EmitterWeights(lamps, uniform_weights(0, n_portals).outdoor)

@@ -25,8 +25,7 @@ _CHUNK_PIXELS = 500_000  # and pixels of surfaces with holes
 def coverage(item: Item, camera: Camera, cut_outs: CutOuts | None = None) -> Mask:
     """(H, W) bool: the ray through the pixel's centre hits a triangle of item outside of holes.
 
-    cut_outs: of the house's materials. Exact for a pinhole; other lenses are approximated by finer pinhole
-    pictures.
+    Exact for a pinhole; other lenses are approximated by finer pinhole pictures.
     """
     holes = cut_outs or {}
     if camera.intrinsics.lens.is_pinhole:

@@ -138,11 +138,7 @@ def project_points(points: F64, camera: Camera) -> tuple[F64, F64]:
 
 
 def inside_picture(px: F64, z: F64, camera: Camera) -> Bools:
-    """(N,) true if projected points (N, 2) at depths z (N,) are in front of a camera and in its picture.
-
-    px: pixels, (0, 0) the upper left corner of the picture; NaN is outside. Occlusion is tested by
-    `reaches`.
-    """
+    """(N,) true if pixels (N, 2) at depths z (N,) are in front of a camera and in its picture; see `reaches`."""
     i = camera.intrinsics
     with np.errstate(invalid="ignore"):
         inside = (px[:, 0] >= 0) & (px[:, 0] < i.width_px)
@@ -166,10 +162,7 @@ def reaches(points: F64, faces: I32, camera: Camera, first_hit: FirstHit) -> Boo
 
 
 def flow_label(found: Correspondence) -> F32:
-    """(H, W, 2) float32 for a 16-bit EXR: pixels right and down, 0 where it is not defined.
-
-    Beyond 32,768 px it is stored as that.
-    """
+    """(H, W, 2) float32 for a 16-bit EXR: pixels right and down up to 32,768, 0 where undefined."""
     return np.clip(found.flow, -_MOST_PX, _MOST_PX).astype(np.float32)
 
 

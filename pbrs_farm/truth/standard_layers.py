@@ -45,10 +45,7 @@ def normal_label(normal_world: UnitVectors, world_from_camera: Matrix4) -> NDArr
 
 
 def encoded_normal(normal: UnitVectors) -> NDArray[np.uint16]:
-    """(H, W, 3) uint16 round((n + 1) 65535 / 2), clipped; halves are rounded to even.
-
-    normal: (H, W, 3) float32. Back: v * 2 / 65535 - 1.
-    """
+    """(H, W, 3) uint16 round((n + 1) 65535 / 2) of normals, clipped; the inverse is v * 2 / 65535 - 1."""
     scaled = (normal + np.float32(1)) * np.float32(65535 / 2)
     return np.asarray(np.clip(np.rint(scaled), 0, 65535), np.uint16)
 
@@ -94,10 +91,7 @@ def check_instances(house: House) -> None:
 
 
 def semantic_label(item: ItemBuffer, house: House) -> NDArray[np.uint8]:
-    """(H, W) uint8 NYU40 id of the item seen; 0 = nothing, or an item without a class.
-
-    item: (H, W) instance ids, which count house.items from 1.
-    """
+    """(H, W) uint8 NYU40 id of the visible item; 0 = nothing, or an item without a class."""
     return nyu40_of_instance(house)[item]
 
 

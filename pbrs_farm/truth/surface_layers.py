@@ -99,10 +99,7 @@ def roughness_label(
 
 
 def f0_label(hit: HitRecord, house: House, geometry: Geometry) -> NDArray[np.uint8]:
-    """(H, W, 3) uint8 sRGB: what the coat, the metal, the mirror or the glass reflects at right angles.
-
-    0 for matte surfaces, and nothing.
-    """
+    """(H, W, 3) uint8 sRGB reflectance at right angles of coat, metal, mirror or glass; 0 for matte."""
     return _of_materials(_f0_srgb8, 3, hit, house, geometry)
 
 

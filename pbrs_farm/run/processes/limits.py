@@ -60,8 +60,5 @@ def is_room_for_two() -> bool:
 
 
 def memory_share_mb(n_processes: int) -> float:
-    """Memory limit of one of n render processes: its share of nine tenths of the machine, in MiB.
-
-    A tenth is left for the scheduler and the system.
-    """
+    """Memory limit of one of n render processes: its share of nine tenths of the machine, in MiB."""
     return _SHARE_OF_MACHINE * machine_mb() / max(1, n_processes)

@@ -168,11 +168,7 @@ def apply_lens(light: F64, sensor: SensorFields) -> F64:
 
 
 def mosaic(rgb: F64) -> F64:
-    """(H, W) values of a Bayer mosaic with rows RGRG and GBGB.
-
-    rgb: (H, W, 3) linear; the first pixel is red. Odd sizes are allowed. No noise is added; `demosaic` is
-    its inverse except for detail finer than the mosaic.
-    """
+    """(H, W) values of a Bayer mosaic, rows RGRG and GBGB, of rgb (H, W, 3) linear; see `demosaic`."""
     raw = rgb[..., 1].copy()
     raw[0::2, 0::2] = rgb[0::2, 0::2, 0]
     raw[1::2, 1::2] = rgb[1::2, 1::2, 2]

@@ -22,10 +22,9 @@ from pbrs_farm.transport.light_result import LightResult
 
 
 def denoise(result: LightResult) -> LightResult:
-    """Denoise each light group separately, so that modes stay exact sums.
+    """Denoise each light group separately, guided by albedo and normal, so that modes stay exact sums.
 
-    Guided by albedo and normal. The light of single lamps (`lamps`) is not denoised; `lamp_shares` uses it
-    to divide the denoised indoor light.
+    The light of single lamps (`lamps`) is not denoised.
     """
     return replace(
         result,

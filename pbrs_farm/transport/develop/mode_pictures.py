@@ -93,10 +93,7 @@ def develop(
 def wanted_exposures(
     aovs: LinearAovs, fields: ToneFields, *, denoise: bool, wraps: bool = False
 ) -> dict[str, float]:
-    """Mode -> the factor that a picture of these would be exposed by.
-
-    denoise, wraps: as of the picture; noise lowers the mean of logarithms, and so brightens.
-    """
+    """Mode -> the exposure factor of its picture; denoise, wraps: as of the picture, since noise brightens."""
     images = develop(aovs, fields, denoise=denoise, wraps=wraps)
     return {mode: image.exposure for mode, image in images.items()}
 

@@ -106,21 +106,17 @@ def exposure_of(radiance: RadianceImage, fields: ToneFields) -> float:
 
 
 def add_veil(light: F64, fields: ToneFields) -> F64:
-    """Add veiling glare: the share of the mean of light (H, W, 3) that a lens scatters over the picture.
-
-    Values above the white count as the white, since flare depends on the whole view; otherwise one bulb's
-    pixel would veil a room.
-    """
+    """Add veiling glare: the share of the mean of light (H, W, 3), clipped at the white, that a lens scatters."""
     if fields.flare == 0:
         return light
     return np.asarray(light + fields.flare * np.minimum(light, fields.white).mean(axis=(0, 1)))
 
 
 def flatten_light(light: F64, fields: ToneFields) -> F64:
-    """Exposed light (H, W, 3) with large differences of luminance reduced and detail kept.
+    """Exposed light (H, W, 3) with large differences of luminance reduced, without halos.
 
-    The base is the logarithm of luminance by a guided filter (He, Sun, Tang 2013), which gives no halo;
-    `local_contrast` of its distance to the key is taken out.
+    A guided filter (He, Sun, Tang 2013) of the logarithm of luminance gives the base; `local_contrast` of its
+    distance to the key is taken out.
     """
     if fields.local_contrast == 0:
         return light

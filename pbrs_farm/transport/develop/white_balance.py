@@ -89,10 +89,7 @@ def _one_colour_fills(albedo: F32) -> bool:
 
 
 def all_channels(holds: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """(H, W) whether all three of (H, W, 3) hold: `np.all` over so short an axis takes four times as long.
-
-    Only for three channels; others are neither looked at nor an error.
-    """
+    """(H, W) whether all three of (H, W, 3) hold: `np.all` over so short an axis takes four times as long."""
     return holds[..., 0] & holds[..., 1] & holds[..., 2]
 
 

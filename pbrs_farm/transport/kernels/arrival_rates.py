@@ -60,10 +60,7 @@ class ArrivalRates:
         self._rows = device_array(mi.Float, rows.ravel())
 
     def of_kind(self, p: Any, kind: Any, active: Any) -> Any:
-        """The rate of one kind at p.
-
-        p: Point3f; kind: UInt32 below N_KINDS. Lanes that are not active get 0.
-        """
+        """The rate of one kind (UInt32 below N_KINDS) at p."""
         return dr.gather(mi.Float, self._rows, self.grid.voxel(p) * N_KINDS + kind, active)
 
     def of_near_lamps(self, p: Any, active: Any) -> list[Any]:

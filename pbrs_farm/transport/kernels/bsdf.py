@@ -41,10 +41,7 @@ class Bsdf(NamedTuple):
 
 
 def luminance(rgb: Any) -> Any:
-    """Luminance of linear sRGB.
-
-    rgb: Color3f or three numbers; Rec. 709 weights.
-    """
+    """Luminance of linear sRGB (Color3f or three numbers), Rec. 709 weights."""
     return rgb[0] * LUMINANCE[0] + rgb[1] * LUMINANCE[1] + rgb[2] * LUMINANCE[2]
 
 
@@ -87,10 +84,7 @@ def diffuse_reflection(bsdf: Bsdf, cos_o: Any) -> Any:
 
 
 def diffuse_response(has_coat: Any, cos_i: Any) -> Any:
-    """Factor on diffuse reflection towards wi under a coat.
-
-    has_coat: Bool; cos_i: cosine of the incoming direction, >= 0. 1 for plain matte surfaces.
-    """
+    """Factor on diffuse reflection towards wi under a coat; cos_i >= 0. 1 for plain matte surfaces."""
     return dr.select(has_coat, _ashikhmin(cos_i), 1.0)
 
 

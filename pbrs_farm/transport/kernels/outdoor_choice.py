@@ -43,10 +43,7 @@ class TechniqueCounts(NamedTuple):
     brought: Any  # sums of the root of the luminance that it brought the path, in 1 / _STEPS
 
     def numpy(self) -> NDArray[np.uint32]:
-        """(2, voxels, MAX_TECHNIQUES).
-
-        uint32; as ArrivalCounts has them, but by technique. Waits for the kernel that counts.
-        """
+        """(2, voxels, MAX_TECHNIQUES) uint32, as of ArrivalCounts, but by technique."""
         return np.stack([x.numpy().reshape(-1, MAX_TECHNIQUES) for x in self])
 
 
@@ -96,10 +93,7 @@ class OutdoorChoice:
 
 
 def choose_technique(chances: list[Any], u: Any) -> tuple[Any, Any]:
-    """(number of a technique, drawn by its chance, u made uniform again).
-
-    chances: as `OutdoorChoice.chances`, their sum 1; u: Float in [0, 1).
-    """
+    """(technique drawn by `OutdoorChoice.chances`, u made uniform again); u: Float in [0, 1)."""
     numbers = [mi.UInt32(k) for k in range(len(chances))]
     return sample_discrete(numbers, chances, mi.Float(1), dr.minimum(u, 1 - 1e-6))
 

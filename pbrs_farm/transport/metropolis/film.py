@@ -47,11 +47,7 @@ class Chains(NamedTuple):
 
 
 def sample_film(film: Film, u: Any, is_tent: Any) -> tuple[Any, Any, Any]:
-    """(pixel index, its corner in pixels, offset spread by the filter) from two numbers.
-
-    u: Point2f in [0, 1)^2, over the whole picture; a mutation of it moves smoothly from pixel to pixel.
-    `sample_pixel` is for a given pixel.
-    """
+    """(pixel index, its corner in pixels, offset spread by the filter) from u in [0, 1)^2 over the picture."""
     x, y = u.x * mi.Float(film.width), u.y * mi.Float(film.height)
     column = dr.minimum(mi.UInt32(x), film.width - 1)
     row = dr.minimum(mi.UInt32(y), film.height - 1)
@@ -67,11 +63,7 @@ def sample_pixel(film: Film, pixel: Any, u: Any, is_tent: Any) -> tuple[Any, Any
 
 
 def target_function(film: Film, pixel: Any, light: Any, active: Any = True) -> Any:
-    """Target density of the chains: the luminance of light at a pixel times its importance.
-
-    light: Color3f of a path; pixel: UInt32. A scalar, >= 0: Metropolis light transport decides without
-    colour.
-    """
+    """Target density of the chains: the luminance of light (Color3f) at a pixel times its importance."""
     return luminance(light) * dr.gather(mi.Float, film.importance, pixel, active)
 
 
