@@ -31,8 +31,8 @@ APT_TIMEOUT_S: Final = 600  # of one download
 
 def cache_folder() -> Path:
     """Folder for downloads and data derived from them: $PBRS_CACHE, else ~/.cache/pbrs_farm."""
-    given = os.environ.get("PBRS_CACHE", "")
-    return Path(given) if given else Path.home() / ".cache" / "pbrs_farm"
+    chosen = os.environ.get("PBRS_CACHE", "")
+    return Path(chosen) if chosen else Path.home() / ".cache" / "pbrs_farm"
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,8 +79,8 @@ def fetched_deb(package: str, tested_version: str, folder: Path | None = None) -
     """
     folder = folder or cache_folder()
     try:
-        held = cached_deb(package, tested_version, folder)
-        return held or _download_into(package, tested_version, folder)
+        cached = cached_deb(package, tested_version, folder)
+        return cached or _download_into(package, tested_version, folder)
     except OSError as error:
         hint = "set PBRS_CACHE to a folder of yours"
         raise MachineFailed(f"{folder}: {error.strerror or error}", hint=hint) from None
@@ -121,10 +121,10 @@ def _fetch(package: str, tested_version: str, scratch: Path) -> None:
 
 def _deb(package: str, tested_version: str, path: Path) -> Deb:
     # Hash a file once a process: a job of many homes asks for its package with each.
-    held, version, note = path.stat(), version_of(path), ""
+    status, version, note = path.stat(), version_of(path), ""
     if version != tested_version:
         note = f"{package} {version} is not the tested version {tested_version}"
-    return Deb(package, version, path, _sha256(path, held.st_size, held.st_mtime_ns), note)
+    return Deb(package, version, path, _sha256(path, status.st_size, status.st_mtime_ns), note)
 
 
 @lru_cache(maxsize=16)
@@ -177,27 +177,27 @@ def version_of(deb: Path) -> str:
 
 
 def _extract_files(tar: bytes, wanted: Callable[[str], bool]) -> dict[str, bytes]:
-    found = {}
+    files = {}
     with tarfile.open(fileobj=io.BytesIO(tar)) as archive:
         # Read the wanted files alone; links and folders are passed over.
         for member in archive:
             name = member.name.removeprefix("./")
             stream = archive.extractfile(member) if member.isfile() and wanted(name) else None
             if stream is not None:
-                found[name] = stream.read()
-    return found
+                files[name] = stream.read()
+    return files
 
 
 def _ar_members(data: bytes) -> list[tuple[str, bytes]]:
     if not data.startswith(b"!<arch>\n"):
         raise ValueError("not a Debian package")
-    members, at = [], 8
-    while at + 60 <= len(data):
+    members, offset = [], 8
+    while offset + 60 <= len(data):
         # A member's header has 60 bytes: name in 16, size at 48; contents begin at even places.
-        name = data[at : at + 16].decode("ascii", "replace").strip().rstrip("/")
-        size = int(data[at + 48 : at + 58])
-        members.append((name, data[at + 60 : at + 60 + size]))
-        at += 60 + size + size % 2
+        name = data[offset : offset + 16].decode("ascii", "replace").strip().rstrip("/")
+        size = int(data[offset + 48 : offset + 58])
+        members.append((name, data[offset + 60 : offset + 60 + size]))
+        offset += 60 + size + size % 2
     return members
 
 

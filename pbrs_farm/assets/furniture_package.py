@@ -47,10 +47,10 @@ def _unpacked(deb: Deb) -> FurniturePackage:
     folder = deb.path.parent / f"{PACKAGE}-{deb.sha256[:16]}"
     place = {name: folder / f"{name}.sh3f" for name in LIBRARIES}
     if not all(path.exists() for path in place.values()):
-        wanted = {f"{FOLDER}/{name}.sh3f" for name in LIBRARIES}
-        files = deb.members(lambda name: name in wanted)
-        if set(files) != wanted:
-            missing = ", ".join(sorted(PurePosixPath(f).name for f in wanted - set(files)))
+        paths = {f"{FOLDER}/{name}.sh3f" for name in LIBRARIES}
+        files = deb.members(lambda name: name in paths)
+        if set(files) != paths:
+            missing = ", ".join(sorted(PurePosixPath(f).name for f in paths - set(files)))
             raise deb.damaged(f"holds no {missing}")
         folder.mkdir(exist_ok=True)
         for name, path in place.items():

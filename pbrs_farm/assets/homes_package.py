@@ -52,10 +52,10 @@ def exact_name(word: str) -> str:
 
     word: with or without ".xml". The package need not be there: the names are known without it.
     """
-    known = {h.name.lower(): h.name for h in _HOMES}
-    exact = known.get(word.lower().removesuffix(".xml"))
+    exact_names = {h.name.lower(): h.name for h in _HOMES}
+    exact = exact_names.get(word.lower().removesuffix(".xml"))
     if exact is None:
-        hint = hint_of_choice(word, [*known.values(), "builtin"])
+        hint = hint_of_choice(word, [*exact_names.values(), "builtin"])
         raise BadInput(word, "", "no such file, and no example home of that name", hint=hint)
     return exact
 

@@ -25,10 +25,10 @@ def fetch_skies() -> Path:
     if all((folder / f"{name}.exr").exists() for name in NAMES):
         return folder
     deb = fetched_deb(PACKAGE, TESTED_VERSION)
-    wanted = {f"{name}.exr" for name in NAMES}
-    files = deb.members(lambda path: "studiolights/world/" in path and Path(path).name in wanted)
-    if {Path(path).name for path in files} != wanted:
-        raise deb.damaged(f"holds no {', '.join(sorted(wanted))}")
+    paths = {f"{name}.exr" for name in NAMES}
+    files = deb.members(lambda path: "studiolights/world/" in path and Path(path).name in paths)
+    if {Path(path).name for path in files} != paths:
+        raise deb.damaged(f"holds no {', '.join(sorted(paths))}")
     folder.mkdir(parents=True, exist_ok=True)
     for path, data in files.items():
         write_whole(folder / Path(path).name, data)

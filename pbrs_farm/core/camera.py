@@ -104,7 +104,7 @@ def intrinsics_from_k(size: tuple[int, int] | None, k: Any, hfov_deg: float) -> 
     shape_fits = matrix.shape == (3, 3) and np.isfinite(matrix).all()
     if not shape_fits or min(matrix[0, 0], matrix[1, 1]) <= 0 or abs(matrix[0, 1]) > 1e-9:
         raise BadInput("camera", "K", "expected 3 x 3 numbers: fx 0 cx, 0 fy cy, 0 0 1")
-    fx, fy, cx, cy = (float(matrix[at]) for at in ((0, 0), (1, 1), (0, 2), (1, 2)))
+    fx, fy, cx, cy = (float(matrix[place]) for place in ((0, 0), (1, 1), (0, 2), (1, 2)))
     _check_size_of_k(width, height, cx, cy)
     return Intrinsics(width, height, fx, fy, cx, cy)
 
@@ -214,8 +214,8 @@ class Camera:
         ):
             raise BadInput("camera", "", "eye, target and up give no direction")
         x, y, z = (float(v) for v in up)
-        found = Camera.look(intrinsics_from_k(size, K, hfov_deg), start, towards, (x, y, z))
-        return replace(found, has_own_size=size is not None)
+        camera = Camera.look(intrinsics_from_k(size, K, hfov_deg), start, towards, (x, y, z))
+        return replace(camera, has_own_size=size is not None)
 
     @staticmethod
     @checked_call
@@ -260,8 +260,8 @@ class Camera:
         """
         if min(width_px, height_px) < 1:
             raise BadInput("with_size", "", f"{width_px}x{height_px} is no size")
-        found = self.intrinsics.resized(width_px, height_px)
-        return replace(self, intrinsics=found, has_own_size=True)
+        intrinsics = self.intrinsics.resized(width_px, height_px)
+        return replace(self, intrinsics=intrinsics, has_own_size=True)
 
     def pixels_of(self, points: NDArray[np.floating]) -> F64:
         """(N, 2) pixel coordinates (x, y) of points (N, 3) of the world, in metres.
@@ -288,10 +288,10 @@ class Camera:
         return np.asarray(np.linalg.norm(local, axis=1))
 
     def _from_world(self, points: NDArray[np.floating]) -> F64:
-        given = np.asarray(points, np.float64)
-        if given.ndim != 2 or given.shape[1] != 3:
-            raise BadInput("camera", "points", f"expected (N, 3), got {given.shape}")
-        moved = given - self.eye
+        world_points = np.asarray(points, np.float64)
+        if world_points.ndim != 2 or world_points.shape[1] != 3:
+            raise BadInput("camera", "points", f"expected (N, 3), got {world_points.shape}")
+        moved = world_points - self.eye
         return np.asarray(moved @ self.world_from_camera[:3, :3])
 
     @property
@@ -343,30 +343,30 @@ def camera_of_recipe(camera: Camera, width_px: int, height_px: int) -> Camera:
     if camera.has_own_size:
         return camera
     hfov_rad = 2 * math.atan(0.5 * camera.intrinsics.width_px / camera.intrinsics.fx)
-    found = Intrinsics.from_hfov(width_px, height_px, hfov_rad)
-    return replace(camera, intrinsics=found, has_own_size=True)
+    intrinsics = Intrinsics.from_hfov(width_px, height_px, hfov_rad)
+    return replace(camera, intrinsics=intrinsics, has_own_size=True)
 
 
 def rigid_motion(matrix: Any, call: str, name: str) -> F64:
     """A (4, 4) matrix that turns and moves, as an array; BadInput, naming the argument, for others."""
     try:
-        found = np.asarray(matrix, np.float64)
+        motion = np.asarray(matrix, np.float64)
     except (TypeError, ValueError):
-        found = np.zeros(0)
-    turn = found[:3, :3] if found.shape == (4, 4) else np.zeros((3, 3))
+        motion = np.zeros(0)
+    turn = motion[:3, :3] if motion.shape == (4, 4) else np.zeros((3, 3))
     fits = np.allclose(turn @ turn.T, np.eye(3), atol=1e-4) and np.linalg.det(turn) > 0
-    if not fits or not np.isfinite(found).all() or not np.allclose(found[3], [0, 0, 0, 1]):
+    if not fits or not np.isfinite(motion).all() or not np.allclose(motion[3], [0, 0, 0, 1]):
         raise BadInput(call, name, "is no rigid (4, 4) motion: a rotation and metres")
-    return found
+    return motion
 
 
 @functools.lru_cache(maxsize=4)
 def _lens_grid(i: Intrinsics) -> F64:
     """(H, W, 3) directions through the pixels' centres, OpenGL's camera axes; cached, do not write to it."""
     x, y = np.meshgrid(np.arange(i.width_px) + 0.5, np.arange(i.height_px) + 0.5)
-    found = i.directions(np.stack([x.ravel(), y.ravel()], axis=1)) * _FLIP
-    found.setflags(write=False)
-    return found.reshape(i.height_px, i.width_px, 3)
+    directions = i.directions(np.stack([x.ravel(), y.ravel()], axis=1)) * _FLIP
+    directions.setflags(write=False)
+    return directions.reshape(i.height_px, i.width_px, 3)
 
 
 @functools.lru_cache(maxsize=4)
@@ -379,9 +379,9 @@ def pinholes_of(camera: Camera) -> tuple[list[Camera], PinholeFaces]:
 
     And how its picture follows from theirs. For what only draws pin-holes.
     """
-    found = _lens_faces(camera.intrinsics)
+    faces = _lens_faces(camera.intrinsics)
     cameras = []
-    for face in found.faces:
+    for face in faces.faces:
         # The face's axes as columns, both frames with OpenGL's axes.
         turned = camera.world_from_camera.copy()
         turned[:3, :3] = camera.world_from_camera[:3, :3] @ (_FLIP[:, None] * face.axes.T * _FLIP)
@@ -389,7 +389,7 @@ def pinholes_of(camera: Camera) -> tuple[list[Camera], PinholeFaces]:
         cameras.append(
             Camera(Intrinsics(face.width_px, face.height_px, f, f, face.cx, face.cy), turned)
         )
-    return cameras, found
+    return cameras, faces
 
 
 @dataclass(frozen=True, slots=True, eq=False)

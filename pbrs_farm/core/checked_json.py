@@ -89,9 +89,9 @@ def checked(
         json_from_bytes(data, file, error=error)
         raise error(file, "", "no valid JSON: nested too deeply", hint=hint)
     if first["type"] == "extra_forbidden":
-        word, known = str(first["loc"][-1]), _field_names(adapter)
-        offer = hint_of_choice if len(known) <= _MOST_NAMES else did_you_mean
-        hint = offer(word, known) or hint
+        word, field_names = str(first["loc"][-1]), _field_names(adapter)
+        offer = hint_of_choice if len(field_names) <= _MOST_NAMES else did_you_mean
+        hint = offer(word, field_names) or hint
     inner = place_in(first["loc"])
     between = ", " if place and inner and inner[0] != "[" else ""
     raise error(file, f"{place}{between}{inner}", sentence(first), hint=hint)
@@ -157,8 +157,8 @@ def sentence(fault: ErrorDetails) -> str:
     if kind in _SENTENCES:
         text = _SENTENCES[kind].format(**facts)
     else:
-        wanted = _WANTED.get(kind.partition("_")[0])
-        text = f"expected {wanted}" if wanted else "is not what belongs here"
+        expected_kind = _WANTED.get(kind.partition("_")[0])
+        text = f"expected {expected_kind}" if expected_kind else "is not what belongs here"
     tells_value = text.startswith("expected") and ", got" not in text
     return f"{text}, got {_shown_value(fault['input'])}" if tells_value else text
 

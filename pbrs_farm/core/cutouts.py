@@ -44,14 +44,14 @@ def cut_outs_by_material(
     pictures: texture id -> (H, W, 3 or 4) uint8, row 0 at the top; those of materials with
     alpha_cutout are looked at. A picture that is not there, or has no alpha, is opaque.
     """
-    found = {}
+    cut_outs = {}
     for index, material in enumerate(house.materials):
         if material.alpha_cutout:
             picture = pictures.get(material.texture_id or "")
             has_alpha = picture is not None and picture.ndim == 3 and picture.shape[2] == 4
             alpha = picture[..., 3:] if picture is not None and has_alpha else _SOLID
-            found[index] = CutOut(np.ascontiguousarray(alpha), material.alpha_cutoff)
-    return {k: c for k, c in found.items() if c.alpha.min() < 255 * c.cutoff}
+            cut_outs[index] = CutOut(np.ascontiguousarray(alpha), material.alpha_cutoff)
+    return {k: c for k, c in cut_outs.items() if c.alpha.min() < 255 * c.cutoff}
 
 
 def faces_with_holes(geometry: Geometry, cut_outs: CutOuts) -> Bools:
@@ -91,8 +91,8 @@ def is_hole_at(geometry: Geometry, cut_outs: CutOuts, faces: NDArray[np.integer]
     hole = np.zeros(len(faces), np.bool_)
     for index in np.unique(material):
         if int(index) in cut_outs:
-            own = material == index
-            hole[own] = cut_outs[int(index)].is_hole(uv[own])
+            in_material = material == index
+            hole[in_material] = cut_outs[int(index)].is_hole(uv[in_material])
     return hole
 
 

@@ -55,26 +55,26 @@ def undistorted(points: F64, coefficients: Coefficients) -> F64:
     radius = np.linalg.norm(points, axis=1)
     start = _radius_before(radius, coefficients)
     scale = np.divide(start, radius, out=np.ones_like(radius), where=radius > 0)
-    found = points * scale[:, None]
+    solution = points * scale[:, None]
     # Solve both components; the Jacobian is symmetric.
     for _ in range(_STEPS):
-        error = distorted(found, coefficients) - points
-        xx, xy, yy = jacobian(found, coefficients)
+        error = distorted(solution, coefficients) - points
+        xx, xy, yy = jacobian(solution, coefficients)
         determinant = xx * yy - xy * xy
         inverse = np.divide(
             1.0, determinant, out=np.zeros_like(determinant), where=np.abs(determinant) > 1e-12
         )
         step_x = (yy * error[:, 0] - xy * error[:, 1]) * inverse
         step_y = (xx * error[:, 1] - xy * error[:, 0]) * inverse
-        found = found - np.stack([step_x, step_y], axis=1)
+        solution = solution - np.stack([step_x, step_y], axis=1)
         if max(np.abs(step_x).max(), np.abs(step_y).max()) < 1e-15:
             break
     # A point beyond the fold is another point's picture, turned inside out.
-    error = np.abs(distorted(found, coefficients) - points).max(1)
-    xx, xy, yy = jacobian(found, coefficients)
-    within = np.linalg.norm(found, axis=1) <= largest_radius(coefficients)
+    error = np.abs(distorted(solution, coefficients) - points).max(1)
+    xx, xy, yy = jacobian(solution, coefficients)
+    within = np.linalg.norm(solution, axis=1) <= largest_radius(coefficients)
     good = (error < _RESIDUAL) & (xx > 0) & (xx * yy > xy * xy) & within
-    return np.where(good[:, None], found, np.nan)
+    return np.where(good[:, None], solution, np.nan)
 
 
 def jacobian(points: F64, coefficients: Coefficients) -> tuple[F64, F64, F64]:

@@ -137,8 +137,8 @@ class Surface:
 
 def corners_of_surfaces(surfaces: Iterable[Surface]) -> F64:
     """(F, 3, 3) float64 corners of all triangles of surfaces in their order; (0, 3, 3) without any."""
-    found = [triangle_corners(s.positions, s.faces) for s in surfaces]
-    return np.concatenate([np.zeros((0, 3, 3)), *found])
+    corners = [triangle_corners(s.positions, s.faces) for s in surfaces]
+    return np.concatenate([np.zeros((0, 3, 3)), *corners])
 
 
 def part_of(surface: Surface, faces: I32, name: str) -> Surface:
@@ -294,8 +294,8 @@ class Item:
 
     def __repr__(self) -> str:
         room = f", room {self.room_id}" if self.room_id else ""
-        what = f"{self.kind}, nyu40 {self.nyu40}{room}, {self.n_faces:,} triangles"
-        return f"Item({self.id!r}, {self.name!r}, {what})"
+        summary = f"{self.kind}, nyu40 {self.nyu40}{room}, {self.n_faces:,} triangles"
+        return f"Item({self.id!r}, {self.name!r}, {summary})"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

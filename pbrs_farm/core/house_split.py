@@ -67,7 +67,7 @@ def split_of_house(house: str, shares: SplitShares | None = None) -> str:
     shares = shares or SplitShares()
     # Take a number of 0..1 from the home's name.
     digest = hashlib.sha256(home_of(house).encode()).digest()
-    at = int.from_bytes(digest[:8], "big") / 2**64
-    if at < shares.train:
+    position = int.from_bytes(digest[:8], "big") / 2**64
+    if position < shares.train:
         return "train"
-    return "val" if at < shares.train + shares.val else "test"
+    return "val" if position < shares.train + shares.val else "test"

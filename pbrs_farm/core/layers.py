@@ -349,15 +349,15 @@ OWN_LAYERS: Final[tuple[Layer, ...]] = (
 
 def _of_plugins() -> tuple[Layer, ...]:
     """The layers of installed plugins, by name: optional, written by the step `truth`."""
-    found = []
+    layers = []
     for name, plugin in plugins("layers").items():
         layer = plugin.load().layer
         if layer.name != name or layer.step != "truth" or not layer.optional:
             raise MachineFailed(
                 f"plugin {plugin.mark}: its layer must be optional, of the step truth, called {name}"
             )
-        found.append(layer)
-    return tuple(found)
+        layers.append(layer)
+    return tuple(layers)
 
 
 def _pictures_of_plugins() -> tuple[Layer, ...]:
@@ -388,9 +388,12 @@ def layers_in_digest(names: Iterable[str], max_albedo: float) -> list[str]:
 
     max_albedo: the recipe's limit of albedo. A layer of version 1 adds nothing.
     """
-    known = [layer for layer in LAYERS if layer.name in set(names)]
-    shown = [f"{layer.name} {max_albedo}" for layer in known if layer.shows_albedo]
-    return [*shown, *(f"{layer.name} {layer.version}" for layer in known if layer.version > 1)]
+    named_layers = [layer for layer in LAYERS if layer.name in set(names)]
+    shown = [f"{layer.name} {max_albedo}" for layer in named_layers if layer.shows_albedo]
+    return [
+        *shown,
+        *(f"{layer.name} {layer.version}" for layer in named_layers if layer.version > 1),
+    ]
 
 
 def layer_table() -> str:
@@ -413,11 +416,11 @@ def text_table(width: int) -> str:
         for x in LAYERS
     ]
     widths = [max(len(row[k]) for row in (heads, *rows)) for k in range(3)]
-    left = max(width - sum(widths) - 6, 16)
+    unit_width = max(width - sum(widths) - 6, 16)
     lines = []
     for row in (heads, *rows):
         cells = [cell.ljust(n) for cell, n in zip(row[:3], widths, strict=True)]
-        unit = row[3] if len(row[3]) <= left else row[3][: left - 1] + "\u2026"
+        unit = row[3] if len(row[3]) <= unit_width else row[3][: unit_width - 1] + "\u2026"
         lines.append("  ".join([*cells, unit]).rstrip())
     return "\n".join(lines)
 

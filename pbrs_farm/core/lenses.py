@@ -82,15 +82,15 @@ class Lens:
         Of unit depth where depth is planar, else of unit length; (0, 0, 0) where there is no ray.
         """
         if self.model == "fisheye":
-            found = directions_of_fisheye(plane, self.coefficients, self.largest_angle_rad)
+            directions = directions_of_fisheye(plane, self.coefficients, self.largest_angle_rad)
         elif self.model == "equirect":
-            found = directions_of_equirect(plane)
+            directions = directions_of_equirect(plane)
         elif self.model == "cubemap":
-            found = directions_of_cubemap(plane)
+            directions = directions_of_cubemap(plane)
         else:
             ideal = undistorted(plane, self.coefficients) if self.model == "radtan" else plane
-            found = np.concatenate([ideal, np.ones((len(plane), 1))], axis=1)
-        return np.where(np.isfinite(found).all(1, keepdims=True), found, 0.0)
+            directions = np.concatenate([ideal, np.ones((len(plane), 1))], axis=1)
+        return np.where(np.isfinite(directions).all(1, keepdims=True), directions, 0.0)
 
     def plane_points(self, directions: F64) -> F64:
         """(N, 2) points of the plane of directions (N, 3), any length; NaN where none is seen.
@@ -112,8 +112,8 @@ class Lens:
         if self.model == "pinhole":
             return ideal
         with np.errstate(invalid="ignore"):
-            seen = np.linalg.norm(ideal, axis=1) <= largest_radius(self.coefficients)
-        return np.where(seen[:, None], distorted(ideal, self.coefficients), np.nan)
+            in_view = np.linalg.norm(ideal, axis=1) <= largest_radius(self.coefficients)
+        return np.where(in_view[:, None], distorted(ideal, self.coefficients), np.nan)
 
     def table(self) -> dict[str, Any]:
         """The lens as JSON values: model, its coefficients by name, a fisheye's max_angle_rad."""

@@ -163,8 +163,8 @@ def edges_are_paired(faces: NDArray[np.integer]) -> bool:
     start, end = (faces[:, k].astype(np.int64) for k in ([0, 1, 2], [1, 2, 0]))
     n = int(faces.max(initial=0)) + 1
     # Number each edge in both directions: what leaves a place must come back to it.
-    there, back = (start * n + end).ravel(), (end * n + start).ravel()
-    return bool(np.array_equal(np.sort(there), np.sort(back)))
+    forward, back = (start * n + end).ravel(), (end * n + start).ravel()
+    return bool(np.array_equal(np.sort(forward), np.sort(back)))
 
 
 def clipped_to_box(corners: F64, low: F64, high: F64) -> F64:
@@ -202,15 +202,18 @@ def _cut(corners: F64, axis: int, sign: float, place: float) -> F64:
     along = np.roll(start, -1, axis=1) - start
     climb = sign * along[..., axis]
     share = -height[is_cut] / np.where(climb == 0, 1e-12, climb)
-    met = share[..., None] * along + start
+    crossing = share[..., None] * along + start
 
     # With two corners kept two triangles are left, with one corner one.
     (two,), (one,) = np.nonzero(total > 0), np.nonzero(total <= 0)
     out, inner = side[two].argmin(1), side[one].argmax(1)
     second, third = start[two, (out + 1) % 3], start[two, (out + 2) % 3]
-    last = met[two, out]
-    quads = ((second, third, met[two, (out + 2) % 3]), (met[two, (out + 2) % 3], last, second))
-    ends = (start[one, inner], met[one, inner], met[one, (inner + 2) % 3])
+    last = crossing[two, out]
+    quads = (
+        (second, third, crossing[two, (out + 2) % 3]),
+        (crossing[two, (out + 2) % 3], last, second),
+    )
+    ends = (start[one, inner], crossing[one, inner], crossing[one, (inner + 2) % 3])
     parts = [np.stack(part, axis=1) for part in (*quads, ends)]
     return np.concatenate([corners[is_kept], *parts])
 

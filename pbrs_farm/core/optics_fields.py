@@ -121,8 +121,8 @@ class LensFields(FieldGroup):
     def _with_preset(cls, given: Any) -> Any:
         # Fill in what the preset says and the user does not; an unknown preset is judged later.
         preset = given.get("preset", "none") if isinstance(given, dict) else "none"
-        known = LENS_PRESETS.get(preset, {}) if isinstance(preset, str) else {}
-        return {**known, **given} if known else given
+        preset_values = LENS_PRESETS.get(preset, {}) if isinstance(preset, str) else {}
+        return {**preset_values, **given} if preset_values else given
 
     @property
     def lens(self) -> Lens:
@@ -136,11 +136,11 @@ class LensFields(FieldGroup):
 
         Raises ValueError if the distortion folds the picture, or a fisheye lacks fx and hfov_deg.
         """
-        found = self._unchecked(pinhole)
-        fold = None if found is pinhole else fold_of(found)
+        intrinsics = self._unchecked(pinhole)
+        fold = None if intrinsics is pinhole else fold_of(intrinsics)
         if fold is not None:
             raise ValueError(fold)
-        return found
+        return intrinsics
 
     def aspect_fault(self, width_px: int, height_px: int) -> str | None:
         """Why a picture of that size cannot be the lens's, None where it can.
@@ -157,8 +157,8 @@ class LensFields(FieldGroup):
         if abs(width_px * h / (height_px * w) - 1) <= _ASPECT_ERROR:
             return None
         hint = f"--set image.width_px={w} --set image.height_px={h}"
-        what = f"lens.model {self.model} is of pictures {w}:{h}"
-        return f"{what}, not {width_px}x{height_px}: add {hint}"
+        fault = f"lens.model {self.model} is of pictures {w}:{h}"
+        return f"{fault}, not {width_px}x{height_px}: add {hint}"
 
     def _unchecked(self, pinhole: Intrinsics) -> Intrinsics:
         lens = self.lens
@@ -277,5 +277,5 @@ class SensorFields(FieldGroup):
     def _with_preset(cls, given: Any) -> Any:
         # Fill in what the preset says and the user does not; an unknown preset is judged later.
         preset = given.get("preset", "none") if isinstance(given, dict) else "none"
-        known = SENSOR_PRESETS.get(preset, {}) if isinstance(preset, str) else {}
-        return {**known, **given} if known else given
+        preset_values = SENSOR_PRESETS.get(preset, {}) if isinstance(preset, str) else {}
+        return {**preset_values, **given} if preset_values else given

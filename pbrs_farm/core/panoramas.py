@@ -37,10 +37,10 @@ def directions_of_equirect(plane: F64) -> F64:
     """
     longitude, latitude = plane[:, 0], plane[:, 1]
     level = np.cos(latitude)
-    found = np.stack(
+    directions = np.stack(
         [level * np.sin(longitude), np.sin(latitude), level * np.cos(longitude)], axis=1
     )
-    return np.where((np.abs(latitude) <= np.pi / 2)[:, None], found, np.nan)
+    return np.where((np.abs(latitude) <= np.pi / 2)[:, None], directions, np.nan)
 
 
 def equirect_of_directions(directions: F64) -> F64:

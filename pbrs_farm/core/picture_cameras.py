@@ -110,8 +110,8 @@ def picture_camera(name: str, tone: ToneFields, sensor: SensorFields, seed: int)
     # Add the errors in the row's order; errors of the contrast are in its binary logarithm.
     for f, deviation in row.spread.items():
         z = deviation * float(rng.normal())
-        held = values.get(f, getattr(tone, f))
-        values[f] = round(held * 2**z if f == "contrast" else held + z, 4)
+        value = values.get(f, getattr(tone, f))
+        values[f] = round(value * 2**z if f == "contrast" else value + z, 4)
     if not sensor.is_on and row.sensor != "none":
         sensor = SensorFields(preset=row.sensor, **sensor.model_dump(exclude_defaults=True))
     return PictureCamera(name, tone.model_copy(update={**values, "camera": name}), sensor)

@@ -50,10 +50,10 @@ class PinholeFaces:
         """
         out = np.zeros((*self.number.shape, *pictures[0].shape[2:]), pictures[0].dtype)
         for k, picture in enumerate(pictures):
-            at = self.number == k
-            column = np.floor(self.x[at]).astype(np.int64).clip(0, picture.shape[1] - 1)
-            row = np.floor(self.y[at]).astype(np.int64).clip(0, picture.shape[0] - 1)
-            out[at] = picture[row, column]
+            on_face = self.number == k
+            column = np.floor(self.x[on_face]).astype(np.int64).clip(0, picture.shape[1] - 1)
+            row = np.floor(self.y[on_face]).astype(np.int64).clip(0, picture.shape[0] - 1)
+            out[on_face] = picture[row, column]
         return out
 
     def bilinear(self, pictures: Sequence[NDArray[np.floating]]) -> NDArray[np.float32]:
@@ -64,15 +64,15 @@ class PinholeFaces:
         """
         out = np.zeros((*self.number.shape, pictures[0].shape[2]), np.float32)
         for k, picture in enumerate(pictures):
-            at = self.number == k
+            on_face = self.number == k
             # Pixel centres lie at +0.5; a border repeats itself.
-            left = np.clip(self.x[at] - 0.5, 0, picture.shape[1] - 1.000001)
-            top = np.clip(self.y[at] - 0.5, 0, picture.shape[0] - 1.000001)
+            left = np.clip(self.x[on_face] - 0.5, 0, picture.shape[1] - 1.000001)
+            top = np.clip(self.y[on_face] - 0.5, 0, picture.shape[0] - 1.000001)
             column, row = left.astype(np.int64), top.astype(np.int64)
             across, down = (left - column)[:, None], (top - row)[:, None]
             upper = picture[row, column] * (1 - across) + picture[row, column + 1] * across
             lower = picture[row + 1, column] * (1 - across) + picture[row + 1, column + 1] * across
-            out[at] = upper * (1 - down) + lower * down
+            out[on_face] = upper * (1 - down) + lower * down
         return out
 
 
@@ -120,8 +120,8 @@ def _cube_faces(unit: F64, has_ray: NDArray[np.bool_], focal: float) -> PinholeF
     index[used] = np.arange(len(used))
     x, y = np.zeros(number.shape), np.zeros(number.shape)
     for k in used:
-        at = number == k
-        local = unit[at] @ FACE_AXES[k].T
-        x[at], y[at] = (local[:, :2] / local[:, 2:] * focal + side / 2).T
+        on_face = number == k
+        local = unit[on_face] @ FACE_AXES[k].T
+        x[on_face], y[on_face] = (local[:, :2] / local[:, 2:] * focal + side / 2).T
     faces = tuple(PinholeFace(FACE_AXES[k], side, side, focal, side / 2, side / 2) for k in used)
     return PinholeFaces(faces, index[number], x, y)

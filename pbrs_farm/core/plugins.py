@@ -60,12 +60,12 @@ def plugins(group: str) -> Mapping[str, Plugin]:
 
     Runs no plugin's code. Cached for the life of the process, which misses packages installed meanwhile.
     """
-    found: dict[str, Plugin] = {}
+    by_name: dict[str, Plugin] = {}
     for entry in sorted(entry_points(group=f"pbrs_farm.{group}"), key=_order):
         package = entry.dist.name if entry.dist else "?"
         version = entry.dist.version if entry.dist else "?"
-        found.setdefault(entry.name, Plugin(group, entry.name, package, version, entry))
-    return found
+        by_name.setdefault(entry.name, Plugin(group, entry.name, package, version, entry))
+    return by_name
 
 
 @cache
@@ -80,11 +80,15 @@ def _order(entry: EntryPoint) -> tuple[str, str]:
 
 def plugin(group: str, name: str) -> Plugin:
     """The plugin of that name, not loaded; MachineFailed without one, with the nearest known name."""
-    known = plugins(group)
-    if name not in known:
-        hint = hint_of_choice(name, tuple(known)) if known else "install the package that has it"
+    installed = plugins(group)
+    if name not in installed:
+        hint = (
+            hint_of_choice(name, tuple(installed))
+            if installed
+            else "install the package that has it"
+        )
         raise MachineFailed(f"no plugin {name!r} for {group} is installed here", hint=hint)
-    return known[name]
+    return installed[name]
 
 
 def marks_in_digest(group: str, names: Iterable[str]) -> list[str]:
@@ -103,11 +107,11 @@ def checked_names(group: str, names: str) -> str:
 
     Empty parts are allowed, and the text is returned unchanged.
     """
-    known = plugins(group)
+    installed = plugins(group)
     for name in filter(None, names.split(":")):
-        if name not in known:
+        if name not in installed:
             raise ValueError(
-                f"no plugin {name!r} for {group}, {hint_of_choice(name, tuple(known))}"
+                f"no plugin {name!r} for {group}, {hint_of_choice(name, tuple(installed))}"
             )
     return names
 

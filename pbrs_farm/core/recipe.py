@@ -139,8 +139,8 @@ class Recipe(FieldGroup):
     def lenses(self) -> dict[str, LensFields]:
         """The lens of all views, and those of a rig's cameras by their place in messages."""
         of_rig = () if self.rig is None else self.rig.cameras
-        own = {f"rig camera {c.name}: ": c.lens for c in of_rig if c.lens is not None}
-        return {"": self.lens, **own}
+        rig_lenses = {f"rig camera {c.name}: ": c.lens for c in of_rig if c.lens is not None}
+        return {"": self.lens, **rig_lenses}
 
     @model_validator(mode="after")
     def _blur_fits(self) -> Self:
@@ -163,13 +163,13 @@ class Recipe(FieldGroup):
         f, lens = self.cameras, self.lens
         if lens.fx == 0 or not lens.lens.depth_is_planar:
             return f
-        own = {
+        lens_view = {
             "hfov_rad": 2 * math.atan(0.5 * lens.width_px / lens.fx),
             "hfov_spread": 0.0,
             "score_height_px": max(round(f.score_width_px * lens.height_px / lens.width_px), 1),
             "coarse_height_px": max(round(f.coarse_width_px * lens.height_px / lens.width_px), 1),
         }
-        return f.model_copy(update=own)
+        return f.model_copy(update=lens_view)
 
     def camera_of(self, house_id: str, view_id: str, variant: int = 0) -> PictureCamera:
         """The camera that develops one view: tone.camera, or a drawn one for a variant.
@@ -290,9 +290,9 @@ def changed_recipe(
     for group, values in _PRESETS[base].items():
         fields[group] = dict(values)
     for group, value in changes.items():
-        held = fields.get(group)
-        both = isinstance(held, dict) and isinstance(value, Mapping)
-        fields[group] = {**held, **value} if both and held is not None else value
+        preset_value = fields.get(group)
+        both = isinstance(preset_value, dict) and isinstance(value, Mapping)
+        fields[group] = {**preset_value, **value} if both and preset_value is not None else value
     for path, text in overrides.items():
         _set(fields, path, text)
     return _validated(fields)
@@ -335,9 +335,9 @@ def _fault(fault: ErrorDetails) -> str:
     if isinstance(value, dict) and value:
         path = f"{path}.{next(iter(value))}"
     # A field without its group, or in another's, is found in every group that has it.
-    known = field_paths()
-    same = [p for p in known if p.endswith(f".{path.rpartition('.')[2]}")]
-    offer = question(near_names(path, same) or same[:2] or near_names(path, known))
+    paths = field_paths()
+    same = [p for p in paths if p.endswith(f".{path.rpartition('.')[2]}")]
+    offer = question(near_names(path, same) or same[:2] or near_names(path, paths))
     return f"{path}: {text}" + (f", {offer}" if offer else "")
 
 

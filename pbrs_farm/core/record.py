@@ -76,10 +76,10 @@ def _read(path: Path, kind: type[_T], parse: Callable[[str], Any]) -> _T:
     except ValidationError as error:
         wrong = error.errors()[0]
         # Rows that have a name are known by it.
-        names, here = [], raw
+        names, entry = [], raw
         for key in wrong["loc"]:
-            here = _within(here, key)
-            names.append(str(here.get("name", key) if isinstance(here, dict) else key))
+            entry = _within(entry, key)
+            names.append(str(entry.get("name", key) if isinstance(entry, dict) else key))
         raise BadInput(path.name, " ".join(names), sentence(wrong)) from error
 
 

@@ -79,8 +79,8 @@ def bilinear(
     top, bottom = (y0 % height).astype(np.int64), ((y0 + 1) % height).astype(np.int64)
 
     def at(rows: NDArray[np.int64], columns: NDArray[np.int64]) -> NDArray[np.float32]:
-        found = pixels[rows, columns]
-        return found.astype(np.float32) if value_of_byte is None else value_of_byte[found]
+        texels = pixels[rows, columns]
+        return texels.astype(np.float32) if value_of_byte is None else value_of_byte[texels]
 
     # Blend along rows first.
     upper = at(top, left) * (1 - fx) + at(top, right) * fx

@@ -58,12 +58,12 @@ def escaped(json_text: str) -> str:
 def _cleaned(line: str) -> str:
     if line.isascii() and line.isprintable():
         return line
-    kept, n_marks = [], 0
+    characters, n_marks = [], 0
     for c in line:
         n_marks = n_marks + 1 if unicodedata.combining(c) else 0
         if n_marks <= _MAX_MARKS:
-            kept.append(" " if _is_unsafe(c) else c)
-    return "".join(kept)
+            characters.append(" " if _is_unsafe(c) else c)
+    return "".join(characters)
 
 
 def _is_unsafe(c: str) -> bool:
@@ -84,9 +84,9 @@ def near_names(word: str, known: Iterable[str]) -> list[str]:
     """The known names most like the word's first 100 characters in any case, the likeliest first."""
     plain = {name.lower(): name for name in known}
     word = word[:100].lower()
-    found = get_close_matches(word, plain, n=_MOST, cutoff=_LEAST_LIKENESS)
-    likeness = [SequenceMatcher(None, name, word).ratio() for name in found]
-    return [plain[n] for n, x in zip(found, likeness) if x >= likeness[0] - _AS_LIKELY]
+    matches = get_close_matches(word, plain, n=_MOST, cutoff=_LEAST_LIKENESS)
+    likeness = [SequenceMatcher(None, name, word).ratio() for name in matches]
+    return [plain[n] for n, x in zip(matches, likeness) if x >= likeness[0] - _AS_LIKELY]
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:

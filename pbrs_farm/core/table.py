@@ -53,8 +53,8 @@ class Table(Sequence[Mapping[str, Any]]):
         return tuple(_text(row.get(name)) for name in self.columns)
 
     def _more(self) -> list[str]:
-        left = len(self._rows) - _SHOWN
-        return [f"... and {left} more"] if left > 0 else []
+        n_more = len(self._rows) - _SHOWN
+        return [f"... and {n_more} more"] if n_more > 0 else []
 
 
 def _text(value: Any) -> str:

@@ -160,8 +160,8 @@ def _columns(path: Path, line: int, cells: list[str]) -> list[str]:
     place = f"line {line}"
     for column in columns:
         if column not in _COLUMNS:
-            what = f"{_quoted(column)} is no column"
-            raise BadInput(path, place, what, hint=hint_of_choice(column, _COLUMNS))
+            fault = f"{_quoted(column)} is no column"
+            raise BadInput(path, place, fault, hint=hint_of_choice(column, _COLUMNS))
         if columns.count(column) > 1:
             raise BadInput(path, place, f"has the column {column} twice")
     for column in _COLUMNS:
@@ -185,10 +185,10 @@ def _table_row(path: Path, line: int, cells: dict[str, str]) -> ClassRule:
     if int(number) and not name:
         raise BadInput(path, place, f"class {number} has no name")
     if name != shown(name):
-        what = f"name {_quoted(name)} is too long or cannot be printed"
-        raise BadInput(path, place, what, hint=f"at most {MAX_NAME} characters")
-    known = (*NYU40_NAMES, *_KINDS)
-    if _WILD.isdisjoint(word) and word not in known:
+        fault = f"name {_quoted(name)} is too long or cannot be printed"
+        raise BadInput(path, place, fault, hint=f"at most {MAX_NAME} characters")
+    names = (*NYU40_NAMES, *_KINDS)
+    if _WILD.isdisjoint(word) and word not in names:
         # A word similar to a class is a misspelt one; others are names of a source or an item.
         near = get_close_matches(word[:MAX_NAME], NYU40_NAMES, n=1, cutoff=_MISSPELT)
         if near:

@@ -161,13 +161,13 @@ def gltf_from_glb(data: bytes, file: str) -> Gltf:
 def _chunks(data: bytes, length: int, file: str) -> dict[int, bytes]:
     # Chunks: length, kind, bytes; the first of each kind counts.
     chunks: dict[int, bytes] = {}
-    at = 12
-    while at + 8 <= length:
-        size, kind = struct.unpack_from("<II", data, at)
-        if at + 8 + size > length:
-            raise BadHouse(file, f"byte {at}", "chunk reaches past the end")
-        chunks.setdefault(kind, data[at + 8 : at + 8 + size])
-        at += 8 + size
+    offset = 12
+    while offset + 8 <= length:
+        size, kind = struct.unpack_from("<II", data, offset)
+        if offset + 8 + size > length:
+            raise BadHouse(file, f"byte {offset}", "chunk reaches past the end")
+        chunks.setdefault(kind, data[offset + 8 : offset + 8 + size])
+        offset += 8 + size
     return chunks
 
 
@@ -177,8 +177,8 @@ def entry(gltf: Gltf, kind: str, index: Any) -> dict[str, Any]:
     fits = isinstance(entries, list) and isinstance(index, int) and not isinstance(index, bool)
     if not fits or not 0 <= index < len(entries) or not isinstance(entries[index], dict):
         raise BadHouse(gltf.file, f"{kind}[{index}]", "does not exist")
-    found: dict[str, Any] = entries[index]
-    return found
+    value: dict[str, Any] = entries[index]
+    return value
 
 
 def count(gltf: Gltf, holder: dict[str, Any], key: str, place: str, default: int = 0) -> int:
@@ -247,8 +247,8 @@ def _sparse_array(
 ) -> NDArray[Any]:
     """Zeros, or the accessor's own data, with some elements replaced (glTF 2.0, section 3.6.2.3)."""
     sparse = accessor["sparse"]
-    held = sparse if isinstance(sparse, dict) else {}
-    parts: list[dict[str, Any]] = [held.get(k, {}) for k in ("indices", "values")]
+    table = sparse if isinstance(sparse, dict) else {}
+    parts: list[dict[str, Any]] = [table.get(k, {}) for k in ("indices", "values")]
     if not all(isinstance(part, dict) and part for part in parts):
         raise BadHouse(gltf.file, f"{place}.sparse", "expected indices and values")
     n, n_given = count(gltf, accessor, "count", place), count(gltf, sparse, "count", place)

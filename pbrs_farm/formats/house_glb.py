@@ -46,7 +46,7 @@ def glb_from_house(house: House) -> bytes:
             node["mesh"] = len(meshes)
             meshes.append({"name": item.name or item.id, "primitives": primitives})
         nodes.append(node)
-    images, kept = write_textures(writer, house.textures)
+    images, textures = write_textures(writer, house.textures)
     # glTF allows no empty list of nodes.
     scene = {"name": house.name} | ({"nodes": list(range(len(nodes)))} if nodes else {})
     return writer.glb(
@@ -57,10 +57,10 @@ def glb_from_house(house: House) -> bytes:
             "nodes": nodes,
             "meshes": meshes,
             "materials": [gltf_material(m, images) for m in house.materials],
-            "images": [image for image in kept if "name" in image],
+            "images": [image for image in textures if "name" in image],
             "samplers": [{"wrapS": _REPEAT, "wrapT": _REPEAT}] if images else [],
             "textures": [{"source": i, "sampler": 0} for i in range(len(images))],
-            "extras": {"house": house.id, "textures": [x["bufferView"] for x in kept]},
+            "extras": {"house": house.id, "textures": [x["bufferView"] for x in textures]},
         }
     )
 
@@ -135,14 +135,14 @@ def write_textures(
     bytes without an image: our reader finds it again, a viewer shows the plain colour.
     """
     images: dict[str, int] = {}
-    kept: list[dict[str, Any]] = []
+    rows: list[dict[str, Any]] = []
     for key, texture in textures.items():
         view: dict[str, Any] = {"bufferView": writer.add_bytes(texture.data)}
         if texture.media_type in GLTF_IMAGES:
             images[key] = len(images)
             view |= {"mimeType": texture.media_type, "name": texture.name or texture.id}
-        kept.append(view)
-    return images, kept
+        rows.append(view)
+    return images, rows
 
 
 def gltf_material(material: Material, images: dict[str, int]) -> dict[str, Any]:

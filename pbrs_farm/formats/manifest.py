@@ -47,5 +47,5 @@ def lines_by_house(manifest: bytes) -> Iterator[tuple[str, bytes]]:
 
 
 def _house_of_line(line: bytes) -> str:
-    at = keys.parse_house_key(json.loads(line)["key"])
-    return at.house if at is not None else ""
+    parts = keys.parse_house_key(json.loads(line)["key"])
+    return parts.house if parts is not None else ""

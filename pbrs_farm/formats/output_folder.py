@@ -108,15 +108,15 @@ def _house(folder: Path) -> OutputHouse:
 
 
 def _outlines(rooms: Any) -> dict[str, RoomOutline]:
-    found = {}
+    outlines = {}
     for room in rooms:
         try:
             polygon, floor_y = np.array(room["polygon"], np.float64), float(room["floor_y"])
         except (KeyError, TypeError, ValueError):
             continue
         if polygon.ndim == 2 and polygon.shape[1] == 2 and len(polygon) >= 3:
-            found[str(room["id"])] = RoomOutline(polygon, floor_y)
-    return found
+            outlines[str(room["id"])] = RoomOutline(polygon, floor_y)
+    return outlines
 
 
 def _first(words: Any) -> str:

@@ -177,6 +177,6 @@ def _shaped(
     if array.ndim != len(shape) or any(
         w is not None and w != n for w, n in zip(shape, array.shape)
     ):
-        wanted = ", ".join("any" if n is None else str(n) for n in shape)
-        raise ValueError(f"expected shape ({wanted}), got {array.shape}")
+        expected = ", ".join("any" if n is None else str(n) for n in shape)
+        raise ValueError(f"expected shape ({expected}), got {array.shape}")
     return array

@@ -34,13 +34,13 @@ def tracks_npz(tracks: object, frames: Sequence[str]) -> bytes:
 def tracks_from_npz(data: bytes, place: str) -> Mapping[str, NDArray[Any]]:
     """Name -> array of what tracks_npz wrote, "frames" among them; BadInput names place."""
     try:
-        with np.load(io.BytesIO(data), allow_pickle=False) as held:
-            found = {name: held[name] for name in ("frames", *ARRAYS)}
+        with np.load(io.BytesIO(data), allow_pickle=False) as archive:
+            arrays = {name: archive[name] for name in ("frames", *ARRAYS)}
     except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
         raise BadInput(place, "", f"not a tracks.npz: {error}") from None
-    n, t = len(found["query_frame"]), len(found["frames"])
+    n, t = len(arrays["query_frame"]), len(arrays["frames"])
     shapes = {1: (n,), 2: (n, t), 3: (n, t, 2)}
     for name, (kind, axes) in ARRAYS.items():
-        if found[name].dtype != kind or found[name].shape != shapes[axes]:
+        if arrays[name].dtype != kind or arrays[name].shape != shapes[axes]:
             raise BadInput(place, name, f"expected {kind} {shapes[axes]}")
-    return found
+    return arrays

@@ -45,7 +45,7 @@ def view_description(
         **table,
         "warnings": warnings,
         "recipe": recipe_digest,
-        "modes": {step: said for step, said in facts.items() if step != "truth"},
+        "modes": {step: step_facts for step, step_facts in facts.items() if step != "truth"},
         "versions": versions,
     }
 

@@ -162,8 +162,8 @@ def _move(house: House, edit: MoveItems, _fields: ReadFields) -> House:
 def _open(house: House, edit: OpenJoints, _fields: ReadFields) -> House:
     for index, part in _joints_named(house, edit.joints):
         house = opened(house, index, part, edit.share)
-    held = set(edit.joints)
-    motions = tuple(m for m in house.motions if (m.item, m.part) not in held)
+    edited = set(edit.joints)
+    motions = tuple(m for m in house.motions if (m.item, m.part) not in edited)
     return replace(house, motions=motions)
 
 
@@ -337,16 +337,16 @@ def _with_materials(
 
 
 def _changed(house: House, ids: Collection[str], change: Callable[[Item], Item]) -> House:
-    wanted = frozenset(ids)
-    _found(house, wanted)
-    return house.with_items(change(item) if item.id in wanted else item for item in house.items)
+    item_ids = frozenset(ids)
+    _found(house, item_ids)
+    return house.with_items(change(item) if item.id in item_ids else item for item in house.items)
 
 
 def _found(house: House, ids: Collection[str]) -> None:
-    known = {item.id for item in house.items if not item.is_removed}
+    present = {item.id for item in house.items if not item.is_removed}
     for name in ids:
-        if name not in known:
-            raise BadInput(house.id, name, "no such item", hint=did_you_mean(name, sorted(known)))
+        if name not in present:
+            raise BadInput(house.id, name, "no such item", hint=did_you_mean(name, sorted(present)))
 
 
 def _file(path: str, sha256: str) -> bytes:

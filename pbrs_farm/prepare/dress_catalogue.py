@@ -30,11 +30,11 @@ def fetch_packages(words: str) -> None:
 
     The user's libraries are read: BadInput for a path that does not exist or is no catalogue.
     """
-    given = [word for word in words.split(":") if word]
-    if GENERATED not in given:
+    paths = [word for word in words.split(":") if word]
+    if GENERATED not in paths:
         furniture_package.fetch()
         homes_package.fetch()
-    if any(word != GENERATED for word in given):
+    if any(word != GENERATED for word in paths):
         catalogue_of_words(words)
 
 
@@ -43,9 +43,9 @@ def catalogue_of_words(words: str) -> Catalogue:
 
     A missing package is a note of the kind NO_FURNITURE. BadInput for a path that is no catalogue.
     """
-    given = [word for word in words.split(":") if word]
-    stamps = tuple((Path(word), _stamp(Path(word))) for word in given if word != GENERATED)
-    if GENERATED in given:
+    paths = [word for word in words.split(":") if word]
+    stamps = tuple((Path(word), _stamp(Path(word))) for word in paths if word != GENERATED)
+    if GENERATED in paths:
         return _catalogue(stamps, None)
     return _catalogue(stamps, furniture_package.PACKAGE in _cached_names())
 

@@ -65,10 +65,10 @@ def finished_house(
         >>> dressing is None
         True
     """
-    kept = before_edits or HouseBeforeEdits()
+    cache = before_edits or HouseBeforeEdits()
 
     def finish(other: SourceRef, fields: Recipe) -> FinishedHouse:
-        return finished_house(other, fields, before_edits=kept)
+        return finished_house(other, fields, before_edits=cache)
 
     work = Preparation(source, recipe, tell_share, finish)
     passes = [p for p in PASSES if p.is_needed(source, recipe)]
@@ -76,10 +76,10 @@ def finished_house(
         return _through(passes, work)
     # Begin from the house before its edits, and do what these add.
     bare = source.unedited
-    before = kept.get(bare, recipe)
+    before = cache.get(bare, recipe)
     if before is None:
-        before = finished_house(bare, recipe, tell_share, kept)
-        kept.keep(bare, recipe, before)
+        before = finished_house(bare, recipe, tell_share, cache)
+        cache.keep(bare, recipe, before)
     work = replace(work, current=before.house, report=before.report, dressing=before.dressing)
     return _through([p for p in passes if not p.is_needed(bare, recipe)], work)
 

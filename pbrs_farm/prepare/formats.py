@@ -50,7 +50,7 @@ def formats_of_plugins() -> tuple[Format, ...]:
 
 def format_of_kind(kind: str) -> Format | None:
     """The format of the sources of a kind, the first of several; None for a kind without files."""
-    return next((one for one in formats() if one.kind == kind), None)
+    return next((entry for entry in formats() if entry.kind == kind), None)
 
 
 def format_of_source(source: SourceRef) -> Format | None:
@@ -86,25 +86,25 @@ def format_of_file(path: Path, *, surely: bool = False) -> Format | None:
     surely: a suffix that files of other kinds share is not enough. Raises BadHouse for an unreadable file.
     """
     look = _Look(path)
-    found = next((one for one in formats() if look.is_of(one)), None)
-    if found is None and not surely and path.is_file():
+    match = next((entry for entry in formats() if look.is_of(entry)), None)
+    if match is None and not surely and path.is_file():
         suffix = path.suffix.lower()
-        found = next((one for one in formats() if suffix in one.suffixes), None)
-    return found
+        match = next((entry for entry in formats() if suffix in entry.suffixes), None)
+    return match
 
 
 def is_beside_homes(path: Path) -> bool:
     """True if a file name, in any case, belongs to a home beside it."""
-    patterns = [pattern for one in formats() for pattern in one.beside]
+    patterns = [pattern for entry in formats() for pattern in entry.beside]
     return any(fnmatch(path.name.lower(), pattern) for pattern in patterns)
 
 
 def summary() -> str:
     """All supported formats in one line, for hints."""
-    every = list(formats())
-    suffixes = dict.fromkeys(suffix for one in every for suffix in one.suffixes)
-    titles = dict.fromkeys(one.title for one in every if one.keys)
-    folders = [f"{one.files} of {one.title}" for one in every if one.main_file]
+    entries = list(formats())
+    suffixes = dict.fromkeys(suffix for one in entries for suffix in one.suffixes)
+    titles = dict.fromkeys(one.title for one in entries if one.keys)
+    folders = [f"{one.files} of {one.title}" for one in entries if one.main_file]
     return f"{' '.join(suffixes)}, .json of {', '.join(titles)}, {', '.join(folders)}"
 
 
@@ -151,25 +151,25 @@ class _Look:
 def _formats_of_packages() -> tuple[Format, ...]:
     names = [module.name for module in pkgutil.iter_modules(read.__path__) if module.ispkg]
     packages = [import_module(f"{read.__name__}.{name}") for name in names]
-    found = [p.FORMAT for p in packages if isinstance(getattr(p, "FORMAT", None), Format)]
-    return tuple(sorted(found, key=lambda one: one.order))
+    entries = [p.FORMAT for p in packages if isinstance(getattr(p, "FORMAT", None), Format)]
+    return tuple(sorted(entries, key=lambda one: one.order))
 
 
 @cache
 def _formats_of_plans() -> tuple[Format, ...]:
     from pbrs_farm.generate.plans.plan_files import plan_formats
 
-    names = [one.name for one in fields_of(DataFormat)]
+    names = [field.name for field in fields_of(DataFormat)]
     return tuple(
         Format(
-            **{name: getattr(one, name) for name in names},
+            **{name: getattr(field, name) for name in names},
             kind=PLAN,
             read=_read_plan,
             companions=_companions_of_plan,
             has_parts=True,
             has_box_only_items=True,
         )
-        for one in plan_formats()
+        for field in plan_formats()
     )
 
 
@@ -184,6 +184,6 @@ def _companions_of_plan(given: GivenFile, files: SourceFiles) -> str:
     if given.path.suffix.lower() != ".json":
         return ""
     folder = given.path.parent
-    names = dict.fromkeys(name for one in _formats_of_plans() for name in one.beside)
+    names = dict.fromkeys(name for entry in _formats_of_plans() for name in entry.beside)
     beside = [name for name in names if (folder / name).is_file()]
     return files.digest(RootFolder(folder), beside) if beside else ""

@@ -164,8 +164,10 @@ def _kinds_of_rooms(space: HouseSpace) -> dict[str, RoomKind]:
     """
     kinds = {room.room.id: room.kind for room in space.rooms}
     has_windows = any(room.windows for room in space.rooms)
-    others = [r for r in space.rooms if r.kind is RoomKind.OTHER and (r.windows or not has_windows)]
-    for room in sorted(others, key=lambda r: (-r.area.area, r.room.id)):
+    unnamed = [
+        r for r in space.rooms if r.kind is RoomKind.OTHER and (r.windows or not has_windows)
+    ]
+    for room in sorted(unnamed, key=lambda r: (-r.area.area, r.room.id)):
         if room.area.area >= _LEAST_LIVING_M2 and RoomKind.LIVING not in kinds.values():
             kinds[room.room.id] = RoomKind.LIVING
         elif room.area.area >= _LEAST_BEDROOM_M2:
@@ -233,8 +235,8 @@ def _is_wanting(
     if covered > most_covered * area:
         return False
     if kind not in _USES:
-        what = f"{room.room.name or 'a room without a name'} is empty and its use is not known"
-        mutable.notes.append(Note("not-furnished", f"room {room.room.id}", what))
+        text = f"{room.room.name or 'a room without a name'} is empty and its use is not known"
+        mutable.notes.append(Note("not-furnished", f"room {room.room.id}", text))
         return False
     return True
 
@@ -258,14 +260,14 @@ def _ground(bounds: F64) -> Polygon:
 
 def _standing(storey: _Storey, number: int, mutable: MutableHouse) -> list[Rect]:
     """Footprints of the room's furniture in the upright plan."""
-    found = []
+    footprints = []
     for n in _on_floor(storey.rooms[number], mutable):
         ground = shapely.affinity.rotate(
             _ground(mutable.items[n].bounds), storey.angle_rad, (0, 0), use_radians=True
         )
         x0, z0, x1, z1 = ground.bounds
-        found.append((x0, z0, x1, z1))
-    return found
+        footprints.append((x0, z0, x1, z1))
+    return footprints
 
 
 def _opening(
@@ -280,10 +282,10 @@ def _opening(
     kind = OpeningKind.DOOR
     if passage.is_window:
         kind = OpeningKind.WINDOW if sill > 0.3 else OpeningKind.FRENCH_WINDOW
-    other = sides[1] if len(sides) > 1 and sides[1] != sides[0] else None
+    far_side = sides[1] if len(sides) > 1 and sides[1] != sides[0] else None
     return (
-        PlanOpening(kind, wall, passage.width / 2, passage.width, height, sill, sides[0], other),
-        PlanWall(start, end, max(2 * min(passage.half_wall), 0.02), other is None),
+        PlanOpening(kind, wall, passage.width / 2, passage.width, height, sill, sides[0], far_side),
+        PlanWall(start, end, max(2 * min(passage.half_wall), 0.02), far_side is None),
     )
 
 
@@ -310,11 +312,11 @@ def _add(
         x, z = piece.x * cos - piece.z * sin, piece.x * sin + piece.z * cos
         x -= mx * math.cos(turn) + mz * math.sin(turn)
         z -= mz * math.cos(turn) - mx * math.sin(turn)
-        at = np.array([x, room.floor_y + piece.elevation - low[1], z])
+        position = np.array([x, room.floor_y + piece.elevation - low[1], z])
         item = mutable.placed(
             piece.piece,
             shape,
-            at,
+            position,
             turn,
             item_id=f"furnished_{len(mutable.items)}",
             room_id=room.id,

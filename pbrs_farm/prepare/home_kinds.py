@@ -170,8 +170,8 @@ def _finish_plugin(source: SourceRef, recipe: Recipe, finish: Finish) -> Finishe
         raise BadInput(source.location, "--dress", "a plugin dresses its homes itself")
     home = _plugin_home(source.location).make()
     groups = {path.partition(".")[0] for path, _value in home.settings}
-    if others := groups - _GROUPS_OF_PLUGINS:
-        text = f"sets recipe fields of {', '.join(sorted(others))}, which belong to the run"
+    if foreign := groups - _GROUPS_OF_PLUGINS:
+        text = f"sets recipe fields of {', '.join(sorted(foreign))}, which belong to the run"
         raise BadInput(source.location, "", text, hint="fields of read, dress and repair alone")
     finished = finish(home.source, with_settings(recipe, dict(home.settings)))
     return finished._replace(house=replace(finished.house, id=source.house_id))

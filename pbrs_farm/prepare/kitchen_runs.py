@@ -131,23 +131,23 @@ def kitchen_units(
         for item in (*counters, *hung)
         for run in _runs_of(item, floor_y, distance_to_wall, choose_front, is_hung=item in hung)
     ]
-    found: dict[str, list[Unit]] = {}
-    others = [i for i in items if i not in counters and i not in hung]
+    units: dict[str, list[Unit]] = {}
+    appliances = [i for i in items if i not in counters and i not in hung]
     whole = [r for r in runs if not r.is_hung and "kitchen" in words_of_item(r.item)]
     longest = max(whole, key=lambda r: r.length, default=None)
-    wanted = _missing(others) if longest else ()
+    invented = _missing(appliances) if longest else ()
     for run in runs:
-        modules = _modules_of(run, [] if run.is_hung else others)
+        modules = _modules_of(run, [] if run.is_hung else appliances)
         if run is longest:
-            modules = _with_invented(modules, wanted)
-        found.setdefault(run.item.id, [])
-        found |= {id_: [] for module in modules for id_ in module.absorbed}
+            modules = _with_invented(modules, invented)
+        units.setdefault(run.item.id, [])
+        units |= {id_: [] for module in modules for id_ in module.absorbed}
         for number, module in enumerate(modules):
             unit = _unit_of(module, number, run, chosen)
             if unit is not None:
-                found.setdefault((module.item or run.item).id, []).append(unit)
-        others = [i for i in others if i.id not in found]
-    return found
+                units.setdefault((module.item or run.item).id, []).append(unit)
+        appliances = [i for i in appliances if i.id not in units]
+    return units
 
 
 def _is_named_counter(item: Item) -> bool:
@@ -265,15 +265,15 @@ def _kind_of(item: Item) -> str:
     return "gap" if words & _BUILT_IN else "cooker" if words & _COOKERS else ""
 
 
-def _missing(others: Sequence[Item]) -> tuple[str, ...]:
-    kinds = {_kind_of(i) for i in others}
+def _missing(appliances: Sequence[Item]) -> tuple[str, ...]:
+    kinds = {_kind_of(i) for i in appliances}
     return tuple(kind for kind in ("cooker", "sink") if kind not in kinds)
 
 
-def _modules_of(run: _Run, others: Sequence[Item]) -> list[_Module]:
+def _modules_of(run: _Run, appliances: Sequence[Item]) -> list[_Module]:
     """The run from end to end: what the source puts into it, and cabinets between."""
     fixed: list[_Module] = []
-    inside = [(x, i) for i in others if _kind_of(i) and (x := run.along(i)) is not None]
+    inside = [(x, i) for i in appliances if _kind_of(i) and (x := run.along(i)) is not None]
     for x, item in sorted(inside, key=lambda row: row[0]):
         kind = _kind_of(item)
         assert item.box is not None
@@ -290,20 +290,22 @@ def _modules_of(run: _Run, others: Sequence[Item]) -> list[_Module]:
         low = min(low, run.length - width)
         if low >= (fixed[-1].high if fixed else 0.0) - 1e-6:
             fixed.append(_Module(low, low + width, kind, None if kind == "gap" else item))
-    found: list[_Module] = []
-    at = 0.0
+    modules: list[_Module] = []
+    place = 0.0
     for module in (*fixed, _Module(run.length, run.length, "gap")):
-        rest = module.low - at
+        rest = module.low - place
         if rest >= _NARROWEST_M:
             n = max(round(rest / MODULE_M), 1)
-            found += [_Module(at + rest * k / n, at + rest * (k + 1) / n, "base") for k in range(n)]
-        elif found and found[-1].kind != "gap":
-            found[-1] = found[-1]._replace(high=module.low)
+            modules += [
+                _Module(place + rest * k / n, place + rest * (k + 1) / n, "base") for k in range(n)
+            ]
+        elif modules and modules[-1].kind != "gap":
+            modules[-1] = modules[-1]._replace(high=module.low)
         elif module.kind != "gap":
-            module = module._replace(low=at)
-        found.append(module)
-        at = module.high
-    return found[:-1]
+            module = module._replace(low=place)
+        modules.append(module)
+        place = module.high
+    return modules[:-1]
 
 
 def _with_invented(modules: list[_Module], wanted: Sequence[str]) -> list[_Module]:
@@ -312,8 +314,8 @@ def _with_invented(modules: list[_Module], wanted: Sequence[str]) -> list[_Modul
     for kind, share in (("cooker", 1 / 3), ("sink", 2 / 3)):
         free = [k for k, m in enumerate(modules) if m.kind == "base"]
         if kind in wanted and len(free) > 1:
-            at = share * modules[-1].high
-            best = min(free, key=lambda k: abs((modules[k].low + modules[k].high) / 2 - at))
+            middle = share * modules[-1].high
+            best = min(free, key=lambda k: abs((modules[k].low + modules[k].high) / 2 - middle))
             modules[best] = modules[best]._replace(kind=kind)
     return modules
 

@@ -30,7 +30,7 @@ def opened(house: House, index: int, part: str, share: float) -> House:
     """
     value, notes = _reach(house, index, part, share)
     item = item_at(house.items[index], part, value)
-    items = tuple(item if k == index else other for k, other in enumerate(house.items))
+    items = tuple(item if k == index else unchanged for k, unchanged in enumerate(house.items))
     return replace(house, items=items, notes=(*house.notes, *notes))
 
 
@@ -49,7 +49,7 @@ def keyed(
     values = tuple((min(_value(joint, share), most),) for _time, share in keys_of_time)
     motion = Motion(house.items[index].id, part, tuple(t for t, _share in keys_of_time), values)
     item = item_at(house.items[index], part, values[0][0])
-    items = tuple(item if k == index else other for k, other in enumerate(house.items))
+    items = tuple(item if k == index else unchanged for k, unchanged in enumerate(house.items))
     house = replace(house, items=items, notes=(*house.notes, *notes))
     return with_motions(house, [motion])
 
@@ -57,8 +57,8 @@ def keyed(
 def with_motions(house: House, motions: Sequence[Motion]) -> House:
     """The house with these motions, instead of those that it has of the same parts."""
     new = {(motion.item, motion.part): motion for motion in motions}
-    kept = (m for m in house.motions if (m.item, m.part) not in new)
-    return replace(house, motions=(*kept, *new.values()))
+    unchanged = (m for m in house.motions if (m.item, m.part) not in new)
+    return replace(house, motions=(*unchanged, *new.values()))
 
 
 def _shut(house: House, index: int, part: str) -> House:
@@ -70,11 +70,11 @@ def _reach(house: House, index: int, part: str, share: float) -> tuple[float, tu
     """Reachable opening of a part of items[index] towards a share of its range, with notes."""
     item = house.items[index]
     joint = joint_of(item, part)
-    wanted = _value(joint, share)
-    value, stopped_by = free_value(SceneTriangles(house.items), index, part, wanted)
-    if wanted - value <= _NEAR:
+    target = _value(joint, share)
+    value, stopped_by = free_value(SceneTriangles(house.items), index, part, target)
+    if target - value <= _NEAR:
         return value, ()
-    text = f"stands open by {_amount(joint, value)} of {_amount(joint, wanted)}"
+    text = f"stands open by {_amount(joint, value)} of {_amount(joint, target)}"
     return value, (Note(STOPPED, f"{item.id}/{part}", f"{text}: {stopped_by} is in its way"),)
 
 

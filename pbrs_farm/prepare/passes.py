@@ -266,10 +266,10 @@ def _repair(work: Preparation) -> Preparation:
     for k in range(_MAX_ROUNDS):
         work.tell_share(_DRESS_SHARE + (1 - _DRESS_SHARE) * k / _MAX_ROUNDS)
         house, report = repaired(dressed.house)
-        kept = refit_after_repair(house, dressed, catalogue_of(work.recipe.dress))
-        if kept is dressed:
+        refitted = refit_after_repair(house, dressed, catalogue_of(work.recipe.dress))
+        if refitted is dressed:
             break
-        dressed = kept
+        dressed = refitted
     else:
         house, report = repaired(dressed.house)
     return replace(work, current=house, report=report, dressing=dressed.report)

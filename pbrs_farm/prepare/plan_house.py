@@ -75,7 +75,7 @@ def box_only_items(house: House, storeys: Sequence[PlanStorey]) -> tuple[Item, .
     pieces that give no item.
     """
     levels = sorted(house.levels, key=lambda level: level.elevation)
-    found = []
+    items = []
     for number, (level, storey) in enumerate(zip(levels, storeys, strict=True)):
         for k, t in enumerate(storey.things):
             centre = (t.x, level.elevation + t.low + t.height / 2, t.z)
@@ -90,8 +90,8 @@ def box_only_items(house: House, storeys: Sequence[PlanStorey]) -> tuple[Item, .
                 level_id=level.id,
             )
             if item is not None:
-                found.append(item)
-    return tuple(found)
+                items.append(item)
+    return tuple(items)
 
 
 def furnish_plan_file(

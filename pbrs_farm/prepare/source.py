@@ -177,13 +177,13 @@ def saved_home(source: SourceRef) -> bytes:
 
 def _of_saved_home(path: Path, files: SourceFiles | None) -> SourceRef:
     """The source that saved_home wrote; BadHouse for a damaged file and for a home that has changed."""
-    held = checked(SavedHome, text_given(path, error=BadHouse).encode(), str(path), error=BadHouse)
-    if held.home.endswith(SAVED_SUFFIX):
+    saved = checked(SavedHome, text_given(path, error=BadHouse).encode(), str(path), error=BadHouse)
+    if saved.home.endswith(SAVED_SUFFIX):
         raise BadHouse(path, "home", "names another file of a home with edits")
-    (dressed,) = variants(resolve(held.home, files, models=held.models), [held.dress_seed])
-    source = dressed.edited(*held.edits) if held.edits else dressed
-    if source.house_id != held.house_id:
-        text = f"{held.home} is another home now than when this was saved"
+    (dressed,) = variants(resolve(saved.home, files, models=saved.models), [saved.dress_seed])
+    source = dressed.edited(*saved.edits) if saved.edits else dressed
+    if source.house_id != saved.house_id:
+        text = f"{saved.home} is another home now than when this was saved"
         raise BadHouse(path, "house_id", text, hint="save it again")
     return source
 
@@ -236,22 +236,22 @@ def _source_of(kind: str, location: str, files: SourceFiles, models: str, part: 
     if kind in HOME_KIND:
         return HOME_KIND[kind].source(location, files)
     bare = SourceRef(kind=kind, location=location, house_id="", sha256="", models=models, part=part)
-    entry, given = format_of_source(bare), bare.given
+    entry, file = format_of_source(bare), bare.given
     if entry is None:
         raise BadHouse(location, "", f"is of a kind that is not read here: {kind}")
-    if entry.main_file and given.path.parent.name != "house":
-        raise BadHouse(given.path, "", "does not lie in a folder named house", hint=_ROOT_HINT)
-    sha = digest_of_file(given.path / entry.main_file if entry.main_file else given.path, files)
+    if entry.main_file and file.path.parent.name != "house":
+        raise BadHouse(file.path, "", "does not lie in a folder named house", hint=_ROOT_HINT)
+    sha = digest_of_file(file.path / entry.main_file if entry.main_file else file.path, files)
     # The id depends on the file alone, so companions never rename a house; a part is its own house.
-    stem = f"{given.path.stem}-{part}" if part else given.path.stem
+    stem = f"{file.path.stem}-{part}" if part else file.path.stem
     house_id = keys.house_id(stem, keys.digest(sha, part) if part else sha)
-    companions = entry.companions(given, files)
+    companions = entry.companions(file, files)
     if kind == "reader":
         (mark,) = marks_in_digest("readers", [location.partition(":")[0]])
         companions = keys.sha256("\n".join(filter(None, (mark, companions))).encode())
     return bare.model_copy(
         update={
-            "house_id": given.path.name if entry.main_file else house_id,
+            "house_id": file.path.name if entry.main_file else house_id,
             "sha256": sha,
             "companions": companions,
         }

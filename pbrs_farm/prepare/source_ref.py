@@ -54,14 +54,14 @@ class SourceRef(Record):
         """The same house, dressed or not, before its edits."""
         if not self.edits:
             return self
-        own = self.house_id.removesuffix(edited_id("", self.edits))
-        return self.model_copy(update={"house_id": own, "edits": ()})
+        bare_id = self.house_id.removesuffix(edited_id("", self.edits))
+        return self.model_copy(update={"house_id": bare_id, "edits": ()})
 
     def edited(self, *edits: Edit) -> SourceRef:
         """The same house with these edits after its own."""
-        every = (*self.edits, *edits)
-        house_id = edited_id(self.unedited.house_id, every)
-        return self.model_copy(update={"house_id": house_id, "edits": every})
+        all_edits = (*self.edits, *edits)
+        house_id = edited_id(self.unedited.house_id, all_edits)
+        return self.model_copy(update={"house_id": house_id, "edits": all_edits})
 
 
 def home_id(source: SourceRef) -> str:

@@ -102,13 +102,13 @@ def with_stand_ins(house: House, catalogue: Catalogue, how: How) -> House:
     box_only = [item for item in house.items if BOX_ONLY in item.tags]
     if not box_only:
         return house
-    left = replace(house, items=tuple(i for i in house.items if BOX_ONLY not in i.tags))
+    other_items = replace(house, items=tuple(i for i in house.items if BOX_ONLY not in i.tags))
     if how == "none":
         text = f"{len(box_only)} things that are given by their boxes alone are left out"
         return replace(
-            left, notes=(*house.notes, Note("box-only-left-out", house.source.file, text))
+            other_items, notes=(*house.notes, Note("box-only-left-out", house.source.file, text))
         )
-    with closing(MutableHouse(left, 0)) as mutable:
+    with closing(MutableHouse(other_items, 0)) as mutable:
         scene = _Scene(house, catalogue if how == "pieces" else None)
         units = _units_of_kitchens(box_only, scene)
         # Supports come before their contents.
@@ -118,15 +118,15 @@ def with_stand_ins(house: House, catalogue: Catalogue, how: How) -> House:
             else:
                 _stand_in(mutable, item, scene)
         mutable.notes += scene.notes()
-        made = mutable.frozen()
+        finished = mutable.frozen()
     owed = sorted(
         {(p.creator or p.library, p.licence) for p in mutable.used.values() if "BY" in p.licence}
     )
     if not owed:
-        return made
+        return finished
     credit = "; ".join(f"{creator}, {licence}" for creator, licence in owed)
     line = "; ".join(t for t in (house.source.attribution, f"furniture: {credit}, modified") if t)
-    return replace(made, source=replace(made.source, attribution=line))
+    return replace(finished, source=replace(finished.source, attribution=line))
 
 
 class _Place(NamedTuple):
@@ -170,7 +170,7 @@ class _Scene:
 
     def notes(self) -> list[Note]:
         """One note a kind of what became no piece."""
-        found = []
+        notes = []
         for kind, text, names in (
             ("stand-in-box", "have no piece that fits and are plain boxes", self.boxes),
             ("box-only-left-out", "reach into walls and are left out", self.in_walls),
@@ -178,8 +178,8 @@ class _Scene:
             if names:
                 most = ", ".join(f"{n} {name}" for name, n in names.most_common(5))
                 text = f"{names.total()} things {text}: {most}"
-                found.append(Note(kind, self.house.source.file, text))
-        return found
+                notes.append(Note(kind, self.house.source.file, text))
+        return notes
 
     def place_of(self, item: Item) -> _Place | None:
         """The room that a box-only item names, else the nearest on its storey; None = outside all rooms."""
@@ -190,7 +190,7 @@ class _Scene:
     def _find_place(self, item: Item) -> _Place | None:
         assert item.box is not None
         x, y, z = (float(v) for v in item.box.centre)
-        here, best = Point(x, z), None
+        middle, best = Point(x, z), None
         nearest = _MOST_IN_WALL_M
         for place in self._places:
             room = place.room
@@ -202,7 +202,7 @@ class _Scene:
                 continue
             if not (x0 - nearest <= x <= x1 + nearest and z0 - nearest <= z <= z1 + nearest):
                 continue
-            away = place.outline.distance(here)
+            away = place.outline.distance(middle)
             if away < nearest:
                 best, nearest = place, away
         return best
@@ -222,18 +222,18 @@ class _Scene:
         """True if the bottom of an item's box is on or inside another box."""
         assert item.box is not None
         low = float(item.box.centre[1] - item.box.half[1])
-        here = Point(*item.box.centre[[0, 2]])
+        middle = Point(*item.box.centre[[0, 2]])
         feet, tops = (self._centres[:, 1] + s * self._halves[:, 1] for s in (-1, 1))
         away = np.hypot(*(self._centres - item.box.centre)[:, [0, 2]].T)
         reach = np.hypot(self._halves[:, 0], self._halves[:, 2]) + _OVER_EDGE_M
         near = (feet + _ON_FLOOR_M < low) & (low < tops + _ON_TOP_M) & (away <= reach)
-        for other in (self._box_only[n] for n in np.flatnonzero(near)):
-            assert other.box is not None
-            if other.id == item.id:
+        for support in (self._box_only[n] for n in np.flatnonzero(near)):
+            assert support.box is not None
+            if support.id == item.id:
                 continue
-            if other.id not in self._grounds:
-                self._grounds[other.id] = _ground(other.box).buffer(_OVER_EDGE_M)
-            if self._grounds[other.id].contains(here):
+            if support.id not in self._grounds:
+                self._grounds[support.id] = _ground(support.box).buffer(_OVER_EDGE_M)
+            if self._grounds[support.id].contains(middle):
                 return True
         return False
 
@@ -286,9 +286,9 @@ def _units_of_kitchens(box_only: list[Item], scene: _Scene) -> dict[str, list[Un
         if place is not None and target is not None:
             row = by_room.setdefault(place.room.id, (place, []))
             row[1].append(replace(item, box=target))
-    found: dict[str, list[Unit]] = {}
+    units: dict[str, list[Unit]] = {}
     for place, items in by_room.values():
-        found |= kitchen_units(
+        units |= kitchen_units(
             items,
             place.room.floor_y,
             scene.catalogue,
@@ -297,7 +297,7 @@ def _units_of_kitchens(box_only: list[Item], scene: _Scene) -> dict[str, list[Un
             distance_to_wall=place.outline.exterior.distance,
             choose_front=partial(_likeliest_front, place=place, scene=scene),
         )
-    return found
+    return units
 
 
 def _likeliest_front(boxes: Sequence[Box], place: _Place, scene: _Scene) -> int:
@@ -341,9 +341,9 @@ def _stand_in(mutable: MutableHouse, item: Item, scene: _Scene) -> None:
     if surface_y is not None:
         # The support may be lower or higher than in the source.
         target = _from(target, surface_y, surface_y + 2 * float(target.half[1]))
-    found = _chosen(item, target, place, scene) if scene.catalogue else None
-    if found is not None and scene.catalogue is not None:
-        turned, fit = found
+    fit_and_shape = _chosen(item, target, place, scene) if scene.catalogue else None
+    if fit_and_shape is not None and scene.catalogue is not None:
+        turned, fit = fit_and_shape
         shape = scene.catalogue.shape(fit.piece)
         if shape is not None:
             placed = _placed(mutable, item, turned, fit, shape, place)
@@ -551,12 +551,14 @@ def _placed(
         # The tap rises above the rim that the source measures.
         target = _from(target, base, base + float(high[1] - low[1]))
     deeper = max(float(high[2] - low[2]) / 2 - float(target.half[2]), 0.0)
-    at = target.centre + deeper * front - np.array([mx * cos + mz * sin, 0.0, mz * cos - mx * sin])
-    at[1] = base - low[1]
+    position = (
+        target.centre + deeper * front - np.array([mx * cos + mz * sin, 0.0, mz * cos - mx * sin])
+    )
+    position[1] = base - low[1]
     placed = mutable.placed(
         fit.piece,
         shape,
-        at,
+        position,
         turn_rad,
         item_id=item.id,
         room_id=_room_id(item, place),

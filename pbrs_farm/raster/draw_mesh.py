@@ -91,7 +91,7 @@ def move_item(mesh: DrawMesh, instance: int, item: Item) -> slice:
 
 def _draws_of_item(item: Item) -> list[tuple[int, F32, I64]]:
     """(material, vertices, faces into them) of an item's draws, material by material."""
-    found = []
+    draws = []
     for material in dict.fromkeys(s.material for s in item.surfaces):
         vertices, faces, n = [], [], 0
         for surface in item.surfaces:
@@ -100,8 +100,8 @@ def _draws_of_item(item: Item) -> list[tuple[int, F32, I64]]:
                 vertices.append(v)
                 faces.append(f + n)
                 n += len(v)
-        found.append((material, np.concatenate(vertices), np.concatenate(faces)))
-    return found
+        draws.append((material, np.concatenate(vertices), np.concatenate(faces)))
+    return draws
 
 
 def _box(vertices: F32, faces: I64) -> tuple[F32, F32]:
@@ -120,12 +120,12 @@ def _vertices(surface: Surface) -> tuple[F32, I64]:
     # Split vertices where a normal is missing or not of unit length: faces have their own there.
     if normals is None or not _is_unit(normals[faces.reshape(-1)]).all():
         corner = faces.reshape(-1)
-        own = unit_normals(triangle_corners(points, faces))
-        own[~own.any(1)] = (0.0, 1.0, 0.0)  # up, where a triangle has no area
-        flat = np.repeat(own.astype(np.float32), 3, axis=0)
+        face_normals = unit_normals(triangle_corners(points, faces))
+        face_normals[~face_normals.any(1)] = (0.0, 1.0, 0.0)  # up, where a triangle has no area
+        flat = np.repeat(face_normals.astype(np.float32), 3, axis=0)
         if normals is not None:
-            given = normals[corner]
-            flat = np.where(_is_unit(given)[:, None], given, flat)
+            vertex_normals = normals[corner]
+            flat = np.where(_is_unit(vertex_normals)[:, None], vertex_normals, flat)
         points, normals, uvs = points[corner], flat, uvs[corner]
         faces = np.arange(len(corner)).reshape(-1, 3)
     finite_uvs = np.where(np.isfinite(uvs), uvs, np.float32(0))

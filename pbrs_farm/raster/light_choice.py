@@ -127,8 +127,8 @@ def _spread_points(items: list[Item]) -> tuple[F64, F64, I64]:
         return np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, np.int64)
     # Choose faces at even steps of the running area, and a uniform point in each.
     rng = np.random.default_rng(0)
-    at = (np.arange(_N_FLOOR_POINTS) + 0.5) / _N_FLOOR_POINTS * area.sum()
-    face = np.searchsorted(np.cumsum(area), at).clip(0, len(area) - 1)
+    areas = (np.arange(_N_FLOOR_POINTS) + 0.5) / _N_FLOOR_POINTS * area.sum()
+    face = np.searchsorted(np.cumsum(area), areas).clip(0, len(area) - 1)
     uv = rng.random((len(face), 2))
     uv = np.where(uv.sum(1, keepdims=True) > 1, 1 - uv, uv)
     t = triangles[face]

@@ -93,8 +93,10 @@ class Rasterizer:
         self._light_bytes = 4 * (4 + LIGHT_FLOATS * n_lights)
         # Upload the textures in use; a material without one samples a white texel.
         used = {m.texture_id for m in house.materials}
-        wanted = ((name, pixels) for name, pixels in sorted(textures.items()) if name in used)
-        uploaded = {name: texture_from_pixels(gl, pixels) for name, pixels in wanted}
+        used_textures = (
+            (name, pixels) for name, pixels in sorted(textures.items()) if name in used
+        )
+        uploaded = {name: texture_from_pixels(gl, pixels) for name, pixels in used_textures}
         white = texture_from_pixels(gl, np.full((1, 1, 3), 255, np.uint8))
         self._textures = [uploaded.get(m.texture_id or "", white) for m in house.materials]
 
@@ -156,8 +158,8 @@ class Rasterizer:
         cameras, faces = pinholes_of(camera)
         forward = camera.towards if len(cameras) == 1 else np.zeros(3)
         linear = linear_from_srgb(np.arange(256) / 255).astype(np.float32)
-        found = faces.bilinear([linear[self._render(c, mode, forward)] for c in cameras])
-        return np.rint(np.clip(srgb_from_linear(found), 0, 1) * 255).astype(np.uint8)
+        picture = faces.bilinear([linear[self._render(c, mode, forward)] for c in cameras])
+        return np.rint(np.clip(srgb_from_linear(picture), 0, 1) * 255).astype(np.uint8)
 
     def _render(self, camera: Camera, mode: str, forward: F64) -> Srgb8Image:
         """forward (3,): direction of the headlight; 0 = at the eye."""
@@ -208,9 +210,9 @@ class Rasterizer:
                 self._draw(vao, int(draw))
         target.prepass_depth.use(1)
         # Keep whatever may be seen through, unasked.
-        kept = ~is_solid
-        kept[is_solid] = [self._queries[draw].samples > 0 for draw in draws[is_solid]]
-        return np.asarray(draws[kept])
+        visible = ~is_solid
+        visible[is_solid] = [self._queries[draw].samples > 0 for draw in draws[is_solid]]
+        return np.asarray(draws[visible])
 
     def _begin_surfaces(
         self, mode: str, features: int, camera: Camera, clip: F64, forward: F64

@@ -76,10 +76,10 @@ class Caster:
         geometry: like this caster's own, except that vertices of the moving faces (F,) are moved rigidly. Hits
         equal those of a caster of that geometry, except for ties.
         """
-        other = copy.copy(self)
-        other.geometry = geometry
-        other._begin(self._hittable, _StillFaces(~moving, self._tracers_of_still))
-        return other
+        caster = copy.copy(self)
+        caster.geometry = geometry
+        caster._begin(self._hittable, _StillFaces(~moving, self._tracers_of_still))
+        return caster
 
     def hit_record(self, camera: Camera, *, skip_faces: Bools | None = None) -> HitRecord:
         """The first hit of the ray through each pixel's centre (rule 8).
@@ -203,8 +203,8 @@ def _tracer_of_both(
     if moving.any():
         build = ScalarTracer if variant.startswith("scalar") else JitTracer
         parts.append(PartTracer(geometry, moving, partial(build, variant)))
-    found = [tracer for tracer in parts if tracer is not None]
-    return NearestTracer(*found) if len(found) == 2 else next(iter(found), None)
+    tracers = [tracer for tracer in parts if tracer is not None]
+    return NearestTracer(*tracers) if len(tracers) == 2 else next(iter(tracers), None)
 
 
 def _tracer(variant: str, geometry: Geometry, keep: Bools) -> RayTracer | None:

@@ -58,11 +58,11 @@ class CutOutTracer:
         if len(pixels):
             origins, directions, _blind = rays_of_pixels(camera)
             reach = np.full(len(pixels), np.inf, np.float32)
-            found = self._past_holes(
+            hits = self._past_holes(
                 origins[pixels], directions[pixels], reach, face.ravel()[pixels]
             )
             face = face.copy()
-            face.ravel()[pixels] = found[1]
+            face.ravel()[pixels] = hits[1]
         return face
 
     def first_hit(self, origins: F32, directions: F32, max_distance: F32) -> tuple[F32, I32]:
@@ -70,12 +70,10 @@ class CutOutTracer:
         rays = self._unsure(face)
         if len(rays):
             t, face = t.copy(), face.copy()
-            found = self._past_holes(
-                origins[rays], directions[rays], max_distance[rays], face[rays]
-            )
+            hits = self._past_holes(origins[rays], directions[rays], max_distance[rays], face[rays])
             # Keep the tracer's own distance for hits that are not holes.
-            t[rays] = np.where(found[1] == face[rays], t[rays], found[0])
-            face[rays] = found[1]
+            t[rays] = np.where(hits[1] == face[rays], t[rays], hits[0])
+            face[rays] = hits[1]
         return t, face
 
     def counts(
@@ -93,8 +91,10 @@ class CutOutTracer:
             reach = np.full(len(origins), np.inf, np.float32)
             _t, face = self.first_hit(origins, directions, reach)
             ends = np.cumsum([len(r[1]) for r in rays])
-            for k, own, (_o, _d, blind) in zip(part, np.split(face, ends[:-1]), rays, strict=True):
-                picture = faces_as_picture(own, cameras[k], blind)
+            for k, camera_faces, (_o, _d, blind) in zip(
+                part, np.split(face, ends[:-1]), rays, strict=True
+            ):
+                picture = faces_as_picture(camera_faces, cameras[k], blind)
                 counts[k, :n_labels] = counted_labels(picture, face_label, n_labels)
         return np.ascontiguousarray(counts[:, :n_labels])
 
@@ -114,22 +114,24 @@ class CutOutTracer:
         )
 
         # Go through the sheets before it, those rays alone whose last one had a hole.
-        here = t[rays]
+        ray_t = t[rays]
         for _ in range(_MOST_SHEETS):
-            begin = here + self._step(o[rays] + here[:, None] * d[rays], d[rays])
-            left = np.minimum(found_t[rays], reach[rays]) - begin
-            before = left > 0
-            rays, begin, left = rays[before], begin[before], left[before]
+            begin = ray_t + self._step(o[rays] + ray_t[:, None] * d[rays], d[rays])
+            remaining = np.minimum(found_t[rays], reach[rays]) - begin
+            before = remaining > 0
+            rays, begin, remaining = rays[before], begin[before], remaining[before]
             if not len(rays):
                 break
             starts = (o[rays] + begin[:, None] * d[rays]).astype(np.float32)
-            more, sheet = _hits(self._sheets, starts, directions[rays], left.astype(np.float32))
-            met = sheet >= 0
-            rays, sheet, begin = rays[met], sheet[met], begin[met] + more[met]
+            more, sheet = _hits(
+                self._sheets, starts, directions[rays], remaining.astype(np.float32)
+            )
+            is_hit = sheet >= 0
+            rays, sheet, begin = rays[is_hit], sheet[is_hit], begin[is_hit] + more[is_hit]
             exact, hole = pierced_holes(self._geometry, self._cut_outs, sheet, o[rays], d[rays])
             solid = ~hole
             found_t[rays[solid]], found[rays[solid]] = exact[solid], sheet[solid]
-            rays, here = rays[hole], begin[hole]
+            rays, ray_t = rays[hole], begin[hole]
         return found_t, found
 
     def _step(self, points: F64, directions: F64) -> F64:

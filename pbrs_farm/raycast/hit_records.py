@@ -98,11 +98,13 @@ def _intersect(
 
     # Clamp to the triangle what falls beside it; a ray within the plane takes its middle.
     beside = np.flatnonzero(~((weights.T >= 0).all(0) & np.isfinite(t)))
-    held = np.nan_to_num(weights[beside], nan=1.0, posinf=1.0, neginf=0.0).clip(0.0, 1.0)
-    held /= held.sum(1, keepdims=True)
-    weights[beside] = held
+    clipped = np.nan_to_num(weights[beside], nan=1.0, posinf=1.0, neginf=0.0).clip(0.0, 1.0)
+    clipped /= clipped.sum(1, keepdims=True)
+    weights[beside] = clipped
     k = local[beside]
-    point = held[:, :1] * planes.a[k] + held[:, 1:2] * planes.b[k] + held[:, 2:] * planes.c[k]
+    point = (
+        clipped[:, :1] * planes.a[k] + clipped[:, 1:2] * planes.b[k] + clipped[:, 2:] * planes.c[k]
+    )
     way = point - planes.origin
     t[beside] = np.linalg.norm(way, axis=1) if axis is None else way @ axis
     return t, weights

@@ -56,20 +56,22 @@ class NearestTracer:
         self._first, self._second = first, second
 
     def faces_of_camera(self, camera: Camera) -> I32:
-        face, other = (t.faces_of_camera(camera) for t in (self._first, self._second))
-        found = np.where(face >= 0, face, other)
-        both = np.flatnonzero((face >= 0) & (other >= 0))
-        if len(both):
+        face, second_face = (t.faces_of_camera(camera) for t in (self._first, self._second))
+        nearest = np.where(face >= 0, face, second_face)
+        both_hit = np.flatnonzero((face >= 0) & (second_face >= 0))
+        if len(both_hit):
             origins, directions, _blind = rays_of_pixels(camera)
-            reach = np.full(len(both), np.inf, np.float32)
-            _t, found.ravel()[both] = self.first_hit(origins[both], directions[both], reach)
-        return found
+            reach = np.full(len(both_hit), np.inf, np.float32)
+            _t, nearest.ravel()[both_hit] = self.first_hit(
+                origins[both_hit], directions[both_hit], reach
+            )
+        return nearest
 
     def first_hit(self, origins: F32, directions: F32, max_distance: F32) -> tuple[F32, I32]:
         t, face = self._first.first_hit(origins, directions, max_distance)
-        other_t, other = self._second.first_hit(origins, directions, max_distance)
+        other_t, second_face = self._second.first_hit(origins, directions, max_distance)
         is_nearer = other_t < t
-        return np.where(is_nearer, other_t, t), np.where(is_nearer, other, face)
+        return np.where(is_nearer, other_t, t), np.where(is_nearer, second_face, face)
 
     def counts(
         self, cameras: Sequence[Camera], face_label: NDArray[np.uint32], n_labels: int

@@ -72,15 +72,15 @@ def llvm_libraries() -> list[tuple[tuple[int, ...], Path]]:
     """
     of_python = (sys.prefix, site.getuserbase())
     patterns = (*_LIBRARY_PLACES, *(f"{folder}/lib/libLLVM*.so*" for folder in of_python))
-    found: dict[Path, tuple[int, ...]] = {}
+    libraries: dict[Path, tuple[int, ...]] = {}
     for pattern in patterns:
         root = Path(Path(pattern).anchor)
         for path in root.glob(str(Path(pattern).relative_to(root))):
             # A link and its target are one library.
             version = llvm_version(path)
             if version:
-                found[path.resolve()] = version
-    return sorted(((v, p) for p, v in found.items()), reverse=True)
+                libraries[path.resolve()] = version
+    return sorted(((v, p) for p, v in libraries.items()), reverse=True)
 
 
 def find_llvm() -> Path | None:

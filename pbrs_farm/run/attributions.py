@@ -25,12 +25,12 @@ def write_attribution(store: Store) -> None:
     Other workers may finish houses meanwhile: it looks again after writing, and stops when nothing
     is new. A root whose houses ask for no credit gets no file.
     """
-    seen: list[dict[str, str]] | None = None
+    last_rows: list[dict[str, str]] | None = None
     for _round in range(_ROUNDS):
         rows = dressing_rows(get_or_none(store, keys.MANIFEST) or b"")
-        if rows == seen:
+        if rows == last_rows:
             return
-        seen = rows
+        last_rows = rows
         write_attribution_of(store, rows)
 
 
@@ -74,15 +74,15 @@ def _paragraph(title: str, lines: set[str]) -> list[str]:
 
 def dressing_rows(manifest: bytes) -> list[dict[str, str]]:
     """The rows of every dress.json in a manifest; other lines, perhaps millions, are not parsed."""
-    found = re.finditer(rb"^.*/" + re.escape(keys.DRESS).encode() + rb".*$", manifest, re.MULTILINE)
-    return [json.loads(match[0]) for match in found]
+    lines = re.finditer(rb"^.*/" + re.escape(keys.DRESS).encode() + rb".*$", manifest, re.MULTILINE)
+    return [json.loads(match[0]) for match in lines]
 
 
 def _credits(store: Store, dressed: Iterable[str]) -> list[Credit]:
-    found: list[Credit] = []
+    credits: list[Credit] = []
     for key in dressed:
         try:
-            found += DressReport.model_validate_json(store.get(key)).credits
+            credits += DressReport.model_validate_json(store.get(key)).credits
         except (ObjectMissing, ValueError):
             continue  # made anew at this moment, or by another version: it comes with its own run
-    return found
+    return credits

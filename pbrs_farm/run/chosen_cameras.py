@@ -49,8 +49,8 @@ def with_lens(view: View, lens: LensFields, rig: RigFields | None = None) -> Vie
     chosen, place = view.camera.intrinsics, view.rig
     try:
         if rig is not None and place is not None:
-            own = next(camera for camera in rig.cameras if camera.name == place.camera)
-            intrinsics = own.intrinsics(chosen, lens)
+            rig_camera = next(camera for camera in rig.cameras if camera.name == place.camera)
+            intrinsics = rig_camera.intrinsics(chosen, lens)
         else:
             intrinsics = lens.intrinsics(chosen)
     except ValueError as error:

@@ -104,20 +104,20 @@ def _intrinsic_layers(
     denoise = work.recipe.light.denoise
     shading = shading_by_group(raw, diffuse, denoise=denoise, wraps=_wraps(work))
     key = keys.view_key(work.house_id, work.view_id or "", LAYER["albedo"].file)
-    found: dict[str, NDArray[np.float16]] = {}
+    layers: dict[str, NDArray[np.float16]] = {}
     for ending, groups in _GROUPS_OF_ENDING.items():
-        asked = [name for name in (f"shading{ending}", f"residual{ending}") if name in names]
-        if not asked:
+        asked_names = [name for name in (f"shading{ending}", f"residual{ending}") if name in names]
+        if not asked_names:
             continue
         total = sum((getattr(light, g.value) for g in groups), np.zeros_like(raw.outdoor))
         lit = sum((shading[g] for g in groups), np.zeros_like(raw.outdoor))
         albedo = np.zeros_like(lit)
-        if f"residual{ending}" in asked:
+        if f"residual{ending}" in asked_names:
             label = layer_from_bytes("albedo", work.store.get(key), key)
             albedo = linear_from_srgb(label / 255).astype(np.float32)
         parts = intrinsic_parts(total, albedo, lit)
-        found |= {name: parts[name.startswith("residual")] for name in asked}
-    return found
+        layers |= {name: parts[name.startswith("residual")] for name in asked_names}
+    return layers
 
 
 def _taken(
@@ -159,11 +159,11 @@ def _sensor_shot(
     now = setup()
     earlier = now.earlier_frames(_LAGS * fields.lag_s)
     denoise = work.recipe.light.denoise
-    wanted = tuple(
+    exposures = tuple(
         wanted_exposures(_glance(work, now.house, view), tone, denoise=denoise, wraps=_wraps(work))
         for _time_s, view in earlier
     )
-    return SensorShot(fields, seed, wanted, tuple(time_s for time_s, _view in earlier))
+    return SensorShot(fields, seed, exposures, tuple(time_s for time_s, _view in earlier))
 
 
 def _glance(work: Work, house: CachedHouse, view: View) -> LinearAovs:

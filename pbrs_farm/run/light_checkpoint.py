@@ -42,9 +42,9 @@ class LightCheckpoint:
         self._tell = tell
         self._clock = clock
         self._began_s = self._kept_s = self._told_s = clock()
-        found = self._found()
-        self.spent_s = found.spent_s if found else 0.0
-        self._loaded = found.parts if found else {}
+        parts = self._found()
+        self.spent_s = parts.spent_s if parts else 0.0
+        self._loaded = parts.parts if parts else {}
         self._states: dict[str, Callable[[], Arrays]] = {
             part: partial(self.kept, part) for part in self._loaded
         }
@@ -70,8 +70,8 @@ class LightCheckpoint:
 
     def _found(self) -> KeptParts | None:
         data = get_or_none(self._store, self._key)
-        found = None if data is None else checkpoint_from_npz(data)
-        return found if found and found.digest == self._digest else None
+        parts = None if data is None else checkpoint_from_npz(data)
+        return parts if parts and parts.digest == self._digest else None
 
     def _write(self, spent_s: float) -> None:
         parts = {part: state() for part, state in self._states.items()}

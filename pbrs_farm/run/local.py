@@ -33,7 +33,7 @@ def run_local(run: Run, observe: Observer = lambda _event: None) -> Summary:
     """
     store = store_from_url(run.store_url, run.store)
     summary = Summary()
-    summary.failures += [(shown(what, MAX_PLACE), text, "") for what, text in run.refused]
+    summary.failures += [(shown(word, MAX_PLACE), text, "") for word, text in run.refused]
     with _pool(run) as pool:
         # Let the processes load their libraries while the homes are looked for, and no others beside.
         pool.start()

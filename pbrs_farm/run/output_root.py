@@ -38,8 +38,8 @@ def finish_house(store: Store, house_id: str) -> int:
     Returns the number of objects that the markers list, whether or not the files exist. An equal manifest is
     not written again, since its date tells when the house last changed.
     """
-    found = [read_marker(store, k) for k in store.list(keys.house_key(house_id, "done/"))]
-    markers = [marker for marker in found if marker is not None]
+    read_markers = [read_marker(store, k) for k in store.list(keys.house_key(house_id, "done/"))]
+    markers = [marker for marker in read_markers if marker is not None]
     data = manifest_from_markers(markers, attribution(store, house_id))
     key = keys.house_key(house_id, keys.MANIFEST)
     if get_or_none(store, key) != data:
@@ -54,8 +54,8 @@ def finish_house(store: Store, house_id: str) -> int:
 
 def merge_manifests(store: Store, house_ids: list[str]) -> None:
     """Write the root's manifest.jsonl from those of the houses that have one, in the order of the ids."""
-    found = (keys.house_key(house_id, keys.MANIFEST) for house_id in sorted(house_ids))
-    store.put(keys.MANIFEST, b"".join(get_or_none(store, key) or b"" for key in found))
+    manifest_keys = (keys.house_key(house_id, keys.MANIFEST) for house_id in sorted(house_ids))
+    store.put(keys.MANIFEST, b"".join(get_or_none(store, key) or b"" for key in manifest_keys))
 
 
 def finish_root(store: Store, houses: Iterable[str]) -> None:
@@ -75,8 +75,8 @@ def claim_root(store: Store, recipe: Recipe, *, update: bool) -> None:
     data = json_bytes(recipe)
     if store.put_if_absent(keys.RECIPE, data):
         return
-    held = recipe_from_json(store.get(keys.RECIPE), f"{store.url}: recipe.json")
-    differing = differences(held, recipe)
+    present = recipe_from_json(store.get(keys.RECIPE), f"{store.url}: recipe.json")
+    differing = differences(present, recipe)
     if differing and not update:
         hint = "--update renders again what differs, or choose another output"
         raise BadRecipe(f"{store.url} holds another recipe: {'; '.join(differing)}", hint=hint)
@@ -97,9 +97,9 @@ def pull(of: Store, folder: Path, tell: Callable[[int], None] = lambda _n: None)
         tell(n_copied + n_there)
         if key == LAYOUT or key.startswith("jobs/"):
             continue  # of the store, not of the root
-        here = to.head(key) if key.startswith(tuple(f"{top}/" for top in keys.FOLDERS)) else None
-        there = of.head(key) if here is not None else None
-        if here is not None and there is not None and here.n_bytes == there.n_bytes:
+        copy = to.head(key) if key.startswith(tuple(f"{top}/" for top in keys.FOLDERS)) else None
+        original = of.head(key) if copy is not None else None
+        if copy is not None and original is not None and copy.n_bytes == original.n_bytes:
             n_there += 1
             continue
         to.put(key, of.get(key))

@@ -66,8 +66,8 @@ def wanted(
     modes: Iterable[str], layers: Iterable[str], n_views: int = 0, *, pairs: bool = False
 ) -> Wanted:
     """`Wanted` from words; no modes mean all of them. BadInput for an unknown word."""
-    asked = tuple(modes) or ALL_MODES
-    return wanted_of(Wanted(modes=asked, layers=tuple(layers), n_views=n_views, pairs=pairs))
+    chosen_modes = tuple(modes) or ALL_MODES
+    return wanted_of(Wanted(modes=chosen_modes, layers=tuple(layers), n_views=n_views, pairs=pairs))
 
 
 def check_layers(want: Wanted, recipe: Recipe) -> None:
@@ -89,8 +89,8 @@ def check_layers(want: Wanted, recipe: Recipe) -> None:
 def house_steps(want: Wanted, house_id: str) -> tuple[str, ...]:
     """Steps of a house in the order they run, before those of its views; no pairs and tracks of objects."""
     needed = [n for step in view_steps(want) for n in needed_of_house(step, house_id)]
-    asked = ("pairs",) * want.pairs + ("tracks",) * want.tracks
-    return ("house", "cameras", *needed, *(() if keys.is_object(house_id) else asked))
+    extra_steps = ("pairs",) * want.pairs + ("tracks",) * want.tracks
+    return ("house", "cameras", *needed, *(() if keys.is_object(house_id) else extra_steps))
 
 
 def needed_of_house(step: str, house_id: str) -> tuple[str, ...]:
@@ -152,15 +152,15 @@ def lit_views(
 
     floor_lux: room id -> lx by light group, of the step illuminance; views of rooms without a row remain.
     """
-    kept: list[tuple[str, str, float]] = []
+    bright: list[tuple[str, str, float]] = []
     left_out: dict[str, int] = {}
     for row in rows:
         lux = floor_lux.get(row[1])
         if lux is None or sum(lux.values()) >= least_lx:
-            kept.append(row)
+            bright.append(row)
         else:
             left_out[row[1]] = left_out.get(row[1], 0) + 1
-    return kept, [
+    return bright, [
         f"room {room}: {n} view{'s' * (n != 1)} left out: {sum(floor_lux[room].values()):g} lx on"
         f" the floor by all light, less than selection.min_room_lx = {least_lx:g}"
         for room, n in left_out.items()

@@ -119,13 +119,13 @@ def lamp_factors(rows: Sequence[Mapping[str, Any]], words: Sequence[LampFactor])
     last counts. Factors are float32 linear RGB; lamps that no word names are not in the result.
     """
     factors: dict[int, F32] = {}
-    for asked in words:
-        named = [int(row["number"]) for row in rows if _is_named(row, asked.word)]
+    for factor_word in words:
+        named = [int(row["number"]) for row in rows if _is_named(row, factor_word.word)]
         if not named:
             exist = ", ".join(f"{row['number']} {row['item']} ({row['name']})" for row in rows)
             hint = f"of {exist}" if exist else "there is none"
-            raise BadInput("--lamp", asked.word, "no such lamp", hint=hint)
-        factors |= {number: np.array(asked.rgb, np.float32) for number in named}
+            raise BadInput("--lamp", factor_word.word, "no such lamp", hint=hint)
+        factors |= {number: np.array(factor_word.rgb, np.float32) for number in named}
     return factors
 
 
@@ -166,16 +166,16 @@ def folder_of_view(word: str, settings: StoreSettings, *, needs_light: bool) -> 
         raise BadInput(word, "", "names no view", hint="URL/houses/HOUSE/views/VIEW")
     house, view = match["house"], match["view"]
     store = store_from_url(match["root"], settings)
-    wanted = [keys.RECIPE, keys.view_key(house, view, "view.json")]
+    needed_keys = [keys.RECIPE, keys.view_key(house, view, "view.json")]
     if needs_light:
-        wanted.append(keys.view_key(house, view, RADIANCE_EXR))
+        needed_keys.append(keys.view_key(house, view, RADIANCE_EXR))
     with TemporaryDirectory(prefix="pbrs-view-") as folder:
         copy = FolderStore(Path(folder))
-        for key in (*wanted, keys.house_key(house, "house.json")):
+        for key in (*needed_keys, keys.house_key(house, "house.json")):
             try:
                 copy.put(key, store.get(key))
             except ObjectMissing:
                 # house.json needs its credit line alone.
-                if key in wanted:
+                if key in needed_keys:
                     raise BadInput(word, key, "not in this store") from None
         yield Path(folder) / keys.view_key(house, view)

@@ -172,12 +172,12 @@ def _modes(given: object) -> object:
     if isinstance(given, str) or not isinstance(given, Iterable):
         return given
     names = [mode.value for mode in ALL_MODES]
-    asked = [str(mode) for mode in given]
-    for name in asked:
+    mode_names = [str(mode) for mode in given]
+    for name in mode_names:
         if name not in names:
             hint = hint_of_choice(name, names)
             raise BadInput("--modes", name, "no such lighting mode", hint=hint)
-    return tuple(mode for mode in ALL_MODES if mode.value in asked)
+    return tuple(mode for mode in ALL_MODES if mode.value in mode_names)
 
 
 class Wanted(Record):
@@ -238,8 +238,8 @@ def wanted_of(request: Wanted) -> Wanted:
         if layer in LIGHT_LAYERS and not any(mode.groups for mode in want.modes):
             text, hint = "is made of traced light", "--modes mlt_ol mlt_il_ol"
             raise BadInput("--layers", layer, text, hint=hint)
-    asked = {name for layer in want.layers for name in (layer, *LAYER[layer].beside)}
-    return want.model_copy(update={"layers": tuple(x for x in OPTIONAL if x in asked)})
+    layer_names = {name for layer in want.layers for name in (layer, *LAYER[layer].beside)}
+    return want.model_copy(update={"layers": tuple(x for x in OPTIONAL if x in layer_names)})
 
 
 class ProcessLimitOptions(Record):

@@ -37,8 +37,8 @@ class _Unit:
     def without(self, step: str) -> None:
         """Leave a step out of the stages that have not begun."""
         later = [[(lane, _without(task, step)) for lane, task in stage] for stage in self.stages]
-        kept = ([(lane, task) for lane, task in stage if task.steps] for stage in later)
-        self.stages = deque(stage for stage in kept if stage)
+        stages = ([(lane, task) for lane, task in stage if task.steps] for stage in later)
+        self.stages = deque(stage for stage in stages if stage)
 
 
 class Schedule:
@@ -78,8 +78,8 @@ class Schedule:
         """
         while self._houses or any(self._waiting.values()) or pool.n_busy:
             for lane in self._waiting:
-                for held in pool.idle_houses(lane):
-                    task = self._next(lane, held, pool)
+                for house in pool.idle_houses(lane):
+                    task = self._next(lane, house, pool)
                     if task is not None:
                         pool.give(task, lane)
             for event in pool.events():
@@ -118,8 +118,8 @@ class Schedule:
             return
         first, rest = steps[:1], steps[1:]
         beside = tuple(s for s in rest if s in _OF_LIGHT)
-        others = tuple(s for s in rest if s not in beside)
-        stages = [[(lane, replace(task, steps=first))], _side_by_side(task, others, beside)]
+        after = tuple(s for s in rest if s not in beside)
+        stages = [[(lane, replace(task, steps=first))], _side_by_side(task, after, beside)]
         self._begin(task, stages)
 
     def _begin(self, task: RenderTask, stages: Sequence[_Stage]) -> None:
@@ -148,8 +148,8 @@ class Schedule:
         elif event.kind == "lacking":
             summary.lacking[event.step] = event.message
         elif event.kind == "failed":
-            what = "/".join(x for x in (event.house_id, event.view_id, event.step) if x)
-            summary.failures.append((what, event.message, self._command(event)))
+            place = "/".join(x for x in (event.house_id, event.view_id, event.step) if x)
+            summary.failures.append((place, event.message, self._command(event)))
             if event.step == "illuminance":
                 self._unlit.add(event.house_id)
             self._leave_out(self._units[key], event.step)

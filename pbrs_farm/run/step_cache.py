@@ -112,10 +112,10 @@ def run_unless_done(
 
     # Put the files, then the marker: both at once in a store that packs them.
     started = time.perf_counter()
-    made = function(replace(work, inputs=inputs, digest=digest))
+    output = function(replace(work, inputs=inputs, digest=digest))
     if is_valid:
         work.store.delete(key)
-    data = {_file_key(work, name, file): made.files[file] for file in sorted(made.files)}
+    data = {_file_key(work, name, file): output.files[file] for file in sorted(output.files)}
     files = tuple(StoredFile(key=k, n_bytes=len(d), sha256=keys.sha256(d)) for k, d in data.items())
     if old is not None:
         _remove_stale(work, old, files)
@@ -125,15 +125,15 @@ def run_unless_done(
         view_id=view_id,
         digest=digest,
         files=files,
-        facts=made.facts,
+        facts=output.facts,
         seconds=round(time.perf_counter() - started, 3),
         worker=f"{platform.node()}/{os.getpid()}",
         attempt=attempt,
         finished_utc=datetime.now(UTC).isoformat(timespec="seconds"),
     )
     put_done(work.store, key, marker.json_bytes(), data)
-    if made.unfinished:
-        work.store.delete(made.unfinished)
+    if output.unfinished:
+        work.store.delete(output.unfinished)
     return Outcome(marker, was_done=False)
 
 
@@ -146,9 +146,9 @@ def _written_layers(marker: Marker | None) -> tuple[str, ...]:
 
 def _union(asked: tuple[str, ...], written: tuple[str, ...]) -> tuple[str, ...]:
     """All of both, in the order of what holds the other, else of the table of layers."""
-    for held in (written, asked):
-        if set(held) >= {*asked, *written}:
-            return held
+    for layers in (written, asked):
+        if set(layers) >= {*asked, *written}:
+            return layers
     return tuple(x.name for x in LAYERS if x.name in {*asked, *written})
 
 
@@ -172,13 +172,13 @@ def _extra(name: str, work: Work) -> object:
         return passes.step_depends(required_source(work), work.recipe)
     if name == "truth":
         labels = work.layers_of("truth")
-        others = [layer for layer in labels if layer in plugins("layers")]
-        known = [*labels, *marks_in_digest("layers", others)]
-        return [*known, *layers_in_digest(labels, max_albedo(work.recipe))]
+        plugin_layers = [layer for layer in labels if layer in plugins("layers")]
+        marks = [*labels, *marks_in_digest("layers", plugin_layers)]
+        return [*marks, *layers_in_digest(labels, max_albedo(work.recipe))]
     if name == "light":
         blurred = work.recipe.blur.shutter_s > 0
-        found = ["diffuse"] * bool(work.layers_of("light")) + ["things blur"] * blurred
-        return found or None
+        changes = ["diffuse"] * bool(work.layers_of("light")) + ["things blur"] * blurred
+        return changes or None
     if name == "develop":
         extra, shot = _extra_of_develop(work), work.recipe.shot(work.view_id or "")
         # Stills of a rig share its drawn camera; once only a camera called right did.

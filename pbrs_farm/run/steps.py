@@ -89,8 +89,10 @@ def _cameras(work: Work) -> StepOutput:
         return _object_cameras(work, house, seed)
     sampling = chosen_cameras(house, work.recipe, seed, cached.caster)
     views, report = sampling.views, sampling.report
-    made = _camera_output(views, report.model_dump(mode="json"), work.recipe)
-    return made if views else StepOutput(made.files, {**made.facts, "why_none": report.why_none})
+    output = _camera_output(views, report.model_dump(mode="json"), work.recipe)
+    return (
+        output if views else StepOutput(output.files, {**output.facts, "why_none": report.why_none})
+    )
 
 
 def _object_cameras(work: Work, house: House, seed: int) -> StepOutput:
@@ -391,13 +393,13 @@ def versions() -> Mapping[str, str]:
 
     "-" for a package that is not installed.
     """
-    found = {"pbrs_farm": pbrs_farm.__version__, "python": platform.python_version()}
+    by_name = {"pbrs_farm": pbrs_farm.__version__, "python": platform.python_version()}
     for package in ("mitsuba", "drjit", "moderngl", "pyoidn", "numpy"):
         try:
-            found[package] = version(package)
+            by_name[package] = version(package)
         except PackageNotFoundError:
-            found[package] = "-"
-    return found
+            by_name[package] = "-"
+    return by_name
 
 
 _FUNCTIONS: Final[Mapping[str, Callable[[Work], StepOutput]]] = {

@@ -115,7 +115,7 @@ def cameras_from_file_text(
         if not lines:
             raise BadInput(file, "", "holds no camera")
         return [(line.camera, line.room_id) for line in lines]
-    given = checked(_CAMERAS, text.encode(), file, "camera")
-    if not given:
+    rows = checked(_CAMERAS, text.encode(), file, "camera")
+    if not rows:
         raise BadInput(file, "", "holds no camera")
-    return [(camera.camera(width_px, height_px), camera.room) for camera in given]
+    return [(camera.camera(width_px, height_px), camera.room) for camera in rows]

@@ -61,13 +61,13 @@ def camera_map(house: House, sampling: Sampling) -> Drawing:
 
     For formats other than SVG and pixels. Levels are side by side.
     """
-    marks, left, bottom = _levels_to_draw(house, sampling.views, sampling.traces)
+    marks, right, bottom = _levels_to_draw(house, sampling.views, sampling.traces)
     # Write the legend and the reasons to the right of the last level.
     notes = _notes(sampling)
-    marks += [_shift_marks(mark, left) for mark in notes]
+    marks += [_shift_marks(mark, right) for mark in notes]
     height = max(bottom, *(mark.points[0][1] for mark in notes)) + _MARGIN
     letters = max(len(mark.text) for mark in notes)
-    width = left + max(_TEXT_PX, _LETTER_WIDTH * _LETTERS * letters) + _MARGIN
+    width = right + max(_TEXT_PX, _LETTER_WIDTH * _LETTERS * letters) + _MARGIN
     return Drawing(math.ceil(width), math.ceil(height), tuple(marks))
 
 
@@ -82,7 +82,7 @@ def _levels_to_draw(
 ) -> tuple[list[Mark], float, float]:
     """The levels side by side, each at the scale that fits; where they end on the right and below."""
     marks: list[Mark] = []
-    left, bottom = _MARGIN, _MARGIN
+    right, bottom = _MARGIN, _MARGIN
     for level in house.levels:
         rooms = [room for room in house.rooms if room.level_id == level.id]
         shapes = [s for s in map(room_shape, rooms) if not shapely.is_empty(s)]
@@ -90,12 +90,12 @@ def _levels_to_draw(
             continue
         x0, z0, x1, z1 = shapely.total_bounds(shapes)
         scale = min(_PX_PER_M, _MAX_PX / max(x1 - x0, z1 - z0, 1e-6))
-        panel = _Panel(left - scale * x0, 2 * _MARGIN - scale * z0, scale)
-        marks.append(_text_mark(left, _MARGIN, shown(level.name) or f"Level {level.id}", 14.0))
+        panel = _Panel(right - scale * x0, 2 * _MARGIN - scale * z0, scale)
+        marks.append(_text_mark(right, _MARGIN, shown(level.name) or f"Level {level.id}", 14.0))
         marks += _level_marks(house, views, traces, level.id, panel, is_plan)
-        left += scale * (x1 - x0) + 2 * _MARGIN
+        right += scale * (x1 - x0) + 2 * _MARGIN
         bottom = max(bottom, 2 * _MARGIN + scale * (z1 - z0))
-    return marks, left, bottom
+    return marks, right, bottom
 
 
 class _Panel:
@@ -141,10 +141,10 @@ def _level_marks(
         if len(room.polygon)
     ]
     # A walk is one line; of its frames a few say where they look.
-    own = [view for view in views if view.room_id in rooms and not view.shot.eye]
-    frames = [view for view in own if view.frame is not None]
+    level_views = [view for view in views if view.room_id in rooms and not view.shot.eye]
+    frames = [view for view in level_views if view.frame is not None]
     marks += _walk(frames, panel)
-    for view in own:
+    for view in level_views:
         if view.frame is None:
             marks += _winner(view, panel)
     return marks

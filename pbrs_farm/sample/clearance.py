@@ -35,8 +35,8 @@ def near_any_triangle(points: F64, geometry: Geometry, distance_m: float) -> Boo
         part = points[start : start + _POINTS]
         point, triangle = tree.query(shapely.points(part[:, [0, 2]]))
         y = part[point, 1]
-        kept = (y >= low[triangle, 1]) & (y <= high[triangle, 1])
-        point, triangle = point[kept], triangle[kept]
+        at_height = (y >= low[triangle, 1]) & (y <= high[triangle, 1])
+        point, triangle = point[at_height], triangle[at_height]
         # Compute the exact distances of the remaining pairs.
         for first in range(0, len(point), _PAIRS):
             i, t = point[first : first + _PAIRS], triangle[first : first + _PAIRS]

@@ -88,11 +88,11 @@ def _in_standing_wall(house: House, eyes: F64) -> Bools:
         if item.kind is not ItemKind.WALL:
             continue
         low, high = item.bounds
-        held = np.flatnonzero(((eyes > low) & (eyes < high)).all(1))
-        if len(held):
-            wall, y = corners_of_surfaces(item.surfaces), eyes[held, 1]
-            is_below = highest_below(plan[held], wall, y) >= floor_y[held] - _ONE_PLANE_M
-            inside[held] |= is_below & np.isfinite(lowest_above(plan[held], wall, y))
+        in_box = np.flatnonzero(((eyes > low) & (eyes < high)).all(1))
+        if len(in_box):
+            wall, y = corners_of_surfaces(item.surfaces), eyes[in_box, 1]
+            is_below = highest_below(plan[in_box], wall, y) >= floor_y[in_box] - _ONE_PLANE_M
+            inside[in_box] |= is_below & np.isfinite(lowest_above(plan[in_box], wall, y))
     return inside
 
 
@@ -106,13 +106,13 @@ def enclosed(
     """
     bounds, most = limits or enclosure_limits(house)
     inside = np.zeros(len(eyes), np.bool_)
-    held = np.flatnonzero(_held_by(bounds, eyes))
+    in_box = np.flatnonzero(_held_by(bounds, eyes))
     cube = Intrinsics.from_hfov(_CUBE_PX, _CUBE_PX, math.pi / 2)
-    cameras = [Camera(cube, pose) for pose in _cube_poses(eyes[held])]
+    cameras = [Camera(cube, pose) for pose in _cube_poses(eyes[in_box])]
     for part, rows in count_items(counter, cameras, len(house.items), group=6):
         # Add up the six faces, and compare with what encloses each item's kind.
         share = rows[:, 1:].reshape(-1, 6, len(house.items)).sum(1) / (6 * _CUBE_PX**2)
-        which = held[part.start // 6 : part.stop // 6]
+        which = in_box[part.start // 6 : part.stop // 6]
         eye = eyes[which, None, :]
         holds = ((eye >= bounds[:, 0]) & (eye <= bounds[:, 1])).all(2)
         inside[which] = (holds & (share > most)).any(1)
@@ -121,10 +121,10 @@ def enclosed(
 
 def _held_by(bounds: F64, eyes: F64) -> Bools:
     """(N,) bool: the box of some item (I, 2, 3) holds the eye (N, 3)."""
-    held = np.zeros(len(eyes), np.bool_)
+    in_box = np.zeros(len(eyes), np.bool_)
     for low, high in bounds:
-        held |= ((eyes >= low) & (eyes <= high)).all(1)
-    return held
+        in_box |= ((eyes >= low) & (eyes <= high)).all(1)
+    return in_box
 
 
 def _cube_poses(eyes: F64) -> F64:

@@ -54,8 +54,8 @@ def sample_cameras(
         if reason:
             rooms.append(RoomReport(room_id=room.id, name=room.name, reason=reason))
             continue
-        found, report, trace = sampler.run()
-        views += found
+        room_views, report, trace = sampler.run()
+        views += room_views
         rooms.append(report)
         traces.append(trace)
     # Order as published: best views of the house first.
@@ -82,8 +82,8 @@ def _photographed(sampler: PhotoSampler) -> Sampling:
     chosen = sampler.choose(scored)
     views: list[View] = []
     for of_room in scored:
-        found, reports[of_room.room.id] = room_report(sampler, of_room, chosen)
-        views += found
+        room_views, reports[of_room.room.id] = room_report(sampler, of_room, chosen)
+        views += room_views
     traces = tuple(RoomTrace(s.room.id, s.candidates, s.verdict) for s in scored)
     return Sampling(
         tuple(views),

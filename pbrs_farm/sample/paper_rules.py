@@ -54,10 +54,10 @@ def rejections(
     )
     places = np.flatnonzero(inside)
     for start in range(0, len(places), _CHUNK):
-        left = places[start : start + _CHUNK]
+        remaining = places[start : start + _CHUNK]
         # Ask each rule about the candidates that all rules before it passed.
         for rule, breaks in rules:
-            rejected = breaks(eye[left])
-            verdict[left[rejected]] = rule
-            left = left[~rejected]
+            rejected = breaks(eye[remaining])
+            verdict[remaining[rejected]] = rule
+            remaining = remaining[~rejected]
     return verdict

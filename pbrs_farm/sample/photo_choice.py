@@ -134,11 +134,11 @@ class PhotoChoice:
 
     def likely(self, rooms: Sequence[RoomCandidates]) -> dict[str, NDArray[np.intp]]:
         """Room id -> indices of the candidates that may be chosen with better scores; writes low verdicts."""
-        found: dict[str, set[int]] = {scored.room.id: set() for scored in rooms}
+        likely: dict[str, set[int]] = {scored.room.id: set() for scored in rooms}
         for sector in self._filled_sectors(rooms):
             best = sector.scored.ranked(sector.number)[: _LIKELY_BY_SCORE * self.fields.per_sector]
-            found[sector.scored.room.id] |= sector.ahead | set(best.tolist())
-        return {room: np.array(sorted(numbers), np.intp) for room, numbers in found.items()}
+            likely[sector.scored.room.id] |= sector.ahead | set(best.tolist())
+        return {room: np.array(sorted(numbers), np.intp) for room, numbers in likely.items()}
 
     def _filled_sectors(self, rooms: Sequence[RoomCandidates]) -> list[_Sector]:
         """The sectors that have candidates, the one with the best first, each with its views."""
@@ -178,14 +178,14 @@ class PhotoChoice:
 
     def _fill(self, sector: _Sector) -> None:
         """Take a sector's views, the candidate that adds most first, leaving out near-duplicates."""
-        left = sector.candidates
+        remaining = sector.candidates
         for _ in range(_TRIES * self.fields.per_sector):
-            if len(sector.taken) == self.fields.per_sector or not len(left):
+            if len(sector.taken) == self.fields.per_sector or not len(remaining):
                 return
             # Rank again after each choice: a view's gain depends on those already chosen.
-            order = np.argsort(-self._gain(sector.scored, left), kind="stable")
-            sector.ahead.update(left[order[:_TRIES]].tolist())
-            number, left = int(left[order[0]]), np.delete(left, order[0])
+            order = np.argsort(-self._gain(sector.scored, remaining), kind="stable")
+            sector.ahead.update(remaining[order[:_TRIES]].tolist())
+            number, remaining = int(remaining[order[0]]), np.delete(remaining, order[0])
             if self._is_near_duplicate(sector.scored, number):
                 sector.scored.verdict[number] = Verdict.NEAR_DUPLICATE
             else:
@@ -196,10 +196,10 @@ class PhotoChoice:
         before = list(sector.taken)
         for number in before:
             self._give_up(sector, number)
-            others = np.setdiff1d(sector.candidates, sector.taken)
-            gain = self._gain(sector.scored, others)
+            alternatives = np.setdiff1d(sector.candidates, sector.taken)
+            gain = self._gain(sector.scored, alternatives)
             # Try the better ones from the best down; a view is no near-duplicate of itself.
-            order = others[np.argsort(-gain, kind="stable")][:_TRIES].tolist()
+            order = alternatives[np.argsort(-gain, kind="stable")][:_TRIES].tolist()
             sector.ahead.update(order)
             better = order[: order.index(number)] if number in order else order
             free = (k for k in better if not self._is_near_duplicate(sector.scored, k))

@@ -78,8 +78,8 @@ class PhotoSampler:
         nothing = np.zeros((n, len(NYU13_NAMES)))
         none = np.zeros(n)
         placed = RoomCandidates(room, candidates, verdict, none, nothing, none, none)
-        left = np.flatnonzero(verdict == Verdict.LOWER_SCORE)
-        return self._scored(placed, left, *self._first_sizes)
+        remaining = np.flatnonzero(verdict == Verdict.LOWER_SCORE)
+        return self._scored(placed, remaining, *self._first_sizes)
 
     def with_better_scores(self, rooms: Sequence[RoomCandidates]) -> list[RoomCandidates]:
         """Score the eligible candidates of all rooms again from small pictures; others lose their score."""
@@ -97,25 +97,25 @@ class PhotoSampler:
         cameras = candidates.cameras(which, self._intrinsics(*size))
         small = [camera.with_size(*depth_size) for camera in cameras]
         depth = self.depth_of(small)
-        seen = self._shares(cameras, depth)
+        shares = self._shares(cameras, depth)
         # Used to find near-duplicates.
         if depth_size == DEPTH_SIZE:
             names = [(placed.room.id, int(k)) for k in which]
             self._looked_at |= dict(zip(names, zip(small, depth, strict=True), strict=True))
         # Rules about the picture come before any comparison of scores.
         rule = np.full(len(which), Verdict.LOWER_SCORE, np.uint8)
-        one = (seen.largest > f.max_item_fraction) | (seen.wall > f.max_wall_fraction)
-        rule[one | (seen.opening > f.max_opening_fraction)] = Verdict.FILLED_BY_ONE
-        rule[seen.n_objects < f.min_objects] = Verdict.FEW_OBJECTS
+        overfilled = (shares.largest > f.max_item_fraction) | (shares.wall > f.max_wall_fraction)
+        rule[overfilled | (shares.opening > f.max_opening_fraction)] = Verdict.FILLED_BY_ONE
+        rule[shares.n_objects < f.min_objects] = Verdict.FEW_OBJECTS
         # Give the others the score of what they show.
         n = len(candidates)
         verdict, score = placed.verdict.copy(), np.full(n, -np.inf)
-        nyu13, framing, foreground = np.zeros((n, seen.nyu13.shape[1])), np.zeros(n), np.zeros(n)
+        nyu13, framing, foreground = np.zeros((n, shares.nyu13.shape[1])), np.zeros(n), np.zeros(n)
         tilt_deg = np.degrees(np.arcsin(-candidates.towards[which, 1]))
         verdict[which] = rule
-        score[which] = np.where(rule == Verdict.LOWER_SCORE, photo_score(seen), -np.inf)
-        nyu13[which], framing[which] = seen.nyu13, framing_cost(seen, tilt_deg)
-        foreground[which] = foreground_cost(seen)
+        score[which] = np.where(rule == Verdict.LOWER_SCORE, photo_score(shares), -np.inf)
+        nyu13[which], framing[which] = shares.nyu13, framing_cost(shares, tilt_deg)
+        foreground[which] = foreground_cost(shares)
         return RoomCandidates(placed.room, candidates, verdict, score, nyu13, framing, foreground)
 
     def choose(self, rooms: Sequence[RoomCandidates]) -> dict[tuple[str, int], list[int]]:
@@ -144,7 +144,7 @@ class PhotoSampler:
         scoring size.
         """
         columns, per_sector = np.flatnonzero(self._roles.furniture), self.fields.per_sector
-        seen = [self._at_full_size[scored.room.id, number] for number in chosen]
+        counted = [self._at_full_size[scored.room.id, number] for number in chosen]
         return [
             View(
                 id=view_id(scored.room.id, sector, k if per_sector > 1 else None),
@@ -154,7 +154,7 @@ class PhotoSampler:
                 score=round(float(scored.worth(np.array([number]))[0]), 4),
                 objects={int(i): int(row[i]) for i in columns if row[i]},
             )
-            for k, (number, (camera, row)) in enumerate(zip(chosen, seen, strict=True))
+            for k, (number, (camera, row)) in enumerate(zip(chosen, counted, strict=True))
         ]
 
     @cached_property
@@ -206,7 +206,7 @@ def sector_report(scored: RoomCandidates, sector: int, views: Sequence[View]) ->
     refused = {rule.label: tally[rule] for rule in REJECTIONS if tally[rule]}
     ranked = scored.ranked(sector)
     winners = np.flatnonzero(scored.verdict[ranked] == Verdict.WINNER)
-    others = scored.worth(np.delete(ranked, winners[:1] if len(winners) else slice(0, 1)))
+    other_scores = scored.worth(np.delete(ranked, winners[:1] if len(winners) else slice(0, 1)))
     most = ", ".join(
         f"{n} {rule.replace('_', ' ')}" for rule, n in sorted(refused.items(), key=lambda p: -p[1])
     )
@@ -218,7 +218,7 @@ def sector_report(scored: RoomCandidates, sector: int, views: Sequence[View]) ->
         n_rescored=0,
         views=tuple(view.id for view in views),
         winner_score=views[0].score if views else None,
-        runner_up_score=round(float(others.max()), 4) if len(others) else None,
+        runner_up_score=round(float(other_scores.max()), 4) if len(other_scores) else None,
         reason="" if views else f"every candidate was rejected: {most}",
     )
 
@@ -230,7 +230,7 @@ def room_report(
     room, views, sectors = scored.room, list[View](), []
     for sector in range(sampler.fields.n_sectors):
         mine = chosen.get((room.id, sector), [])
-        found = sampler.views(scored, sector, mine) if mine else []
-        views += found
-        sectors.append(sector_report(scored, sector, found))
+        sector_views = sampler.views(scored, sector, mine) if mine else []
+        views += sector_views
+        sectors.append(sector_report(scored, sector, sector_views))
     return views, RoomReport(room_id=room.id, name=room.name, sectors=tuple(sectors))

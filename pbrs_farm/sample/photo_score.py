@@ -159,37 +159,37 @@ def _median_depth(depth_m: F32) -> F64:
     return median
 
 
-def photo_score(seen: PhotoShares) -> F64:
+def photo_score(shares: PhotoShares) -> F64:
     """(N,) score: furniture, items and classes count; doors, close-ups and bare walls cost.
 
     Shares are of the picture, distances metres. Only differences matter: zero has no meaning.
     """
     # Reward typical subjects of photographs, up to a maximum.
-    score = np.minimum(seen.furniture, MOST_FURNITURE)
-    score += SCORE_OF_OBJECT * np.minimum(seen.n_objects, MOST_OBJECTS)
-    score += SCORE_OF_CLASS * np.minimum(seen.n_classes, MOST_CLASSES)
-    score += np.minimum(seen.floor, MOST_FLOOR)
+    score = np.minimum(shares.furniture, MOST_FURNITURE)
+    score += SCORE_OF_OBJECT * np.minimum(shares.n_objects, MOST_OBJECTS)
+    score += SCORE_OF_CLASS * np.minimum(shares.n_classes, MOST_CLASSES)
+    score += np.minimum(shares.floor, MOST_FLOOR)
     # Charge what fills a picture without showing the room.
-    score -= OPENING_COST * np.maximum(seen.opening - MOST_OPENING, 0)
-    score -= np.maximum(seen.largest - MOST_OF_ONE, 0)
-    score -= np.maximum(seen.wall - MOST_OF_A_WALL, 0)
+    score -= OPENING_COST * np.maximum(shares.opening - MOST_OPENING, 0)
+    score -= np.maximum(shares.largest - MOST_OF_ONE, 0)
+    score -= np.maximum(shares.wall - MOST_OF_A_WALL, 0)
     # Prefer the distance across a room.
-    score -= NEAR_COST * np.maximum(NEAR_M - seen.median_m, 0)
-    score -= FAR_COST * np.maximum(seen.median_m - FAR_M, 0)
+    score -= NEAR_COST * np.maximum(NEAR_M - shares.median_m, 0)
+    score -= FAR_COST * np.maximum(shares.median_m - FAR_M, 0)
     return score
 
 
-def framing_cost(seen: PhotoShares, tilt_deg: F64) -> F64:
+def framing_cost(shares: PhotoShares, tilt_deg: F64) -> F64:
     """(N,) cost of steep and close views and of doors, which likeness would prefer; tilt_deg: downwards."""
     cost = TILT_COST * np.maximum(tilt_deg - MOST_TILT_DEG, 0)
-    cost += CLOSE_COST * np.maximum(NEAR_M - seen.median_m, 0)
-    cost += FRAMED_OPENING_COST * np.maximum(seen.opening - FREE_OPENING, 0)
+    cost += CLOSE_COST * np.maximum(NEAR_M - shares.median_m, 0)
+    cost += FRAMED_OPENING_COST * np.maximum(shares.opening - FREE_OPENING, 0)
     return cost
 
 
-def foreground_cost(seen: PhotoShares) -> F64:
+def foreground_cost(shares: PhotoShares) -> F64:
     """(N,) total cost of objects close to the lens, by FOREGROUND; it is subtracted from a view's score."""
-    nearer = zip(FOREGROUND, seen.foreground.T, strict=True)
+    nearer = zip(FOREGROUND, shares.foreground.T, strict=True)
     costs = [f.cost * np.maximum(share - f.free, 0) for f, share in nearer]
     return np.asarray(np.sum(costs, axis=0))
 

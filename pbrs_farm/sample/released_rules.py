@@ -85,9 +85,9 @@ def viewpoint_mask(house: House, room: Room, clearance_m: float) -> tuple[Bools,
     eps = 1e-3  # triangles that only touch floor or ceiling block nothing
     y = triangles[:, :, 1]
     plan_low, plan_high = triangles.min(1)[:, [0, 2]], triangles.max(1)[:, [0, 2]]
-    met = (y.max(1) > floor_top + eps) & (y.min(1) < ceiling_bottom - eps)
-    met &= (plan_low >= (xs[0], zs[0])).all(1) & (plan_high <= (xs[-1], zs[-1])).all(1)
-    blocked = _nodes_near_shapes(nodes, _plan_shapes(triangles[met]), cell / 2)
+    in_height = (y.max(1) > floor_top + eps) & (y.min(1) < ceiling_bottom - eps)
+    in_height &= (plan_low >= (xs[0], zs[0])).all(1) & (plan_high <= (xs[-1], zs[-1])).all(1)
+    blocked = _nodes_near_shapes(nodes, _plan_shapes(triangles[in_height]), cell / 2)
 
     # Erode by the clearance.
     allowed = (floor & ~blocked).reshape(shape)

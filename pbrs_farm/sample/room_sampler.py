@@ -96,8 +96,8 @@ class RoomSampler:
         views: list[View] = []
         sectors: list[SectorReport] = []
         for sector in range(self.fields.n_sectors):
-            found, sector_report = self._sector(sector, candidates, verdict)
-            views += found
+            sector_views, sector_report = self._sector(sector, candidates, verdict)
+            views += sector_views
             sectors.append(sector_report)
         report = RoomReport(room_id=self.room.id, name=self.room.name, sectors=tuple(sectors))
         return views, report, RoomTrace(self.room.id, candidates, verdict)

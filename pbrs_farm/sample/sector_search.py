@@ -48,9 +48,9 @@ class FullScores:
         new = np.array([c for c in candidates.tolist() if c not in self.score], np.intp)
         if not len(new):
             return
-        kept, score, rows = self.rescore(new)
+        keeps, score, rows = self.rescore(new)
         for k, candidate in enumerate(new.tolist()):
-            self.kept[candidate] = bool(kept[k])
+            self.kept[candidate] = bool(keeps[k])
             self.score[candidate] = float(score[k])
             self.counts[candidate] = rows[k]
 
@@ -61,8 +61,8 @@ class FullScores:
     @property
     def ranking(self) -> list[int]:
         """Candidates that keep the rules, best first; equal scores in order of number."""
-        kept = [c for c in self.score if self.keeps(c)]
-        return sorted(kept, key=lambda c: (-self.score[c], c))
+        candidates = [c for c in self.score if self.keeps(c)]
+        return sorted(candidates, key=lambda c: (-self.score[c], c))
 
 
 def best_first(coarse: Coarse, full: FullScores, *, margin: float | None) -> int | None:
@@ -99,9 +99,9 @@ def next_diverse(
     newly seen, then by how much more of every object is seen than in the best chosen view.
     """
     # Rank by newly visible objects, then by objects larger than before.
-    seen = share[chosen].max(0)
-    new_objects = ((share >= min_fraction) & (seen < min_fraction)).sum(1)
-    gain = np.maximum(share - seen, 0).sum(1)
+    shown = share[chosen].max(0)
+    new_objects = ((share >= min_fraction) & (shown < min_fraction)).sum(1)
+    gain = np.maximum(share - shown, 0).sum(1)
     order = np.lexsort((-gain, -new_objects))
     # Take the first that keeps the rules at full size.
     for candidate in order.tolist():

@@ -63,9 +63,9 @@ def views_from_cameras(
     columns = object_columns(house)
     views: list[View] = []
     used: dict[tuple[str, int], int] = {}
-    known = {room.id: room for room in house.rooms}
+    room_by_id = {room.id: room for room in house.rooms}
     for camera, room_id in cameras:
-        room = known.get(room_id or "") or room_of(house, camera)
+        room = room_by_id.get(room_id or "") or room_of(house, camera)
         place = (OUTSIDE if room is None else room.id, sector_of(camera, fields.n_sectors))
         k = used[place] = used.get(place, -1) + 1
         views.append(View(view_id(*place, k), *place, camera, origin))

@@ -43,9 +43,9 @@ def shared_part(a: Camera, depth_a: F32, b: Camera, depth_b: F32) -> float:
     inside = (column >= 0) & (column < i.width_px) & (row >= 0) & (row < i.height_px)
 
     # A point is visible if no surface is in front of it.
-    there = depth_b[row[inside], column[inside]]
-    seen = np.abs(there - z[inside]) <= TOLERANCE * z[inside]
-    return float(seen.sum() / len(points))
+    depth = depth_b[row[inside], column[inside]]
+    visible = np.abs(depth - z[inside]) <= TOLERANCE * z[inside]
+    return float(visible.sum() / len(points))
 
 
 def overlap(a: Camera, depth_a: F32, b: Camera, depth_b: F32) -> float:

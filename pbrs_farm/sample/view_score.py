@@ -64,9 +64,11 @@ def overfill(counts: NDArray[np.uint32], columns: NDArray[np.intp], fields: Came
     """
     # Compare the largest object and the largest wall with what each may cover.
     pixels = np.maximum(counts.sum(1, dtype=np.int64), 1)
-    others = np.delete(counts, np.append(columns, 0), axis=1)  # walls, floors, ceilings, the ground
+    structure = np.delete(
+        counts, np.append(columns, 0), axis=1
+    )  # walls, floors, ceilings, the ground
     object_share = counts[:, columns].max(1, initial=0) / pixels
-    wall_share = others.max(1, initial=0) / pixels
+    wall_share = structure.max(1, initial=0) / pixels
     over_object = object_share - fields.max_item_fraction
     return np.asarray(np.maximum(over_object, wall_share - fields.max_wall_fraction))
 
@@ -82,8 +84,8 @@ def released_score(
     pixels = int(counts[0].sum()) if len(counts) else 0
     least = max(1, int(fields.min_object_fraction * pixels))
     objects = counts[:, columns].astype(np.int64)
-    kept = objects > least  # strictly more
+    counted = objects > least  # strictly more
     # Sum the logarithms of whole multiples of the least count.
-    score = np.log(np.where(kept, objects // least, 1)).sum(1)
-    n_objects = kept.sum(1)
+    score = np.log(np.where(counted, objects // least, 1)).sum(1)
+    n_objects = counted.sum(1)
     return Scored(n_objects, np.where(n_objects >= fields.min_objects, score, 0.0))

@@ -165,12 +165,12 @@ class FolderStore:
     def _walk(self, prefix: str) -> Iterator[str]:
         try:
             with os.scandir(self.root / prefix) as entries:
-                found = sorted(entries, key=lambda entry: entry.name)
+                ordered = sorted(entries, key=lambda entry: entry.name)
         except (FileNotFoundError, NotADirectoryError):
             return  # no such folder: no objects
         except OSError as error:
             raise self._failure(prefix, error) from error
-        for entry in found:
+        for entry in ordered:
             if entry.name.startswith("."):
                 continue  # unfinished or foreign
             if entry.is_dir():

@@ -59,11 +59,11 @@ class _Pending:
     group: str
     steps: dict[str, dict[str, bytes]] = field(default_factory=dict)
 
-    def find(self, at: keys.HouseKey) -> bytes | None:
-        if (at.house, at.view) != (self.house, self.view):
+    def find(self, parts: keys.HouseKey) -> bytes | None:
+        if (parts.house, parts.view) != (self.house, self.view):
             return None
-        found = (members.get(file_or_marker(at)) for members in self.steps.values())
-        return next((data for data in found if data is not None), None)
+        members_of_steps = (members.get(file_or_marker(parts)) for members in self.steps.values())
+        return next((data for data in members_of_steps if data is not None), None)
 
 
 @dataclass(slots=True)
@@ -151,64 +151,64 @@ class LaidOutStore:
 
     def put_done(self, key: str, marker: bytes, files: Mapping[str, bytes]) -> None:
         """Put a step's files and its marker; for a view both at once, in a pack."""
-        at = self._of_view(key)
-        if at is None:
+        parts = self._of_view(key)
+        if parts is None:
             for file, data in files.items():
                 self.put(file, data)
             self.put_if_absent(key, marker)
             return
         # Keep it for the pack of its group while the task makes the rest of that.
-        assert at.view is not None
-        group = GROUP_OF_STEP.get(at.step, at.step)
-        self._flush_unless(at.house, at.view, group)
+        assert parts.view is not None
+        group = GROUP_OF_STEP.get(parts.step, parts.step)
+        self._flush_unless(parts.house, parts.view, group)
         task = self._task
-        pending = (task and task.pending) or _Pending(at.house, at.view, group)
+        pending = (task and task.pending) or _Pending(parts.house, parts.view, group)
         members = {file_or_marker(_house_key(file)): data for file, data in files.items()}
-        pending.steps[at.step] = {marker_of(at.step): marker, **members}
+        pending.steps[parts.step] = {marker_of(parts.step): marker, **members}
         if task is not None:
             task.pending = pending
         if task is None or len(GROUPS.get(group, ())) < 2:  # nothing follows
             self._flush(pending)
 
     def get(self, key: str) -> bytes:
-        at = self._of_view(key)
-        if at is None:
+        parts = self._of_view(key)
+        if parts is None:
             return self._get_object(key)
-        if (waiting := self._waiting(at)) is not None:
+        if (waiting := self._waiting(parts)) is not None:
             return waiting
         # Once more where a pack was written, or written anew, since its index was read.
-        for is_fresh in (False, True) if not at.step else (True, True):
-            found = self._found(at, is_fresh=is_fresh)
-            if found is None and is_fresh:
+        for is_fresh in (False, True) if not parts.step else (True, True):
+            member = self._found(parts, is_fresh=is_fresh)
+            if member is None and is_fresh:
                 break
-            if found is not None and (data := self._member(*found)) is not None:
+            if member is not None and (data := self._member(*member)) is not None:
                 return data
         raise ObjectMissing(key, f"no such object in {self.url}")
 
     def get_range(self, key: str, start: int, n_bytes: int) -> bytes:
-        at = self._of_view(key)
-        if at is None:
+        parts = self._of_view(key)
+        if parts is None:
             return self.inner.get_range(self._object(key), start, n_bytes)
-        if (waiting := self._waiting(at)) is not None:
+        if (waiting := self._waiting(parts)) is not None:
             return waiting[start : start + n_bytes]
-        found = self._found(at)
-        if found is None:
+        member = self._found(parts)
+        if member is None:
             raise ObjectMissing(key, f"no such object in {self.url}")
-        place, pack, name = found
+        place, pack, name = member
         _step, first, size = pack.rows[name]
         n_bytes = min(n_bytes, size - start)
         return self.inner.get_range(place, first + start, n_bytes) if n_bytes > 0 else b""
 
     def head(self, key: str) -> Head | None:
-        at = self._of_view(key)
-        if at is None:
+        parts = self._of_view(key)
+        if parts is None:
             return self.inner.head(self._object(key))
-        if (waiting := self._waiting(at)) is not None:
+        if (waiting := self._waiting(parts)) is not None:
             return Head(len(waiting), time.time())
-        found = self._found(at, is_fresh=bool(at.step))
-        if found is None:
+        member = self._found(parts, is_fresh=bool(parts.step))
+        if member is None:
             return None
-        place, pack, name = found
+        place, pack, name = member
         whole = self.inner.head(place)
         return Head(pack.rows[name][2], whole.modified_s if whole is not None else 0.0)
 
@@ -221,12 +221,12 @@ class LaidOutStore:
         return self._list(prefix)
 
     def delete(self, key: str) -> None:
-        at = self._of_view(key)
-        if at is None:
+        parts = self._of_view(key)
+        if parts is None:
             self._forget(key)
             self.inner.delete(self._object(key))
-        elif at.step:
-            self._drop(at)
+        elif parts.step:
+            self._drop(parts)
         # A file of a view goes with its marker.
 
     # Where a key is.
@@ -245,13 +245,15 @@ class LaidOutStore:
         check_key(key)
         if key.partition("/")[0] not in keys.FOLDERS or not self.is_packed:
             return None
-        at = keys.parse_house_key(key)
-        return at if at is not None and at.view is not None else None
+        parts = keys.parse_house_key(key)
+        return parts if parts is not None and parts.view is not None else None
 
-    def _found(self, at: keys.HouseKey, *, is_fresh: bool = False) -> tuple[str, Pack, str] | None:
+    def _found(
+        self, parts: keys.HouseKey, *, is_fresh: bool = False
+    ) -> tuple[str, Pack, str] | None:
         """The object that holds a key, its index, and the key's name there."""
-        house, view, name = at.house, at.view or "", file_or_marker(at)
-        for group in groups_of(at):
+        house, view, name = parts.house, parts.view or "", file_or_marker(parts)
+        for group in groups_of(parts):
             # Without the pack of its group no step of it is done.
             place = pack_key(house, view, group)
             pack = self._pack(place, is_fresh=is_fresh)
@@ -259,11 +261,11 @@ class LaidOutStore:
                 if pack is not None:
                     return place, pack, name
                 continue
-            for step in steps_of(at, group):
+            for step in steps_of(parts, group):
                 place = pack_key(house, view, step)
-                own = self._pack(place, is_fresh=is_fresh)
-                if own is not None and name in own.rows:
-                    return place, own, name
+                step_pack = self._pack(place, is_fresh=is_fresh)
+                if step_pack is not None and name in step_pack.rows:
+                    return place, step_pack, name
         return None
 
     # Reading.
@@ -271,8 +273,8 @@ class LaidOutStore:
     def _get_object(self, key: str) -> bytes:
         """An object of no view; in a task the house's markers and its description are kept."""
         place, task = self._object(key), self._task
-        at = keys.parse_house_key(key) if task is not None else None
-        if task is None or at is None or not (at.step or at.file == "house.json"):
+        parts = keys.parse_house_key(key) if task is not None else None
+        if task is None or parts is None or not (parts.step or parts.file == "house.json"):
             return self.inner.get(place)
         if key not in task.objects:
             task.objects[key] = get_or_none(self.inner, place)
@@ -280,17 +282,17 @@ class LaidOutStore:
             raise ObjectMissing(key, f"no such object in {self.url}")
         return data
 
-    def _waiting(self, at: keys.HouseKey) -> bytes | None:
+    def _waiting(self, parts: keys.HouseKey) -> bytes | None:
         """Data that the task has not written yet. Asking for a later group's marker writes the group before."""
         task = self._task
         if task is None or task.pending is None:
             return None
-        is_same_view = (at.house, at.view) == (task.pending.house, task.pending.view)
+        is_same_view = (parts.house, parts.view) == (task.pending.house, task.pending.view)
         later = _ORDER[_ORDER.index(task.pending.group) + 1 :]
-        if at.step and (not is_same_view or GROUP_OF_STEP.get(at.step) in later):
+        if parts.step and (not is_same_view or GROUP_OF_STEP.get(parts.step) in later):
             self._flush()
             return None
-        return task.pending.find(at)
+        return task.pending.find(parts)
 
     def _pack(self, place: str, *, is_fresh: bool = False) -> Pack | None:
         task, now = self._task, time.monotonic()
@@ -299,9 +301,9 @@ class LaidOutStore:
         if task is not None and _before(place) in task.absent:
             # Pictures are made from light that was not there: nor were they, or they are stale.
             return None
-        until, held = self._recent.get(place, (0.0, None))
+        until, recent = self._recent.get(place, (0.0, None))
         if not is_fresh and until > now:
-            return held
+            return recent
         pack = self._read(place)
         if task is not None and pack is None:
             task.absent.add(place)
@@ -359,23 +361,23 @@ class LaidOutStore:
             if below.startswith(("views/", "done/")):
                 folders = [f"{folder}packs/", *([f"{folder}done/"] if below == "done/" else [])]
                 view = below.removeprefix("views/").partition("/")[0] if below[0] == "v" else ""
-        seen: set[str] = set()
+        listed: set[str] = set()
         last = ""
         for folder in folders:
-            for found in self.inner.list(folder):
-                key = key_of_object(found)
+            for stored_key in self.inner.list(folder):
+                key = key_of_object(stored_key)
                 parts = key.split("/")
                 if len(parts) != 4 or parts[2] != "packs" or parts[0] not in keys.FOLDERS:
                     yield key
                     continue
                 if parts[1] != last:
-                    seen, last = set(), parts[1]
+                    listed, last = set(), parts[1]
                 of = parts[3].partition(".")[2].removesuffix(".tar")
                 if view and of != view:
                     continue
-                for name in self._names(found, parts[1], of):
-                    if name.startswith(prefix) and name not in seen:
-                        seen.add(name)
+                for name in self._names(stored_key, parts[1], of):
+                    if name.startswith(prefix) and name not in listed:
+                        listed.add(name)
                         yield name
 
     def _names(self, place: str, house: str, view: str) -> Iterator[str]:
@@ -412,37 +414,37 @@ class LaidOutStore:
     def _write(self, pending: _Pending) -> None:
         house, view, group = pending.house, pending.view, pending.group
         place = pack_key(house, view, group)
-        known = self._task.packs.get(place) if self._task is not None else None
+        present = self._task.packs.get(place) if self._task is not None else None
         if self._task is not None:
             self._task.absent.discard(_before(place))
-        if known is None:
+        if present is None:
             data = pack_bytes(pending.steps)
             if self.inner.put_if_absent(place, data):
                 self._wrote(place, data)
                 return
-            known = self._read(place)
-            self._remember(place, known)
+            present = self._read(place)
+            self._remember(place, present)
         # Steps done after the pack was written, or missing in another writer's pack, get their own.
         for step, members in pending.steps.items():
             name = marker_of(step)
-            if known is not None and name in known.rows:
-                held = self._member(place, known, name)
-                if held is not None and _digest(held) == _digest(members[name]):
+            if present is not None and name in present.rows:
+                old_data = self._member(place, present, name)
+                if old_data is not None and _digest(old_data) == _digest(members[name]):
                     continue
                 self._take_out(house, view, step)
-            own = pack_key(house, view, step)
+            step_key = pack_key(house, view, step)
             data = pack_bytes({step: members})
-            self.inner.put(own, data)
-            self._wrote(own, data)
+            self.inner.put(step_key, data)
+            self._wrote(step_key, data)
 
     def _wrote(self, place: str, data: bytes) -> None:
         self._recent.pop(place, None)
         if self._task is not None:
             self._remember(place, pack_from_head(data, place))
 
-    def _drop(self, at: keys.HouseKey) -> None:
+    def _drop(self, parts: keys.HouseKey) -> None:
         self._flush()
-        self._take_out(at.house, at.view or "", at.step)
+        self._take_out(parts.house, parts.view or "", parts.step)
 
     def _take_out(self, house: str, view: str, step: str) -> None:
         """Take a step out of the packs that hold it, whole packs at a time; other steps stay."""
@@ -495,10 +497,10 @@ def _others(group: str, step: str) -> Iterable[str]:
 
 
 def _house_key(key: str) -> keys.HouseKey:
-    at = keys.parse_house_key(key)
-    if at is None or at.view is None:
+    parts = keys.parse_house_key(key)
+    if parts is None or parts.view is None:
         raise StoreFailed(key, "no file of a view")
-    return at
+    return parts
 
 
 def _is_packed(data: bytes) -> bool:
@@ -522,5 +524,5 @@ def one_task(store: Store, *, reads_whole: bool) -> Iterator[Store]:
     if not isinstance(store, LaidOutStore):
         yield store
         return
-    with store.task(reads_whole=reads_whole) as own:
-        yield own
+    with store.task(reads_whole=reads_whole) as task_store:
+        yield task_store

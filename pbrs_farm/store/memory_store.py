@@ -53,8 +53,8 @@ class MemoryStore:
         check_prefix(prefix)
         with self._lock:
             # Take a copy: the caller may put and delete while it lists.
-            found = [key for key in self._objects if key.startswith(prefix)]
-        return iter(sorted(found))
+            found_keys = [key for key in self._objects if key.startswith(prefix)]
+        return iter(sorted(found_keys))
 
     def delete(self, key: str) -> None:
         with self._lock:
@@ -62,6 +62,6 @@ class MemoryStore:
 
 
 def _store_of(objects: dict[str, bytes]) -> MemoryStore:
-    found = MemoryStore()
-    found._objects = objects
-    return found
+    store = MemoryStore()
+    store._objects = objects
+    return store

@@ -56,11 +56,11 @@ def pack_bytes(steps: Mapping[str, Mapping[str, bytes]]) -> bytes:
     ]
     found.sort(key=lambda row: (not row[0].startswith("done/"), len(row[2]), row[0]))
     # Places count from the index's end, so that its length does not depend on them.
-    rows, at = [], 0
+    rows, offset = [], 0
     for name, step, data in found:
-        at += TAR_BLOCK
-        rows.append([name, step, at, len(data)])
-        at += _padded(len(data))
+        offset += TAR_BLOCK
+        rows.append([name, step, offset, len(data)])
+        offset += _padded(len(data))
     index = json.dumps({"format": FORMAT, "members": rows}, separators=(",", ":")).encode()
     out = io.BytesIO()
     with tarfile.open(fileobj=out, mode="w", format=tarfile.USTAR_FORMAT) as tar:
@@ -88,7 +88,8 @@ def pack_from_head(data: bytes, key: str) -> Pack | None:
         if index["format"] != FORMAT:
             raise StoreFailed(key, "written by a newer pbrs_farm", hint="install that version")
         rows = {
-            str(n): (str(step), base + int(at), int(size)) for n, step, at, size in index["members"]
+            str(n): (str(step), base + int(offset), int(size))
+            for n, step, offset, size in index["members"]
         }
     except (tarfile.HeaderError, ValueError, KeyError, TypeError):
         raise StoreFailed(key, "is no pack of a view", hint="remove it: it is made again") from None

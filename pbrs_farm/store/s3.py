@@ -125,10 +125,10 @@ class S3Store:
 
     def head(self, key: str) -> Head | None:
         try:
-            found = self._call(key, lambda _tries: self._obstore.head(self._client, key))
+            meta = self._call(key, lambda _tries: self._obstore.head(self._client, key))
         except ObjectMissing:
             return None
-        return Head(n_bytes=int(found["size"]), modified_s=found["last_modified"].timestamp())
+        return Head(n_bytes=int(meta["size"]), modified_s=meta["last_modified"].timestamp())
 
     def list(self, prefix: str = "") -> Iterator[str]:
         check_prefix(prefix)

@@ -20,11 +20,11 @@ MAX_PARTS = 65535
 
 def numbered_joints(house: House) -> list[tuple[int, Item, Joint]]:
     """(instance id, item, joint) of every joint in the house's order; the part id of the k-th is k + 1."""
-    found = [(k, item, j) for k, item in enumerate(house.items, 1) for j in item.joints]
-    if len(found) > MAX_PARTS:
-        text = f"{len(found)} joints, a 16-bit layer holds {MAX_PARTS}"
+    joints = [(k, item, j) for k, item in enumerate(house.items, 1) for j in item.joints]
+    if len(joints) > MAX_PARTS:
+        text = f"{len(joints)} joints, a 16-bit layer holds {MAX_PARTS}"
         raise BadHouse(house.source.file, "joints", text)
-    return found
+    return joints
 
 
 def part_label(hit: HitRecord, house: House, geometry: Geometry) -> NDArray[np.uint16]:

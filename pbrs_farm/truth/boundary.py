@@ -61,8 +61,8 @@ def typed_boundaries(hit: HitRecord, camera: Camera) -> tuple[NDArray[np.uint8],
         # Mark creases where one surface, or two that touch, turn.
         normal = hit.geo_normal_world
         cosine = np.einsum("...i,...i->...", normal[first], normal[second])
-        both = hit.valid[first] & hit.valid[second]
-        creases.append(both & ~gap & (cosine < np.cos(CREASE_RAD)))
+        both_valid = hit.valid[first] & hit.valid[second]
+        creases.append(both_valid & ~gap & (cosine < np.cos(CREASE_RAD)))
     return occlusion, np.where(block_edges(*creases), 255, 0).astype(np.uint8)
 
 
@@ -81,19 +81,23 @@ def _is_gap(hit: HitRecord, rays: F32, first: tuple[slice, ...], second: tuple[s
     gap: Mask = np.abs(z_first - z_second) > threshold
 
     # Extend the tangent plane of either side to the other pixel's ray, where depths differ.
-    asked = np.nonzero(gap & (nearer > 0))
+    candidates = np.nonzero(gap & (nearer > 0))
     ends = [
-        (hit.geo_normal_world[side][asked], hit.depth_z[side][asked], rays[side][asked])
+        (
+            hit.geo_normal_world[side][candidates],
+            hit.depth_z[side][candidates],
+            rays[side][candidates],
+        )
         for side in (first, second)
     ]
     miss_second, miss_first = _plane_miss(*ends), _plane_miss(*ends[::-1])
     # Drop steps that a plane explains: the surface goes on, seen at a grazing angle.
-    near = np.minimum(np.abs(miss_first), np.abs(miss_second)) <= threshold[asked]
+    near = np.minimum(np.abs(miss_first), np.abs(miss_second)) <= threshold[candidates]
     # Drop corners: if both planes are behind the visible surface, or both in front, they meet
     # between the
     # pixels.
     meet = (miss_first > 0) == (miss_second > 0)
-    gap[asked] = ~(near | meet)
+    gap[candidates] = ~(near | meet)
     return gap
 
 

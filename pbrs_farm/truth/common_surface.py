@@ -40,10 +40,12 @@ def pair_rows(views: Sequence[View], first_hit: FirstHit) -> list[ViewPairRow]:
     for view in views:
         rooms.setdefault(view.room_id, []).append(view)
     rows = []
-    for room, own in rooms.items():
-        shares = shared_surface(own, first_hit)
-        for a in range(len(own)):
-            rows += [_pair_row(room, own, a, b, shares) for b in range(a + 1, len(own))]
+    for room, room_views in rooms.items():
+        shares = shared_surface(room_views, first_hit)
+        for a in range(len(room_views)):
+            rows += [
+                _pair_row(room, room_views, a, b, shares) for b in range(a + 1, len(room_views))
+            ]
     return rows
 
 
@@ -65,8 +67,8 @@ def shared_surface(views: Sequence[View], first_hit: FirstHit) -> F64:
             if a != b and len(points):
                 px, z = project_points(points, other)
                 inside = inside_picture(px, z, other)
-                seen = reaches(points[inside], faces[inside], other, first_hit)
-                shares[a, b] = seen.sum() / len(points)
+                visible = reaches(points[inside], faces[inside], other, first_hit)
+                shares[a, b] = visible.sum() / len(points)
     return shares
 
 

@@ -115,13 +115,13 @@ def _spans_of_triangles(corners: F64, i: Intrinsics) -> Iterator[_Spans]:
     """The rows of pixel centres covered by each triangle (T, 3, 3), in batches."""
     # Cut the triangles into chunks of bounded rows, one triangle at least.
     first, n_rows = _rows_of_triangles(corners, i)
-    kept = np.nonzero(n_rows)[0]
-    ends = np.cumsum(n_rows[kept])
+    rows = np.nonzero(n_rows)[0]
+    ends = np.cumsum(n_rows[rows])
     begin = 0
-    while begin < len(kept):
+    while begin < len(rows):
         done = ends[begin - 1] if begin else 0
         stop = max(begin + 1, int(np.searchsorted(ends, done + _CHUNK_ROWS, side="right")))
-        chosen = kept[begin:stop]
+        chosen = rows[begin:stop]
         spans = _row_spans(corners[chosen], first[chosen], n_rows[chosen], i)
         yield spans._replace(triangle=chosen[spans.triangle])
         begin = stop
@@ -172,8 +172,8 @@ def _row_spans(corners: F64, first: I64, n_rows: I64, i: Intrinsics) -> _Spans:
         low[(p == 0) & (q < 0)] = np.inf
 
     # Round inwards to pixel centres.
-    left = np.ceil(np.clip(i.fx * low + i.cx - 0.5, 0, i.width_px)).astype(np.int64)
+    first_column = np.ceil(np.clip(i.fx * low + i.cx - 0.5, 0, i.width_px)).astype(np.int64)
     right = np.floor(np.clip(i.fx * high + i.cx - 0.5, -1, i.width_px - 1)).astype(np.int64)
     triangle = np.repeat(np.arange(len(corners)), n_rows)
-    covers = (right >= left) & ~is_edge_on[triangle]
-    return _Spans(*(values[covers] for values in (triangle, row, left, right)))
+    covers = (right >= first_column) & ~is_edge_on[triangle]
+    return _Spans(*(values[covers] for values in (triangle, row, first_column, right)))

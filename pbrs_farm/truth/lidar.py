@@ -227,8 +227,8 @@ def _distances(geometry: Geometry, face: I32, origin: F64, direction: F64) -> F6
     normal = unit_normals(corners)
     along = (normal * direction).sum(1)
     with np.errstate(divide="ignore", invalid="ignore"):
-        found = (normal * (corners[:, 0] - origin)).sum(1) / along
-    return np.asarray(np.where(np.isfinite(found), np.maximum(found, 0), 0), np.float64)
+        distances = (normal * (corners[:, 0] - origin)).sum(1) / along
+    return np.asarray(np.where(np.isfinite(distances), np.maximum(distances, 0), 0), np.float64)
 
 
 def _normals(geometry: Geometry, face: I32, direction: F64) -> F64:

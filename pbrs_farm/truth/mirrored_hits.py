@@ -77,10 +77,10 @@ def mirrored_hits(
         rays, mirror = _reflected(rays.some(at_mirror), geometry, house, first_hit, textures)
         turned.append((rays.pixel, mirror))
         # The new hits may be on mirrors again.
-        found = rays.face >= 0
-        at, n = _met(rays, geometry)
-        face[rays.pixel], depth[rays.pixel] = rays.face, np.where(found, at, 0)
-        normal[rays.pixel] = np.where(found[:, None], _seen_in(turned, rays.pixel, n), 0)
+        is_hit = rays.face >= 0
+        points, n = _met(rays, geometry)
+        face[rays.pixel], depth[rays.pixel] = rays.face, np.where(is_hit, points, 0)
+        normal[rays.pixel] = np.where(is_hit[:, None], _seen_in(turned, rays.pixel, n), 0)
     shape = hit.face.shape
     item = np.where(face >= 0, geometry.face_item[face], 0) if len(geometry.faces) else face
     return HitRecord(
@@ -161,8 +161,8 @@ def _shading_normals(
 
 def _seen_in(turned: list[tuple[I64, F64]], pixel: I64, normal: F64) -> F64:
     """(N, 3) normals of pixels as the mirrors show them; those of the last mirror's pixels."""
-    seen = normal
+    normals = normal
     for pixels, mirror in reversed(turned):
         n = mirror[np.searchsorted(pixels, pixel)]
-        seen = seen - 2 * np.einsum("ni,ni->n", seen, n)[:, None] * n
-    return seen
+        normals = normals - 2 * np.einsum("ni,ni->n", normals, n)[:, None] * n
+    return normals

@@ -65,18 +65,18 @@ def correspondence(
     if then is not None:
         first_hit = then.first_hit
         _move_points(points, hit.face.ravel()[pixels], then)
-    there, z = project_points(points, other)
+    pixels_there, z = project_points(points, other)
     # Subtract the pixel's own centre.
     rows, columns = np.divmod(pixels, shape[1])
     front = z > _NEAREST_M
     flow = np.zeros((2, hit.face.size))
     for axis, centre in enumerate((columns + 0.5, rows + 0.5)):
-        flow[axis, pixels] = np.where(front, there[:, axis] - centre, 0.0)
+        flow[axis, pixels] = np.where(front, pixels_there[:, axis] - centre, 0.0)
     # Points inside the other picture are visible if no ray ends before them.
-    inside = np.flatnonzero(inside_picture(there, z, other))
-    seen = reaches(points.T[:, inside].T, hit.face.ravel()[pixels[inside]], other, first_hit)
+    inside = np.flatnonzero(inside_picture(pixels_there, z, other))
+    visible = reaches(points.T[:, inside].T, hit.face.ravel()[pixels[inside]], other, first_hit)
     states = np.full(shape, OUTSIDE, np.uint8)
-    states.ravel()[pixels[inside]] = np.where(seen, SEEN, HIDDEN)
+    states.ravel()[pixels[inside]] = np.where(visible, SEEN, HIDDEN)
 
     in_front = np.zeros(shape, bool)
     in_front.ravel()[pixels] = front
@@ -98,8 +98,8 @@ def _move_points(points: F64, faces: I32, then: OtherTime) -> None:
     """Move points (N, 3) in place with the faces (N,) that they lie on."""
     number = then.number_of_face[faces]
     for k in range(1, len(then.matrices)):
-        own = np.flatnonzero(number == k)
-        points[own] = transform_points(then.matrices[k], points[own])
+        moved = np.flatnonzero(number == k)
+        points[moved] = transform_points(then.matrices[k], points[moved])
 
 
 def scene_flow_label(hit: HitRecord, camera: Camera, then: OtherTime | None) -> F32:
@@ -192,18 +192,18 @@ def partners_of(view: View, views: Mapping[str, View]) -> dict[Relation, View]:
 
     A view outside rigs and sequences has none. Each camera of a rig has its own neighbours.
     """
-    found: dict[Relation, View] = {}
-    other = _rectified_partner(view, views)
-    if other is not None:
-        found["stereo"] = other
+    partners: dict[Relation, View] = {}
+    stereo = _rectified_partner(view, views)
+    if stereo is not None:
+        partners["stereo"] = stereo
     if view.frame is None:
-        return found
+        return partners
     neighbours: tuple[tuple[Relation, int], ...] = (("next", 1), ("previous", -1))
     for relation, step in neighbours:
         neighbour = views.get(view.shot.partner(step).id)
         if neighbour is not None:
-            found[relation] = neighbour
-    return found
+            partners[relation] = neighbour
+    return partners
 
 
 def _rectified_partner(view: View, views: Mapping[str, View]) -> View | None:
@@ -213,18 +213,18 @@ def _rectified_partner(view: View, views: Mapping[str, View]) -> View | None:
     """
     if view.rig is None:
         return None
-    own, found = view.rig, dict[str, float]()
-    camera_from_rig = np.linalg.inv(own.rig_from_camera)
-    for name, other in views.items():
-        if name == view.id or other.rig is None or other.rig.instant != own.instant:
+    place, distances = view.rig, dict[str, float]()
+    camera_from_rig = np.linalg.inv(place.rig_from_camera)
+    for name, candidate in views.items():
+        if name == view.id or candidate.rig is None or candidate.rig.instant != place.instant:
             continue
-        between = camera_from_rig @ other.rig.rig_from_camera
+        between = camera_from_rig @ candidate.rig.rig_from_camera
         aside = abs(float(between[0, 3]))
         between[0, 3] = 0.0
         same_rows = np.abs(between - np.eye(4)).max() <= _SAME_ROWS and aside > _SAME_ROWS
-        if same_rows and other.camera.intrinsics == view.camera.intrinsics:
-            found[name] = aside
-    return views[min(found, key=found.__getitem__)] if found else None
+        if same_rows and candidate.camera.intrinsics == view.camera.intrinsics:
+            distances[name] = aside
+    return views[min(distances, key=distances.__getitem__)] if distances else None
 
 
 def partner_table(

@@ -96,8 +96,8 @@ class LabelInputs:
             return {}
         cast = self.first_hit
         return {
-            relation: correspondence(self.hit, self.camera, other, cast, self.times.get(relation))
-            for relation, other in self.partners.items()
+            relation: correspondence(self.hit, self.camera, camera, cast, self.times.get(relation))
+            for relation, camera in self.partners.items()
         }
 
     @cached_property
@@ -230,8 +230,8 @@ def optional_layers(names: Collection[str], inputs: LabelInputs) -> dict[str, ND
     label layer, BadInput for one that needs planar depth from a lens without.
     """
     check_lens(names, inputs.camera.intrinsics.lens)
-    made = [n for n in names if not LAYER[n].partner or LAYER[n].partner in inputs.to_partners]
-    return {name: _function(name)(inputs) for name in made}
+    available = [n for n in names if not LAYER[n].partner or LAYER[n].partner in inputs.to_partners]
+    return {name: _function(name)(inputs) for name in available}
 
 
 def _function(name: str) -> Callable[[LabelInputs], NDArray[Any]]:
@@ -245,11 +245,11 @@ def check_lens(names: Collection[str], lens: Lens) -> None:
     """Raise BadInput for a named layer that a lens cannot have, before rendering. Ignores unknown names."""
     for layer in (LAYER[name] for name in names if name in LAYER):
         if layer.needs == "planar depth" and not lens.depth_is_planar:
-            what = f"needs depth along the axis, which lens.model {lens.model} has not"
-            raise BadInput("--layers", layer.name, what, hint="lens.model pinhole or radtan")
+            text = f"needs depth along the axis, which lens.model {lens.model} has not"
+            raise BadInput("--layers", layer.name, text, hint="lens.model pinhole or radtan")
         if layer.needs == "rows" and not lens.is_pinhole:
-            what = f"needs rows that correspond, which lens.model {lens.model} has not"
-            raise BadInput("--layers", layer.name, what, hint="lens.model pinhole")
+            text = f"needs rows that correspond, which lens.model {lens.model} has not"
+            raise BadInput("--layers", layer.name, text, hint="lens.model pinhole")
 
 
 def optional_tables(names: Collection[str], house: House) -> dict[str, Any]:

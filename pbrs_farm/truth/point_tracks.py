@@ -69,14 +69,14 @@ def point_tracks(
                 for q, (start, face, _instance) in zip(chosen.tolist(), groups, strict=True)
             ]
         )
-        at, z = project_points(now, frame.camera)
-        inside = np.flatnonzero(inside_picture(at, z, frame.camera))
-        seen = np.zeros(len(now), bool)
-        seen[inside] = reaches(now[inside], faces[inside], frame.camera, frame.first_hit())
-        front = (z > 0) & np.isfinite(at).all(1)
-        px.append(np.where(front[:, None], at, 0.0))
+        pixels, z = project_points(now, frame.camera)
+        inside = np.flatnonzero(inside_picture(pixels, z, frame.camera))
+        visible = np.zeros(len(now), bool)
+        visible[inside] = reaches(now[inside], faces[inside], frame.camera, frame.first_hit())
+        front = (z > 0) & np.isfinite(pixels).all(1)
+        px.append(np.where(front[:, None], pixels, 0.0))
         depth.append(np.where(front, z, 0.0))
-        hidden.append(~seen)
+        hidden.append(~visible)
     n = [len(face) for _points, face, _instance in groups]
     return PointTracks(
         np.stack(px, 1).astype(np.float32),
@@ -93,10 +93,12 @@ def _chosen_points(
     """(K, 3) points behind pixels' centres of a frame, (K,) their faces and instances; K <= n."""
     hit = frame.hit()
     face = hit.face.ravel()
-    seen = np.flatnonzero(face >= 0)
-    moves = moving[face[seen]]
-    of_moving = _some(seen[moves], round(n * _MOVING_SHARE), rng)
-    pixels = np.sort(np.concatenate([of_moving, _some(seen[~moves], n - len(of_moving), rng)]))
+    hit_pixels = np.flatnonzero(face >= 0)
+    moves = moving[face[hit_pixels]]
+    of_moving = _some(hit_pixels[moves], round(n * _MOVING_SHARE), rng)
+    pixels = np.sort(
+        np.concatenate([of_moving, _some(hit_pixels[~moves], n - len(of_moving), rng)])
+    )
     return points_of_pixels(hit, frame.camera, pixels), face[pixels], hit.item.ravel()[pixels]
 
 

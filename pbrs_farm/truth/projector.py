@@ -51,14 +51,14 @@ def projector_label(
     angles = np.arctan2((to @ np.stack([right, up], 1)), along[:, None])
     light[lit] = _dots(angles[lit])
     lit &= light > 0.5 / 255
-    seen = _reached(eye, camera, points, hit.face.ravel()[pixels], lit, first_hit)
+    reached = _reached(eye, camera, points, hit.face.ravel()[pixels], lit, first_hit)
     normal = hit.geo_normal_world.reshape(-1, 3)[pixels]
     cosine = np.abs((normal * to).sum(1)) / np.maximum(distance, 1e-6)
     infrared = linear_from_srgb(albedo.reshape(-1, 3)[pixels].max(1) / 255.0)
     falloff = (FULL_M / np.maximum(distance, 1e-3)) ** 2
     out = np.zeros(hit.face.size, np.uint8)
     back_light = srgb_from_linear(np.clip(light * infrared * cosine * falloff, 0, 1))
-    out[pixels] = np.where(seen, np.rint(255 * back_light), 0)
+    out[pixels] = np.where(reached, np.rint(255 * back_light), 0)
     return out.reshape(hit.face.shape)
 
 
@@ -67,9 +67,9 @@ def _reached(
 ) -> Bools:
     world = camera.world_from_camera.copy()
     world[:3, 3] = eye
-    found = np.zeros(len(points), bool)
-    found[lit] = reaches(points[lit], faces[lit], Camera(camera.intrinsics, world), first_hit)
-    return found
+    reached = np.zeros(len(points), bool)
+    reached[lit] = reaches(points[lit], faces[lit], Camera(camera.intrinsics, world), first_hit)
+    return reached
 
 
 def _dots(angles: F64) -> F64:

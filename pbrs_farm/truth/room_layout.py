@@ -22,14 +22,14 @@ def layout_table(room: Room, camera: Camera, depth_z: DepthZ) -> list[dict[str, 
     Sloped or stepped ceilings are not followed.
     """
     rows = []
-    for at, y in (("floor", room.floor_y), ("ceiling", room.ceiling_y)):
+    for where, y in (("floor", room.floor_y), ("ceiling", room.ceiling_y)):
         corners = np.insert(room.polygon, 1, y, axis=1)
         pixels, depths = _projected(corners, camera)
         for number, (world, pixel, z) in enumerate(zip(corners, pixels, depths, strict=True)):
             rows.append(
                 {
                     "corner": number,
-                    "at": at,
+                    "at": where,
                     "world": world.tolist(),
                     "pixel": pixel,
                     "visible": pixel is not None and _is_visible(pixel, z, depth_z),
@@ -42,8 +42,8 @@ def _projected(points: F64, camera: Camera) -> tuple[list[list[float] | None], l
     """(x, y) in px of each point, None where the lens does not see it; and its depth."""
     i = camera.intrinsics
     if not i.lens.is_pinhole:
-        seen = [p if np.isfinite(p).all() else None for p in camera.pixels_of(points)]
-        pixels = [None if p is None else [float(v) for v in p] for p in seen]
+        projections = [p if np.isfinite(p).all() else None for p in camera.pixels_of(points)]
+        pixels = [None if p is None else [float(v) for v in p] for p in projections]
         return pixels, [float(z) for z in camera.depths_of(points)]
     # OpenGL's camera looks along -z, rows count down.
     camera_from_world = np.asarray(np.linalg.inv(camera.world_from_camera), np.float64)

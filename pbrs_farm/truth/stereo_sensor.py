@@ -69,7 +69,7 @@ def _hidden_from_right(z: F64, camera: Camera, baseline_m: float) -> Mask:
     """(H, W) bool: the right camera does not see the point: beyond its picture, or behind another."""
     with np.errstate(divide="ignore"):
         shift = np.where(np.isfinite(z), camera.intrinsics.fx * baseline_m / z, 0.0)
-    there = np.arange(z.shape[1]) - shift
+    columns = np.arange(z.shape[1]) - shift
     # A point on a row is hidden where something on its right has moved past it.
-    leftmost = np.minimum.accumulate(there[:, ::-1], axis=1)[:, ::-1]
-    return np.asarray((there > leftmost + 0.5) | (there < -0.5))
+    leftmost = np.minimum.accumulate(columns[:, ::-1], axis=1)[:, ::-1]
+    return np.asarray((columns > leftmost + 0.5) | (columns < -0.5))

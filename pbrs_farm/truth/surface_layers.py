@@ -42,9 +42,9 @@ def albedo_label(
     """
     linear = np.zeros((*hit.face.shape, 3), np.float32)
     if len(geometry.faces):
-        seen = hit.valid
-        uv = hit.points.uv[seen]
-        linear[seen] = albedo_of_points(hit.face[seen], uv, house, geometry, textures)
+        is_hit = hit.valid
+        uv = hit.points.uv[is_hit]
+        linear[is_hit] = albedo_of_points(hit.face[is_hit], uv, house, geometry, textures)
     # Encode by table: 8-bit sRGB.
     steps = np.rint(np.clip(linear, 0, most) * _STEPS).astype(np.int32)
     return np.asarray(_BYTE_OF_LINEAR[steps])
@@ -61,11 +61,11 @@ def albedo_of_points(
     # Shade material by material: each texture is looked up once, for all its points.
     material = geometry.face_material[face]
     for number in np.unique(material):
-        shaded, own = house.materials[int(number)], material == number
-        linear[own] = linear_from_srgb(np.array(shaded.diffuse)).astype(np.float32)
+        shaded, of_material = house.materials[int(number)], material == number
+        linear[of_material] = linear_from_srgb(np.array(shaded.diffuse)).astype(np.float32)
         pixels = textures.get(shaded.texture_id) if shaded.texture_id else None
         if pixels is not None:
-            linear[own] *= bilinear(pixels[..., :3], uv[own], _LINEAR_OF_BYTE)
+            linear[of_material] *= bilinear(pixels[..., :3], uv[of_material], _LINEAR_OF_BYTE)
     return linear
 
 
@@ -77,25 +77,25 @@ def roughness_label(
     Matte surfaces are 255, mirrors and glass 0. textures: as of albedo_label; a roughness map's green
     is looked up as its colours are.
     """
-    found = np.zeros(hit.face.shape, np.float64)
+    roughness = np.zeros(hit.face.shape, np.float64)
     if not len(geometry.faces):
-        return found.astype(np.uint8)
+        return roughness.astype(np.uint8)
     material = np.where(hit.valid, geometry.face_material[hit.face], -1)
     for number in np.unique(material[material >= 0]):
-        shaded, own = house.materials[int(number)], material == number
+        shaded, of_material = house.materials[int(number)], material == number
         coat = None if shaded.kind in _SMOOTH else coat_of(shaded)
         if coat is None:
-            found[own] = 0.0 if shaded.kind in _SMOOTH else 1.0
+            roughness[of_material] = 0.0 if shaded.kind in _SMOOTH else 1.0
             continue
-        alpha = np.full(int(own.sum()), coat.alpha)
+        alpha = np.full(int(of_material.sum()), coat.alpha)
         name = shaded.roughness_texture_id if shaded.shows_maps else None
         pixels = textures.get(name) if name else None
         if pixels is not None:
             green = pixels[..., None] if pixels.ndim == 2 else pixels[..., 1:2]
-            share = bilinear(green, hit.points.uv[own])[:, 0] / 255
+            share = bilinear(green, hit.points.uv[of_material])[:, 0] / 255
             alpha = np.maximum(coat.alpha * share**2, MIN_ALPHA)
-        found[own] = np.sqrt(alpha)
-    return np.rint(255 * found).astype(np.uint8)
+        roughness[of_material] = np.sqrt(alpha)
+    return np.rint(255 * roughness).astype(np.uint8)
 
 
 def f0_label(hit: HitRecord, house: House, geometry: Geometry) -> NDArray[np.uint8]:
@@ -145,9 +145,9 @@ def shading_normals(
     normals = hit.points.shading_normal_world.copy()
     if not len(geometry.faces):
         return normals
-    seen = hit.valid
-    faces, uv = hit.face[seen], hit.points.uv[seen]
-    normals[seen] = bent_by_maps(normals[seen], faces, uv, house, geometry, textures)
+    is_hit = hit.valid
+    faces, uv = hit.face[is_hit], hit.points.uv[is_hit]
+    normals[is_hit] = bent_by_maps(normals[is_hit], faces, uv, house, geometry, textures)
     return normals
 
 
@@ -168,11 +168,11 @@ def bent_by_maps(
         pixels = textures.get(shaded.normal_texture_id or "") if shaded.shows_maps else None
         if pixels is None or pixels.ndim != 3:
             continue
-        own = material == number
-        values = bilinear(pixels[..., :3], uv[own])
+        of_material = material == number
+        values = bilinear(pixels[..., :3], uv[of_material])
         mapped = normals_from_picture(values, shaded.normal_scale).astype(np.float64)
-        faces, seen = face[own], normals[own].astype(np.float64)
-        normals[own] = _bent(geometry, faces, seen, mapped).astype(np.float32)
+        faces, turned = face[of_material], normals[of_material].astype(np.float64)
+        normals[of_material] = _bent(geometry, faces, turned, mapped).astype(np.float32)
     return normals
 
 

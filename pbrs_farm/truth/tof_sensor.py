@@ -86,8 +86,8 @@ def _edges(z: F64, valid: NDArray[np.bool_]) -> NDArray[np.bool_]:
     high = ndimage.maximum_filter(np.where(valid, z, np.inf), 3, mode="nearest")
     low = ndimage.minimum_filter(np.where(valid, z, np.inf), 3, mode="nearest")
     with np.errstate(invalid="ignore"):
-        apart = high - low
-    return np.asarray(~(apart <= _EDGE_SHARE * low))
+        depth_range = high - low
+    return np.asarray(~(depth_range <= _EDGE_SHARE * low))
 
 
 def incidence_rad(hit: HitRecord, camera: Camera) -> F64:

@@ -150,10 +150,10 @@ class Pool:
         lines = last_lines(worker.process.log_tail())
         reason = f"{ended.text}: {lines}" if lines else ended.text
         yield Event("failed", task.house_id, task.view_id, worker.step, message=reason)
-        left = tuple(s for s in task.steps if s != worker.step and s not in worker.done)
-        if left:
+        remaining = tuple(s for s in task.steps if s != worker.step and s not in worker.done)
+        if remaining:
             self._begin(
-                worker, RenderTask(task.house_id, left, task.source, task.view_id, task.layers)
+                worker, RenderTask(task.house_id, remaining, task.source, task.view_id, task.layers)
             )
         else:
             yield Event("end", task.house_id, task.view_id, "")

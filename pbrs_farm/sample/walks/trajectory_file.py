@@ -136,8 +136,8 @@ def trajectory_views(
     inside = np.flatnonzero(inside_walls(house, eyes, geometry, first_hit))
     if len(inside):
         pose = poses[int(inside[0])]
-        at = ", ".join(f"{v:.2f}" for v in pose.world_from_camera[:3, 3])
-        raise BadInput(file, f"line {pose.line}", f"the camera at {at} stands inside a wall")
+        place = ", ".join(f"{v:.2f}" for v in pose.world_from_camera[:3, 3])
+        raise BadInput(file, f"line {pose.line}", f"the camera at {place} stands inside a wall")
     intrinsics = Intrinsics.from_hfov(
         fields.score_width_px, fields.score_height_px, fields.hfov_rad
     )

@@ -58,8 +58,8 @@ def _resampled(path: F64, step_m: float) -> F64:
     """Points step_m apart along a polyline (M, 2), its ends among them."""
     along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
     n = max(round(float(along[-1]) / step_m), 1)
-    at = np.linspace(0, along[-1], n + 1)
-    return np.stack([np.interp(at, along, path[:, k]) for k in range(2)], axis=1)
+    distances = np.linspace(0, along[-1], n + 1)
+    return np.stack([np.interp(distances, along, path[:, k]) for k in range(2)], axis=1)
 
 
 def spline_through(places: F64) -> F64:
@@ -74,8 +74,8 @@ def spline_through(places: F64) -> F64:
     control = np.concatenate([control[:1], control[:1], control, control[-1:], control[-1:]])
     knots = np.arange(len(control) + 4, dtype=np.float64)
     curve = BSpline(knots, control, 3)
-    at = np.linspace(knots[3], knots[-4], max(int(len(places) * CELL_M / _DENSE_M), 8))
-    return _resampled(np.asarray(curve(at)), _DENSE_M)
+    parameters = np.linspace(knots[3], knots[-4], max(int(len(places) * CELL_M / _DENSE_M), 8))
+    return _resampled(np.asarray(curve(parameters)), _DENSE_M)
 
 
 def time_walk(path: F64, times: F64, speed_mps: float) -> Motion:
@@ -97,9 +97,9 @@ def time_walk(path: F64, times: F64, speed_mps: float) -> Motion:
     speed = np.sqrt(squared)
     # Integrate the time from point to point and interpolate the requested times.
     when = np.concatenate([[0.0], np.cumsum(step / ((speed[:-1] + speed[1:]) / 2))])
-    at = np.interp(times, when, along)
-    places = np.stack([np.interp(at, along, path[:, k]) for k in range(2)], axis=1)
-    return Motion(places, _heading(path, along, at), float(at[-1]))
+    distances = np.interp(times, when, along)
+    places = np.stack([np.interp(distances, along, path[:, k]) for k in range(2)], axis=1)
+    return Motion(places, _heading(path, along, distances), float(distances[-1]))
 
 
 def _curvature(path: F64) -> F64:

@@ -118,8 +118,8 @@ def _things_by_room(
     house: House, level_id: str, grid: FloorGrid, room: NDArray[np.int32]
 ) -> Counter[int]:
     """Room index -> number of the storey's items with their centre in it."""
-    own = [i for i in house.items if i.level_id == level_id and i.n_faces]
-    things = [i for i in own if not (i.kind.is_structure or is_door_item(i))]
+    level_items = [i for i in house.items if i.level_id == level_id and i.n_faces]
+    things = [i for i in level_items if not (i.kind.is_structure or is_door_item(i))]
     middles = np.array([i.bounds.mean(0)[[0, 2]] for i in things]).reshape(-1, 2)
     cells = grid.cells(middles)
     return Counter(room[tuple(cells[grid.holds(cells)].T)].tolist())
@@ -133,11 +133,13 @@ def _most_interesting(
     things = _things_by_room(house, level_id, grid, room)
     walkable = Counter(room[ways > 0].tolist())
     for number in range(1, int(ways.max(initial=0)) + 1):
-        own = room[ways == number]
-        if len(own) * CELL_M**2 < LEAST_WAY_M2:
+        way_rooms = room[ways == number]
+        if len(way_rooms) * CELL_M**2 < LEAST_WAY_M2:
             continue
         # A terrace counts, but little: a walk is one through rooms.
-        rooms = [(int(k), int((own == k).sum())) for k in np.unique(own[own >= 0])]
+        rooms = [
+            (int(k), int((way_rooms == k).sum())) for k in np.unique(way_rooms[way_rooms >= 0])
+        ]
         indoors = {k for k, _n in rooms if house.rooms[k].has_ceiling}
         cells = sum(n if k in indoors else _OUTDOORS * n for k, n in rooms)
         # A room's items count in proportion to its floor in this region.

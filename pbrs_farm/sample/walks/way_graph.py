@@ -34,10 +34,10 @@ class WayGraph:
         ends: list[I64] = []
         weights: list[F64] = []
         for dz, dx in ((0, 1), (1, 0), (1, 1), (1, -1)):
-            other = self.cells + np.array([dz, dx])
-            inside = space.grid.holds(other)
+            neighbour = self.cells + np.array([dz, dx])
+            inside = space.grid.holds(neighbour)
             a = np.flatnonzero(inside)
-            b = number[tuple(other[inside].T)]
+            b = number[tuple(neighbour[inside].T)]
             a, b = a[b >= 0], b[b >= 0]
             length = CELL_M * float(np.hypot(dz, dx))
             mean = (cost[tuple(self.cells[a].T)] + cost[tuple(self.cells[b].T)]) / 2
@@ -67,24 +67,26 @@ def way_through_rooms(space: WalkSpace, length_m: float, rng: np.random.Generato
     members = {k: np.flatnonzero(room == k) for k in rooms} or {-1: np.arange(len(graph.cells))}
     # Begin anywhere in the region, in proportion to the floor.
     all_cells = np.concatenate([members[k] for k in sorted(members)])
-    at = int(rng.choice(all_cells))
-    cells, length, unvisited = [at], 0.0, set(members)
-    here = next((k for k in sorted(members) if at in members[k]), min(members))
+    cell = int(rng.choice(all_cells))
+    cells, length, unvisited = [cell], 0.0, set(members)
+    room_index = next((k for k in sorted(members) if cell in members[k]), min(members))
     for _leg in range(_MOST_LEGS):
         if length >= length_m:
             break
         for _place in range(int(rng.integers(_PLACES_A_ROOM[0], _PLACES_A_ROOM[1] + 1))):
-            cost, before = graph.from_cell(at)
-            drawn = rng.choice(members[here], min(_CHOICES, len(members[here])), replace=False)
+            cost, before = graph.from_cell(cell)
+            drawn = rng.choice(
+                members[room_index], min(_CHOICES, len(members[room_index])), replace=False
+            )
             goal = int(drawn[cost[drawn].argmax()])
             leg = _leg_to(goal, before)
-            length += _length(graph.cells[[at, *leg]])
+            length += _length(graph.cells[[cell, *leg]])
             cells += leg
-            at = goal
-        unvisited.discard(here)
-        unvisited = unvisited or (set(members) - {here}) or {here}
-        cost, _before = graph.from_cell(at)
-        here = min(sorted(unvisited), key=lambda k: float(cost[members[k]].min()))
+            cell = goal
+        unvisited.discard(room_index)
+        unvisited = unvisited or (set(members) - {room_index}) or {room_index}
+        cost, _before = graph.from_cell(cell)
+        room_index = min(sorted(unvisited), key=lambda k: float(cost[members[k]].min()))
     return space.grid.places(graph.cells[cells])
 
 
