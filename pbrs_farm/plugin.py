@@ -56,32 +56,32 @@ if TYPE_CHECKING:
     from pbrs_farm.core.shot import view_id as view_id
     from pbrs_farm.dress.mutable_house import MutableHouse as MutableHouse
     from pbrs_farm.dress.style import Style as Style
+    from pbrs_farm.dress.thing_materials import glass as glass
+    from pbrs_farm.dress.thing_materials import glossy as glossy
+    from pbrs_farm.dress.thing_materials import plain as plain
     from pbrs_farm.export.chosen_view import Choice as Choice
     from pbrs_farm.export.chosen_view import ChosenView as ChosenView
     from pbrs_farm.export.form import HomeForm as HomeForm
     from pbrs_farm.export.form import ViewForm as ViewForm
-    from pbrs_farm.furnishings.things.bodies import bevelled as bevelled
-    from pbrs_farm.furnishings.things.bodies import board as board
-    from pbrs_farm.furnishings.things.bodies import cylinder as cylinder
-    from pbrs_farm.furnishings.things.bodies import disc as disc
-    from pbrs_farm.furnishings.things.bodies import frustum as frustum
-    from pbrs_farm.furnishings.things.bodies import loft as loft
-    from pbrs_farm.furnishings.things.bodies import revolve as revolve
-    from pbrs_farm.furnishings.things.bodies import rounded as rounded
-    from pbrs_farm.furnishings.things.bodies import slab as slab
-    from pbrs_farm.furnishings.things.bodies import tube as tube
-    from pbrs_farm.furnishings.things.bodies import vessel as vessel
     from pbrs_farm.furnishings.things.cloth import draped as draped
     from pbrs_farm.furnishings.things.cloth import sheet as sheet
     from pbrs_farm.furnishings.things.maker import Maker as Maker
     from pbrs_farm.furnishings.things.maker import Size as Size
     from pbrs_farm.furnishings.things.maker import family as family
     from pbrs_farm.furnishings.things.maker import thing as thing
-    from pbrs_farm.furnishings.things.materials import glass as glass
-    from pbrs_farm.furnishings.things.materials import glossy as glossy
-    from pbrs_farm.furnishings.things.materials import plain as plain
-    from pbrs_farm.furnishings.things.outlines import oval as oval
-    from pbrs_farm.furnishings.things.outlines import rect as rect
+    from pbrs_farm.geometry.bodies import bevelled as bevelled
+    from pbrs_farm.geometry.bodies import board as board
+    from pbrs_farm.geometry.bodies import cylinder as cylinder
+    from pbrs_farm.geometry.bodies import disc as disc
+    from pbrs_farm.geometry.bodies import frustum as frustum
+    from pbrs_farm.geometry.bodies import loft as loft
+    from pbrs_farm.geometry.bodies import revolve as revolve
+    from pbrs_farm.geometry.bodies import rounded as rounded
+    from pbrs_farm.geometry.bodies import slab as slab
+    from pbrs_farm.geometry.bodies import tube as tube
+    from pbrs_farm.geometry.bodies import vessel as vessel
+    from pbrs_farm.geometry.outlines import oval as oval
+    from pbrs_farm.geometry.outlines import rect as rect
     from pbrs_farm.geometry.solids import boxes_surface as boxes_surface
     from pbrs_farm.images import exr_from_layers as exr_from_layers
     from pbrs_farm.raycast.caster import Caster as Caster
@@ -116,14 +116,14 @@ _MODULES: Final = {
     "core.shot": ("view_id",),
     "dress.mutable_house": ("MutableHouse",),
     "dress.style": ("Style",),
-    "furnishings.things.bodies": (
+    "geometry.bodies": (
         "bevelled", "board", "cylinder", "disc", "frustum", "loft", "rounded", "slab", "tube", "revolve",
         "vessel",
     ),
     "furnishings.things.cloth": ("draped", "sheet"),
     "furnishings.things.maker": ("Maker", "Size", "family", "thing"),
-    "furnishings.things.materials": ("glass", "glossy", "plain"),
-    "furnishings.things.outlines": ("oval", "rect"),
+    "dress.thing_materials": ("glass", "glossy", "plain"),
+    "geometry.outlines": ("oval", "rect"),
     "export.chosen_view": ("Choice", "ChosenView"),
     "export.form": ("HomeForm", "ViewForm"),
     "geometry.solids": ("boxes_surface",),

@@ -31,9 +31,9 @@ from pbrs_farm.dress.soft_cloth import weave_soft_things
 from pbrs_farm.dress.style import Style, style_for
 from pbrs_farm.dress.surfaces import dress_surfaces
 from pbrs_farm.dress.swap import swap_furniture
+from pbrs_farm.dress.textiles import add_textiles
 from pbrs_farm.dress.walls import furnish_walls
 from pbrs_farm.dress.wear import add_wear
-from pbrs_farm.furnishings.textiles import add_textiles
 
 DressingPass = Callable[[MutableHouse, Catalogue, Style, float], None]
 

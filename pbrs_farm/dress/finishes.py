@@ -37,8 +37,8 @@ from pbrs_farm.dress.part_kinds import (
     kind_of_part,
     metal_of,
 )
+from pbrs_farm.dress.patterns import SEEDS, Pattern, pattern_material, photographed
 from pbrs_farm.dress.style import COLOURS, METALS, WOODS, Rgb, Style, Wood
-from pbrs_farm.furnishings.textures.families import SEEDS, Pattern, pattern_material, photographed
 
 PASS: Final = "parts"
 _LEAST_BOARD_M2: Final = 0.05  # smaller parts of unknown kind are unchanged: knobs, feet

@@ -24,11 +24,10 @@ from pbrs_farm.core.house import (
     Room,
     corners_of_surfaces,
 )
+from pbrs_farm.dress.content import content
+from pbrs_farm.dress.models import Model
 from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.style import style_for
-from pbrs_farm.furnishings.things.assembly import Model
-from pbrs_farm.furnishings.things.families import family_pieces, family_shape
-from pbrs_farm.furnishings.things.things import THINGS
 from pbrs_farm.geometry.free_air import FreeAir, mean_shadow_m2, shadow_for_share
 from pbrs_farm.geometry.moving import moved_item
 from pbrs_farm.home.room_use import MIN_LIVED_IN_M2, is_outdoors
@@ -87,12 +86,13 @@ def _drawn(rng: np.random.Generator) -> Model:
     while True:
         if rng.random() < _SMALL_SHARE:
             style = style_for(rng)
-            piece, shape = THINGS[list(THINGS)[int(rng.integers(len(THINGS)))]].make(rng, style)
+            names = content().small_things
+            piece, shape = content().things[names[int(rng.integers(len(names)))]](rng, style)
         else:
             groups = list(_furniture().values())
             pieces = groups[int(rng.integers(len(groups)))]
             piece = pieces[int(rng.integers(len(pieces)))]
-            shape = family_shape(piece)
+            shape = content().family_shape(piece)
         used = {shape.materials[s.material].kind for s in shape.surfaces}
         if _LEAST_M <= max(piece.size) <= _MOST_M and not used & {*_LEFT_OUT}:
             return piece, shape
@@ -102,7 +102,7 @@ def _drawn(rng: np.random.Generator) -> Model:
 def _furniture() -> dict[str, list[Piece]]:
     """Group -> generated floor furniture without lights, no larger than _MOST_M."""
     found: dict[str, list[Piece]] = {}
-    for piece in family_pieces():
+    for piece in content().family_pieces():
         if (
             piece.place in (Place.FLOOR, Place.SURFACE)
             and piece.kind is ItemKind.OBJECT

@@ -18,17 +18,16 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Catalogue, Place
 from pbrs_farm.core.classes import BOOKSHELF, COUNTER, SINK
 from pbrs_farm.core.record import Nyu40, Record, read_toml
+from pbrs_farm.dress.content import content
 from pbrs_farm.dress.filled_walls import fill_wall, is_filled
 from pbrs_farm.dress.fitting_pieces import own_or_all
 from pbrs_farm.dress.furniture_look import BoardLook, grained, look_of
+from pbrs_farm.dress.models import Model
 from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.room_floor import LOWER_M, OUT_M, FloorSpot, RoomFloor, spot_at
 from pbrs_farm.dress.space import RoomSpace, house_space
 from pbrs_farm.dress.style import Style, room_style
 from pbrs_farm.dress.walls.hanging import next_id
-from pbrs_farm.furnishings.things import case_goods
-from pbrs_farm.furnishings.things.assembly import Model
-from pbrs_farm.furnishings.things.case_goods import CASE_GOODS
 from pbrs_farm.geometry.swept import swept_by
 from pbrs_farm.home.room_use import RoomKind, is_cooked_in
 
@@ -146,7 +145,7 @@ def _generated(
     kind: WantedKind, look: BoardLook, size: tuple[float, float, float], own: int
 ) -> Model:
     rng = np.random.default_rng(own)
-    return grained(CASE_GOODS[kind.model].make(rng, look.style, look.boards, size), look)
+    return grained(content().things[kind.model](rng, look.style, look.boards, size), look)
 
 
 def _from_catalogue(
@@ -274,7 +273,7 @@ def _chair_before(
     rng: np.random.Generator,
 ) -> None:
     """A chair before a desk, turned to it; none where it would be in the way."""
-    made = grained(case_goods.desk_chair.make(rng, look.style, look.boards), look)
+    made = grained(content().things["desk_chair"](rng, look.style, look.boards), look)
     high = made[1].bounds[1]
     out = OUT_M + spot.depth + float(high[2]) + float(rng.uniform(0.05, 0.12))
     y = floor.room.room.floor_y

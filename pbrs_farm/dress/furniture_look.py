@@ -4,19 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from pbrs_farm.core.catalogue import Catalogue
 from pbrs_farm.core.house import Material
 from pbrs_farm.dress.box_mapping import box_mapped
+from pbrs_farm.dress.content import content
 from pbrs_farm.dress.finishes import grain_pattern
+from pbrs_farm.dress.models import Model
 from pbrs_farm.dress.mutable_house import MutableHouse
+from pbrs_farm.dress.patterns import pattern_material, photographed
 from pbrs_farm.dress.style import COLOURS, Rgb, Style, mix
-from pbrs_farm.furnishings.textures.families import pattern_material, photographed
-from pbrs_farm.furnishings.things.assembly import Model
-from pbrs_farm.furnishings.things.case_goods import Boards
-from pbrs_farm.furnishings.things.materials import plain
+from pbrs_farm.dress.thing_materials import plain
 
 _WHITE: Rgb = (0.9, 0.9, 0.88)
 
@@ -26,7 +27,7 @@ class BoardLook:
     """Boards, and of materials that show a picture how large one repeat of it is."""
 
     style: Style
-    boards: Boards
+    boards: Any  # Content.boards
     size_m: Mapping[Material, tuple[float, float]]
 
 
@@ -53,7 +54,7 @@ def look_of(
     else:
         body, front, top = painted, painted, wood
     cloth = style.textiles[int(rng.integers(len(style.textiles)))]
-    return BoardLook(style, Boards(body, front, top, cloth), {wood: grain.size_m})
+    return BoardLook(style, content().boards(body, front, top, cloth), {wood: grain.size_m})
 
 
 def grained(made: Model, look: BoardLook) -> Model:

@@ -20,6 +20,7 @@ from pydantic import TypeAdapter, ValidationError
 from pbrs_farm.assets.debian import write_whole
 from pbrs_farm.core import keys
 from pbrs_farm.core.house import Material, Texture
+from pbrs_farm.dress.content import content
 from pbrs_farm.dress.painted_materials import Painted, Painting
 
 MOST_BYTES: Final = 2_000_000_000  # maximum size; the oldest entries are removed first
@@ -98,8 +99,9 @@ class PaintedBank:
 def _makers() -> str:
     """The digest of the code that paints, and of the packages it paints with."""
     folder = Path(__file__).parent
+    ours = [folder / f"{name}.py" for name in ("noise", "patterns", "style", "surface_maps")]
     code = hashlib.sha256()
-    for path in (*sorted((folder / "textures").glob("*.py")), folder / "style.py"):
+    for path in (*content().paint_files, *ours):
         code.update(path.read_bytes())
     return keys.digest(code.hexdigest(), *(version(name) for name in _MAKERS))
 

@@ -23,12 +23,12 @@ from pbrs_farm.core.house import Item, Material, MaterialKind, Surface
 from pbrs_farm.core.mesh import face_areas, triangle_corners
 from pbrs_farm.core.record import Record, read_toml
 from pbrs_farm.dress.box_mapping import box_mapped
+from pbrs_farm.dress.content import content
 from pbrs_farm.dress.finishes import tinted
 from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.part_kinds import PartKind, kind_by_name
+from pbrs_farm.dress.patterns import Pattern, pattern_material, photographed
 from pbrs_farm.dress.style import Rgb, Style, mix
-from pbrs_farm.furnishings.textures.families import Pattern, pattern_material, photographed
-from pbrs_farm.furnishings.textures.wallpaper import PATTERNS
 
 PASS: Final = "cloth"
 
@@ -92,7 +92,7 @@ def _woven(
         near = mix(own, (0.95, 0.94, 0.9) if max(own) < 0.5 else (0.2, 0.18, 0.16), 0.3)
         tints = (own, mix(near, print_colour, cloth.contrast), style.accent)
         pattern = Pattern(
-            "wallpaper", int(rng.integers(4)), tints, variant=str(rng.choice(PATTERNS))
+            "wallpaper", int(rng.integers(4)), tints, variant=str(rng.choice(content().wallpapers))
         )
         made = pattern_material(house, pattern)
         size = made.size_m[0] * cloth.repeat, made.size_m[1] * cloth.repeat

@@ -11,8 +11,8 @@ from pbrs_farm.core.house import Item, Material, MaterialKind, Surface
 from pbrs_farm.dress.box_mapping import box_mapped
 from pbrs_farm.dress.finishes import grain_pattern
 from pbrs_farm.dress.mutable_house import MutableHouse
+from pbrs_farm.dress.patterns import pattern_material
 from pbrs_farm.dress.style import Metal, Rgb, Wood
-from pbrs_farm.furnishings.textures.families import pattern_material
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,6 +18,7 @@ from pbrs_farm.core.catalogue import Catalogue, Piece, Place, Shape
 from pbrs_farm.core.classes import CHAIR
 from pbrs_farm.core.house import Item, ItemKind, LightPart
 from pbrs_farm.dress.fitting_pieces import Scale, common_scale, is_lit_alike, own_or_all
+from pbrs_farm.dress.models import GENERATED
 from pbrs_farm.dress.mutable_house import MutableHouse, moved_item
 from pbrs_farm.dress.neighbours import (
     ALIKE_HELD,
@@ -40,7 +41,6 @@ from pbrs_farm.dress.old_place import (
 )
 from pbrs_farm.dress.style import Style
 from pbrs_farm.dress.surfaces.skirting import BASEBOARD
-from pbrs_farm.furnishings.things.assembly import GENERATED
 from pbrs_farm.geometry.surface_points import item_triangles
 from pbrs_farm.home.room_use import is_outdoors
 

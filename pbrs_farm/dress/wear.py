@@ -16,13 +16,9 @@ from pbrs_farm.core.catalogue import Catalogue
 from pbrs_farm.core.house import Item, ItemKind, Material, MaterialKind, Texture
 from pbrs_farm.dress.box_mapping import area_of_look, box_mapped
 from pbrs_farm.dress.mutable_house import MutableHouse
+from pbrs_farm.dress.noise import blurred, noise, smoothstep
 from pbrs_farm.dress.style import Style
-from pbrs_farm.furnishings.textures.maps import (
-    normals_from_height,
-    roughness_bytes,
-    texture_from_pixels,
-)
-from pbrs_farm.furnishings.textures.noise import blurred, noise, smoothstep
+from pbrs_farm.dress.surface_maps import normals_from_height, roughness_bytes, texture_from_pixels
 
 PASS: Final = "parts"
 SIZE_M: Final = (0.6, 0.6)  # size of one repeat

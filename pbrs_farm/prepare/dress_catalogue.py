@@ -82,9 +82,9 @@ def _stamp(path: Path) -> int:
 
 @lru_cache(maxsize=4)
 def _catalogue(given: tuple[tuple[Path, int], ...], has_package: bool | None) -> Catalogue:
-    from pbrs_farm.furnishings.things.families import with_families
+    from pbrs_farm.dress.content import content
 
-    catalogue = with_families(_of_libraries(given, has_package))
+    catalogue = content().with_families(_of_libraries(given, has_package))
     return replace(catalogue, painted_folder=cache_folder() / "painted")
 
 

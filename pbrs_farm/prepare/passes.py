@@ -142,10 +142,10 @@ def _has_floating_things(source: SourceRef, recipe: Recipe) -> bool:
 
 
 def _float_depends(source: SourceRef, recipe: Recipe) -> list[object]:
-    from pbrs_farm.furnishings.things.families import families_digest
+    from pbrs_farm.dress.content import content
 
     # Generated items float, too.
-    things = [families_digest(), PASS["dress"].version]
+    things = [content().families_digest(), PASS["dress"].version]
     return [_float_seed(source, recipe), recipe.dress.float_share, *things]
 
 
@@ -293,12 +293,10 @@ def _float(work: Preparation) -> Preparation:
 
 def _surround(work: Preparation) -> Preparation:
     """Streets, gardens and courts before the windows."""
-    from pbrs_farm.furnishings.surroundings import with_surroundings
+    from pbrs_farm.dress.content import content
 
-    recipe = work.recipe
-    return replace(
-        work, current=with_surroundings(work.house, recipe.surroundings.kind, recipe.seed)
-    )
+    kind, seed = work.recipe.surroundings.kind, work.recipe.seed
+    return replace(work, current=content().with_surroundings(work.house, kind, seed))
 
 
 def _edit(work: Preparation) -> Preparation:

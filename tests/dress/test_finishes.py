@@ -13,8 +13,8 @@ from pbrs_farm.core.house import House, Item, Material, MaterialKind
 from pbrs_farm.dress.finishes import finish_furniture
 from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.part_kinds import is_brown, is_dark, is_white, kind_by_name
+from pbrs_farm.dress.patterns import PatternMaterial
 from pbrs_farm.dress.style import Rgb, style_for
-from pbrs_farm.furnishings.textures.families import PatternMaterial
 from tests.dress.furniture import boards, house, solid
 
 BROWN: Rgb = (0.58, 0.27, 0.0)

@@ -14,13 +14,13 @@ from pbrs_farm.core.house import Item
 from pbrs_farm.core.joints import Joint, JointKind
 from pbrs_farm.core.mesh import signed_volume, triangle_corners
 from pbrs_farm.dress.furniture import KINDS, _from_catalogue, add_furniture
+from pbrs_farm.dress.models import Model
 from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.space import doors_are_joined, floor_bitmap, house_space
 from pbrs_farm.dress.style import style_for
 from pbrs_farm.dress.supports import supports_of_item
-from pbrs_farm.furnishings.things.assembly import Model
+from pbrs_farm.dress.thing_materials import plain
 from pbrs_farm.furnishings.things.case_goods import CASE_GOODS, Boards, desk_chair
-from pbrs_farm.furnishings.things.materials import plain
 from pbrs_farm.geometry.scene_triangles import SceneTriangles
 from pbrs_farm.read.builtin.builtin_home import builtin_home
 from tests.dress.furniture import solid

@@ -13,7 +13,7 @@ from pbrs_farm.core.house import Material, Texture
 from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.painted_bank import PaintedBank
 from pbrs_farm.dress.painted_materials import Painted
-from pbrs_farm.furnishings.textures.families import Pattern, pattern_material
+from pbrs_farm.dress.patterns import Pattern, pattern_material
 from pbrs_farm.images import decode_texture
 from pbrs_farm.read.builtin.builtin_home import builtin_home
 

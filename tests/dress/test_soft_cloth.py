@@ -11,9 +11,9 @@ from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.frames import linear_from_srgb
 from pbrs_farm.core.house import Item, Material
 from pbrs_farm.dress.mutable_house import MutableHouse
+from pbrs_farm.dress.patterns import PatternMaterial
 from pbrs_farm.dress.soft_cloth import weave_soft_things
 from pbrs_farm.dress.style import style_for
-from pbrs_farm.furnishings.textures.families import PatternMaterial
 from tests.dress.furniture import house, solid
 
 RED = (0.6, 0.2, 0.1)

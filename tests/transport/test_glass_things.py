@@ -10,8 +10,8 @@ import pytest
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import Material, MaterialKind, Surface
 from pbrs_farm.core.recipe import LightFields, recipe_from_name
-from pbrs_farm.furnishings.things.bodies import revolve
-from pbrs_farm.furnishings.things.materials import CLEAR
+from pbrs_farm.dress.thing_materials import CLEAR
+from pbrs_farm.geometry.bodies import revolve
 from pbrs_farm.raycast.variant import choose_variant
 from pbrs_farm.transport.light_scene import LightScene
 from pbrs_farm.transport.scene_tables.sky import uniform_sky

@@ -20,10 +20,10 @@ from pbrs_farm.dress.clutter.cushions import (
     put_as_it_is,
 )
 from pbrs_farm.dress.clutter.placing import Placing
+from pbrs_farm.dress.content import content
+from pbrs_farm.dress.models import Model
 from pbrs_farm.dress.supports import plan_turn
-from pbrs_farm.furnishings.things import soft
-from pbrs_farm.furnishings.things.assembly import Model
-from pbrs_farm.furnishings.things.bodies import smooth
+from pbrs_farm.geometry.bodies import smooth
 from pbrs_farm.geometry.heights import highest_below
 from pbrs_farm.geometry.plan_grid import PlanGrid, top_heights
 from pbrs_farm.geometry.scene_triangles import SceneTriangles
@@ -67,7 +67,7 @@ def dress_bed(placing: Placing, scene: SceneTriangles, index: int) -> int:
     if not _has_pillows(bed) and rng.random() < 0.95 * placing.share:
         # Both pillows of a bed are alike.
         own = int(rng.integers(1 << 30))
-        made = soft.bed_pillow.make(np.random.default_rng(own), placing.style)
+        made = content().things["bed_pillow"](np.random.default_rng(own), placing.style)
         is_double = bed.width > _DOUBLE_M
         most = (bed.width + 0.04) / 2 - 0.02 if is_double else bed.width
         if made[0].size[0] > most:
@@ -87,12 +87,12 @@ def dress_bed(placing: Placing, scene: SceneTriangles, index: int) -> int:
         return n + (duvet is not None)
     if rng.random() < 0.45 * placing.share:
         # A cushion leans where the pillows end, not across the bed's middle.
-        made = soft.cushion.make(rng, placing.style)
+        made = content().things["cushion"](rng, placing.style)
         at = float(rng.uniform(0.35, 0.65))
         n += lay_down(placing, scene, index, made, *_place_on_bed(bed, at, 0.56, made), bed.level)
     if rng.random() < 0.65 * placing.share:
         # A folded blanket across the foot.
-        made = soft.folded_blanket.make(rng, placing.style)
+        made = content().things["folded_blanket"](rng, placing.style)
         at = float(rng.uniform(0.35, 0.65))
         from_head = bed.length - made[0].size[1] - float(rng.uniform(0.08, 0.25))
         n += lay_down(

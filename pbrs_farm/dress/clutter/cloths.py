@@ -13,10 +13,10 @@ from pbrs_farm.core.house import Material
 from pbrs_farm.dress.clutter.cloth_ground import CELL_M, TOUCH_M, Ground
 from pbrs_farm.dress.clutter.drapes import Folds, Net, drape, flat_net, lie_flat, sheet_of
 from pbrs_farm.dress.clutter.placing import Placing
+from pbrs_farm.dress.models import standing_piece
 from pbrs_farm.dress.style import Rgb, mix
 from pbrs_farm.dress.supports import plan_turn
-from pbrs_farm.furnishings.things.assembly import standing_piece
-from pbrs_farm.furnishings.things.materials import plain
+from pbrs_farm.dress.thing_materials import plain
 from pbrs_farm.geometry.heights import highest_below
 from pbrs_farm.geometry.plan_grid import PlanGrid
 from pbrs_farm.geometry.scene_triangles import SceneTriangles

@@ -21,12 +21,12 @@ from pbrs_farm.dress.clutter.receptacles import can_hold, receptacle_of
 from pbrs_farm.dress.clutter.shelves import fill_shelf, plan_shelves
 from pbrs_farm.dress.clutter.stock import Stock
 from pbrs_farm.dress.clutter.table_tops import fill_top, set_table
+from pbrs_farm.dress.content import content
 from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.space.house_space import HouseSpace, RoomSpace, house_space
 from pbrs_farm.dress.style import Style, room_style
 from pbrs_farm.dress.supports import supports_of_item
 from pbrs_farm.dress.worktop import Worktop
-from pbrs_farm.furnishings.things.book_covers import book_covers
 from pbrs_farm.geometry.scene_triangles import SceneTriangles
 from pbrs_farm.home.names import words_of_item
 from pbrs_farm.home.room_use import RoomKind
@@ -50,7 +50,7 @@ def add_clutter(house: MutableHouse, catalogue: Catalogue, style: Style, share: 
     """
     space = house_space(house)
     scene = SceneTriangles(house.items)
-    covers = book_covers(house.rng("clutter", "covers"), style)
+    covers = content().book_covers(house.rng("clutter", "covers"), style)
     stock = Stock(catalogue, covers, int(house.rng("clutter", "stock").integers(1 << 31)))
     bias = house_bias(house.rng("clutter", "bias"))
     owners = _owners(scene, space)

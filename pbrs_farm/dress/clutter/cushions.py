@@ -11,10 +11,10 @@ from pbrs_farm.core.catalogue import Shape
 from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import Surface
 from pbrs_farm.dress.clutter.placing import Placing
+from pbrs_farm.dress.content import content
+from pbrs_farm.dress.models import Model
 from pbrs_farm.dress.supports import plan_turn
-from pbrs_farm.furnishings.things import soft
-from pbrs_farm.furnishings.things.assembly import Model
-from pbrs_farm.furnishings.things.bodies import smooth
+from pbrs_farm.geometry.bodies import smooth
 from pbrs_farm.geometry.heights import highest_below
 from pbrs_farm.geometry.plan_grid import PlanGrid, cells_over, top_heights
 from pbrs_farm.geometry.scene_triangles import SceneTriangles
@@ -98,7 +98,7 @@ def dress_seat(placing: Placing, scene: SceneTriangles, index: int, most: int) -
     for k in range(2 * n_wanted):
         if n == n_wanted:
             break
-        made = soft.cushion.make(rng, placing.style)
+        made = content().things["cushion"](rng, placing.style)
         half = made[0].size[0] / 2 / CELL_M
         low, high = columns[0] + half + _SIDE_M / CELL_M, columns[-1] - half - _SIDE_M / CELL_M
         if high <= low:

@@ -17,7 +17,7 @@ from scipy import ndimage
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import Surface
 from pbrs_farm.dress.clutter.cloth_ground import TOUCH_M, Ground
-from pbrs_farm.furnishings.textiles.hanging_cloth import solid_sheet
+from pbrs_farm.dress.textiles.hanging_cloth import solid_sheet
 
 MOST_STRETCH: Final = 1.3  # of the 99th percentile of edges, over their lengths at rest
 _STEPS: Final = 50  # time steps until the cloth is at rest

@@ -15,6 +15,7 @@ from pbrs_farm.core.house import Item, ItemKind
 from pbrs_farm.core.walkable import CELL_M
 from pbrs_farm.dress.clutter.placing import Placing, separate_pair
 from pbrs_farm.dress.clutter.stock import CLUTTER
+from pbrs_farm.dress.models import Model
 from pbrs_farm.dress.space.flights import flights_of
 from pbrs_farm.dress.space.floor_bitmaps import (
     FloorBitmap,
@@ -25,7 +26,6 @@ from pbrs_farm.dress.space.floor_bitmaps import (
 from pbrs_farm.dress.space.house_space import HouseSpace, RoomSpace
 from pbrs_farm.dress.supports import faces_around
 from pbrs_farm.dress.worktop import LIFT_M
-from pbrs_farm.furnishings.things.assembly import Model
 from pbrs_farm.geometry.plan_grid import PlanGrid
 from pbrs_farm.geometry.scene_triangles import SceneTriangles
 from pbrs_farm.geometry.swept import floor_swept

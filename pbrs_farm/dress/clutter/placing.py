@@ -15,10 +15,10 @@ from pbrs_farm.core.catalogue import Shape
 from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import Room, Surface
 from pbrs_farm.dress.clutter.stock import CLUTTER, Stock
+from pbrs_farm.dress.models import Model
 from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.style import Style
 from pbrs_farm.dress.worktop import TopSpot, Worktop, turned_size
-from pbrs_farm.furnishings.things.assembly import Model
 from pbrs_farm.home.room_use import RoomKind
 
 PASS = "clutter"

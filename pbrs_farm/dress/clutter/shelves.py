@@ -9,9 +9,9 @@ import numpy as np
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.dress.clutter.placing import Placing, take_for_room
 from pbrs_farm.dress.clutter.stock import CLUTTER, KindShares
+from pbrs_farm.dress.content import content
+from pbrs_farm.dress.models import Model
 from pbrs_farm.dress.worktop import TopSpot, Worktop
-from pbrs_farm.furnishings.things.assembly import Model
-from pbrs_farm.furnishings.things.books import leaning_book, run_of_books, stack_of_books
 from pbrs_farm.home.room_use import RoomKind
 
 _LEAST_BOOK_M = 0.14  # free height that upright books need
@@ -84,10 +84,10 @@ def _put_books(
     for length in (most, 0.6 * most, 0.35 * most):
         if length < 0.03:
             return None
-        made, last = run_of_books(rng, stock.covers, length - 0.09 * leans, tall, depth)
+        made, last = content().run_of_books(rng, stock.covers, length - 0.09 * leans, tall, depth)
         row = [made]
         if leans and last > 0.14:
-            row.append(leaning_book(rng, stock.covers, last * 0.97, depth))
+            row.append(content().leaning_book(rng, stock.covers, last * 0.97, depth))
         after = _leftmost(placing, top, column, row, plan.inset_m)
         if after is not None:
             return after
@@ -98,7 +98,7 @@ def _lying(rng: np.random.Generator, placing: Placing, depth: float, tall: float
     # A pile as high as the shelf lets it, its spines out.
     n = int(rng.integers(2, 6))
     while True:
-        made = stack_of_books(rng, placing.stock.covers, n, most=min(depth / 0.72, 0.32))
+        made = content().stack_of_books(rng, placing.stock.covers, n, most=min(depth / 0.72, 0.32))
         if made[0].size[2] < tall or n == 1:
             return made
         n -= 1

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 from collections import Counter
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
 from pbrs_farm.core.catalogue import Catalogue, Place, Shape
 from pbrs_farm.core.house import ItemKind
 from pbrs_farm.core.record import Record, Several, read_csv, read_toml
+from pbrs_farm.dress.content import content
+from pbrs_farm.dress.models import Model
 from pbrs_farm.dress.style import Style
-from pbrs_farm.furnishings.things.assembly import Model
-from pbrs_farm.furnishings.things.book_covers import Covers
-from pbrs_farm.furnishings.things.books import magazines, open_book, stack_of_books
-from pbrs_farm.furnishings.things.things import THINGS
 from pbrs_farm.home.room_use import RoomKind
 
 # Maximum faces of one small catalogue item, unless its kind has another limit.
@@ -47,7 +45,7 @@ _KINDS: Final = {
 class Stock:
     """Source of a home's small items: one model of each kind, as people own sets."""
 
-    def __init__(self, catalogue: Catalogue, covers: Covers, seed: int) -> None:
+    def __init__(self, catalogue: Catalogue, covers: Any, seed: int) -> None:
         self.covers = covers
         self._catalogue = catalogue
         self._seed = seed
@@ -63,9 +61,14 @@ class Stock:
         if kind == "book":
             # One or a pile; occasionally one is open.
             n = int(rng.choice([0, 1, 1, 2, 3, 4, 5]))
-            return stack_of_books(rng, self.covers, n) if n else open_book(rng, self.covers)
+            books = content()
+            return (
+                books.stack_of_books(rng, self.covers, n)
+                if n
+                else books.open_book(rng, self.covers)
+            )
         if kind == "magazines":
-            return magazines(rng, self.covers, int(rng.integers(1, 6)))
+            return content().magazines(rng, self.covers, int(rng.integers(1, 6)))
         # Draw for all alike, so that what the catalogue holds moves no later draw.
         found = _thing_kind(kind)
         is_made, number = rng.random() < found.made_share, int(rng.integers(1 << 30))
@@ -77,7 +80,7 @@ class Stock:
             self._faces[piece.id] += _n_faces(shape)
             return piece, shape
         own = np.random.default_rng(number)
-        return THINGS[found.made].make(own, style) if found.made else None
+        return content().things[found.made](own, style) if found.made else None
 
     def _owned(self, kind: str) -> list[Model]:
         """The designs of the catalogue that this home has; at most _DESIGNS of a kind."""
@@ -109,7 +112,7 @@ def is_round(kind: str) -> bool:
 
 def is_known(kind: str) -> bool:
     """Whether there is such a kind."""
-    return kind in (*_KINDS, *THINGS, "book", "magazines")
+    return kind in (*_KINDS, *content().small_things, "book", "magazines")
 
 
 def _thing_kind(name: str) -> ThingKind:

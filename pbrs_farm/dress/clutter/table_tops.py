@@ -11,8 +11,8 @@ from pbrs_farm.dress.clutter.cloths import drop_clothes
 from pbrs_farm.dress.clutter.placing import Placing, take_for_room
 from pbrs_farm.dress.clutter.receptacles import shares
 from pbrs_farm.dress.clutter.stock import CLUTTER, is_round
+from pbrs_farm.dress.models import Model
 from pbrs_farm.dress.worktop import Worktop
-from pbrs_farm.furnishings.things.assembly import Model
 from pbrs_farm.geometry.scene_triangles import SceneTriangles
 
 _MOST_OF_A_KIND = 3  # on one surface

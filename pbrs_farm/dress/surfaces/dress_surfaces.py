@@ -18,6 +18,7 @@ from pbrs_farm.core.frames import srgb_from_linear
 from pbrs_farm.core.house import Item, ItemKind, Surface
 from pbrs_farm.dress.finish_scheme import FinishScheme, finish_scheme
 from pbrs_farm.dress.mutable_house import MutableHouse
+from pbrs_farm.dress.patterns import Pattern, PatternMaterial, pattern_material, photographed
 from pbrs_farm.dress.space.house_space import RoomSpace, house_space
 from pbrs_farm.dress.style import Style, room_style
 from pbrs_farm.dress.surface_finishes import (
@@ -40,12 +41,6 @@ from pbrs_farm.dress.surfaces.home_finish import (
 from pbrs_farm.dress.surfaces.sided_walls import RoomFinder, SidedWall, sided_wall
 from pbrs_farm.dress.surfaces.skirting import BASEBOARD, has_boards, skirting_board, wall_plans
 from pbrs_farm.dress.surfaces.wall_materials import REVEAL, RestOfWall, RoomWalls, painted_wall
-from pbrs_farm.furnishings.textures.families import (
-    Pattern,
-    PatternMaterial,
-    pattern_material,
-    photographed,
-)
 from pbrs_farm.home.room_use import RoomKind
 
 PASS = "surfaces"

@@ -8,7 +8,9 @@ from typing import TypeVar
 
 import numpy as np
 
+from pbrs_farm.dress.content import content
 from pbrs_farm.dress.finish_scheme import aged
+from pbrs_farm.dress.patterns import SEEDS, Pattern
 from pbrs_farm.dress.style import (
     COLOURS,
     COVERED_ROOMS,
@@ -21,9 +23,6 @@ from pbrs_farm.dress.style import (
     mix,
     rgb,
 )
-from pbrs_farm.furnishings.textures.families import SEEDS, Pattern
-from pbrs_farm.furnishings.textures.panelling import PANELS_M
-from pbrs_farm.furnishings.textures.wallpaper import PATTERNS, inks
 from pbrs_farm.home.room_use import RoomKind
 
 _T = TypeVar("_T")
@@ -164,7 +163,9 @@ def covered(
         return walls
     pattern = _pattern_of_cover(rng, style, cover)
     if cover.walls == "foot":
-        high = PANELS_M[pattern.variant][1] if not cover.low_m else _pick(rng, cover.low_m)
+        high = (
+            content().panels_m[pattern.variant][1] if not cover.low_m else _pick(rng, cover.low_m)
+        )
         return replace(walls, low=pattern, low_m=high)
     if cover.walls == "one or all" and rng.random() < _ALL_WALLS:
         return replace(walls, main=pattern)
@@ -214,7 +215,7 @@ def _brick(rng: np.random.Generator, style: Style) -> Pattern:
 
 
 def _wallpaper(rng: np.random.Generator, style: Style, ground: Rgb) -> Pattern:
-    tint, accent = inks(rng, ground, mix(style.palette[2], style.accent, 0.25))
+    tint, accent = content().wallpaper_inks(rng, ground, mix(style.palette[2], style.accent, 0.25))
     return Pattern(
         "wallpaper", _seed(rng), (ground, tint, accent), variant=_pick(rng, style.papers)
     )
@@ -267,7 +268,9 @@ def _carpet(rng: np.random.Generator, style: Style) -> Floor:
     if rng.random() < _PRINTED_CARPETS:
         second = style.textiles[int(rng.integers(len(style.textiles)))]
         tints = (tint, mix(tint, second, 0.75), mix(style.accent, tint, 0.3))
-        return Floor(Pattern("printed carpet", _seed(rng), tints, variant=_pick(rng, PATTERNS)))
+        return Floor(
+            Pattern("printed carpet", _seed(rng), tints, variant=_pick(rng, content().wallpapers))
+        )
     return Floor(Pattern(_pick(rng, ("carpet", "carpet", "loop carpet")), _seed(rng), (tint,)))
 
 

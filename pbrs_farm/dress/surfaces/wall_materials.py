@@ -10,9 +10,9 @@ import numpy as np
 from pbrs_farm.core.arrays import F64, Bools
 from pbrs_farm.core.house import Item, Surface
 from pbrs_farm.core.mesh import unit_normals
+from pbrs_farm.dress.patterns import PatternMaterial
 from pbrs_farm.dress.surfaces.cut_triangles import cut_triangles
 from pbrs_farm.dress.surfaces.sided_walls import Side, SidedWall
-from pbrs_farm.furnishings.textures.families import PatternMaterial
 
 REVEAL = "reveal"
 """Name of the faces by whose material repair paints the sides of openings."""

@@ -8,6 +8,8 @@ from PIL import Image, ImageDraw, ImageFont
 from pbrs_farm.core.arrays import F64, Srgb8Image
 from pbrs_farm.core.catalogue import Catalogue, Piece, Shape
 from pbrs_farm.core.classes import MIRROR, SINK
+from pbrs_farm.dress.content import content
+from pbrs_farm.dress.models import Model
 from pbrs_farm.dress.space import HouseSpace, Passage
 from pbrs_farm.dress.style import Rgb, Style, shade
 from pbrs_farm.dress.walls.hanging import WANTS, Hanging, faces_behind
@@ -18,8 +20,6 @@ from pbrs_farm.dress.walls.hung_things import (
     jpeg_texture,
     mirror,
 )
-from pbrs_farm.furnishings.things import hung as hung_furniture
-from pbrs_farm.furnishings.things.assembly import Model
 from pbrs_farm.home.room_use import RoomKind
 
 _SWITCH_M, _SOCKET_M = 1.05, 0.3  # heights of their middles above the floor
@@ -61,7 +61,7 @@ def _tall_mirror(hanging: Hanging, rng: np.random.Generator, style: Style) -> No
     if rng.random() < 0.35:
         diameter = float(rng.uniform(0.45, 0.75))
         made, low = (
-            hung_furniture.round_mirror.make(rng, style, diameter, frame),
+            content().things["round_mirror"](rng, style, diameter, frame),
             1.55 - diameter / 2,
         )
     else:
@@ -75,7 +75,7 @@ def hang_notes(hanging: Hanging, style: Style, share: float) -> None:
     rng = hanging.house.rng("notes", hanging.room.room.id)
     if rng.random() < WANTS[hanging.room.kind].notes * share:
         low_m = float(rng.uniform(0.95, 1.25))
-        hang_anywhere(hanging, hung_furniture.wall_notes.make(rng, style), low_m, 0.3, rng)
+        hang_anywhere(hanging, content().things["wall_notes"](rng, style), low_m, 0.3, rng)
 
 
 def hang_clock(hanging: Hanging, style: Style, share: float) -> None:
@@ -147,7 +147,7 @@ def fit_switches(hanging: Hanging, catalogue: Catalogue, style: Style, share: fl
         return
     # All switches of a home are of one make.
     form = int(hanging.house.rng("switches", "form").integers(SWITCH_FORMS))
-    switch = _draw_fitting(catalogue, "switch", rng) or hung_furniture.wall_switch.make(
+    switch = _draw_fitting(catalogue, "switch", rng) or content().things["wall_switch"](
         rng, style, 1, colour, form
     )
     lit = 0
@@ -157,7 +157,7 @@ def fit_switches(hanging: Hanging, catalogue: Catalogue, style: Style, share: fl
             lit += 1
     for _ in range(WANTS[room.kind].sockets):
         n = int(rng.choice([1, 1, 2, 3]))
-        socket = _draw_fitting(catalogue, "socket", rng) or hung_furniture.wall_socket.make(
+        socket = _draw_fitting(catalogue, "socket", rng) or content().things["wall_socket"](
             rng, style, n, colour
         )
         hang_anywhere(hanging, socket, _SOCKET_M - 0.04, 0.05, rng)

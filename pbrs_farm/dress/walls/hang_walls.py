@@ -10,6 +10,7 @@ import numpy as np
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Catalogue
 from pbrs_farm.core.classes import BED
+from pbrs_farm.dress.content import content
 from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.space import HouseSpace, WallFace, house_space
 from pbrs_farm.dress.style import Style
@@ -19,7 +20,6 @@ from pbrs_farm.dress.walls.kitchens import hang_kitchen
 from pbrs_farm.dress.walls.pictures import Gallery, hang_pictures, hang_pin_board
 from pbrs_farm.dress.walls.radiators import hang_radiators, wants_radiators
 from pbrs_farm.dress.walls.wall_shelves import hang_cloth, hang_shelves
-from pbrs_farm.furnishings.things import hung as hung_furniture
 from pbrs_farm.home.room_use import RoomKind, is_cooked_in
 
 _HOOKS_M: Final = 1.68  # height of the hook board's lower edge above the floor
@@ -40,7 +40,7 @@ def hang_coats(hanging: Hanging, space: HouseSpace, style: Style, share: float) 
         return
     beds = [space.bounds[k] for k in hanging.room.items if items[k].nyu40 == BED]
     for n in range(WANTS[kind].most_coats, 0, -1):
-        piece, shape = hung_furniture.coat_rack.make(rng, style, n, kind is RoomKind.BATHROOM)
+        piece, shape = content().things["coat_rack"](rng, style, n, kind is RoomKind.BATHROOM)
         low, high = shape.bounds
         width, bottom = float(high[0] - low[0]), hanging.floor_y + _HOOKS_M
         places = [

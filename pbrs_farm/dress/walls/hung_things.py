@@ -16,10 +16,10 @@ import numpy as np
 from pbrs_farm.core.arrays import F64, Srgb8Image
 from pbrs_farm.core.classes import MIRROR, OTHERPROP, PICTURE
 from pbrs_farm.core.house import Material, MaterialKind, Surface, Texture
+from pbrs_farm.dress.content import content
+from pbrs_farm.dress.models import Model, hanging_piece
 from pbrs_farm.dress.style import Rgb, Style, shade
-from pbrs_farm.furnishings.things.assembly import Model, hanging_piece
-from pbrs_farm.furnishings.things.hung import facing_disc, ring
-from pbrs_farm.furnishings.things.materials import metal, plain
+from pbrs_farm.dress.thing_materials import metal, plain
 from pbrs_farm.geometry.solids import box, quads_surface
 from pbrs_farm.images import jpeg_from_array
 
@@ -68,12 +68,12 @@ def framed(
     frame_m, depth = _moulding(rng, min(width, height))
     low, high = np.array([-width / 2, 0.0]), np.array([width / 2, height])
     shown = _printed(print_)
-    parts = [(ring("frame", low, high, frame_m, depth), frame)]
+    parts = [(content().ring("frame", low, high, frame_m, depth), frame)]
     at = depth - 0.006
     mat = float(rng.uniform(0.1, 0.17)) * min(width, height) if rng.random() < 0.6 else 0.0
     inner_low, inner_high = low + frame_m, high - frame_m
     if mat:
-        card = ring("mat", inner_low, inner_high, mat, at)
+        card = content().ring("mat", inner_low, inner_high, mat, at)
         parts.append((card, plain("mat", (0.93, 0.92, 0.89), 0.9)))
         inner_low, inner_high, at = inner_low + mat - 0.002, inner_high - mat + 0.002, at - 0.002
     face, back = faced_slab("print", inner_low, inner_high, (0.001, at))
@@ -106,7 +106,7 @@ def mirror(width: float, height: float, frame: Material | None, frame_m: float =
     parts = []
     depth = 0.006
     if frame is not None:
-        parts.append((ring("frame", low, high, frame_m, 0.022), frame))
+        parts.append((content().ring("frame", low, high, frame_m, 0.022), frame))
         low, high, depth = low + frame_m, high - frame_m, 0.014
     face, back = faced_slab("mirror", low, high, (0.001 if frame else 0.0, depth))
     parts += [(face, glass), (back, plain("mirror edge", (0.35, 0.4, 0.4), 0.3))]
@@ -116,8 +116,10 @@ def mirror(width: float, height: float, frame: Material | None, frame_m: float =
 def clock(diameter: float, dial: Texture, frame: Material) -> Model:
     """A round wall clock with a printed dial."""
     r = diameter / 2
-    rim = facing_disc([(0, 0), (r, 0), (r, 0.035), (r - 0.012, 0.035), (r - 0.012, 0.024)], r)
-    face = replace(facing_disc([(r - 0.012, 0.024), (0, 0.024)], r), name="dial")
+    rim = content().facing_disc(
+        [(0, 0), (r, 0), (r, 0.035), (r - 0.012, 0.035), (r - 0.012, 0.024)], r
+    )
+    face = replace(content().facing_disc([(r - 0.012, 0.024), (0, 0.024)], r), name="dial")
     # Lay the dial's picture over the disc.
     uv = (face.positions[:, :2] - [0, r]) / (2 * (r - 0.012)) + 0.5
     parts = [

@@ -7,12 +7,12 @@ from typing import Final
 import numpy as np
 
 from pbrs_farm.core.classes import CABINET, COUNTER, OTHERFURNITURE, SHELVES, SINK
+from pbrs_farm.dress.content import content
 from pbrs_farm.dress.space import HouseSpace
 from pbrs_farm.dress.style import Style, mix
+from pbrs_farm.dress.thing_materials import plain
 from pbrs_farm.dress.walls.hanging import Hanging, faces_behind
 from pbrs_farm.dress.walls.hung_things import CUPBOARD_FORMS
-from pbrs_farm.furnishings.things import hung as hung_furniture
-from pbrs_farm.furnishings.things.materials import plain
 from pbrs_farm.home.names import words_of_item
 from pbrs_farm.home.room_use import RoomKind
 
@@ -87,12 +87,12 @@ def _hang_cupboards(
                 continue
             is_open = rng.random() < _OPEN
             if is_open:
-                made = hung_furniture.open_cupboard.make(
+                made = content().things["open_cupboard"](
                     rng, style, body, w, height, _DEEP_M - 0.04
                 )
             else:
                 given = (body, front, w, height, _DEEP_M, 2 if w > 0.62 else 1, form)
-                made = hung_furniture.wall_cupboard.make(rng, style, *given)
+                made = content().things["wall_cupboard"](rng, style, *given)
             tags = ("support",) if is_open else ()
             hanging.hang(*made, k, s + w / 2, low, margin_m=0.0, tags=tags)
             s += w + 0.001
@@ -102,7 +102,7 @@ def _hang_rail(
     hanging: Hanging, runs: list[tuple[int, float, float]], style: Style, rng: np.random.Generator
 ) -> None:
     width = float(rng.uniform(0.55, 0.95))
-    piece, shape = hung_furniture.tool_rail.make(rng, style, width)
+    piece, shape = content().things["tool_rail"](rng, style, width)
     bottom = float(shape.bounds[0, 1])
     low = hanging.floor_y + 0.97 - bottom
     for k, s0, s1 in runs:

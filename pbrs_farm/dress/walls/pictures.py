@@ -13,14 +13,13 @@ from pbrs_farm.core.arrays import F64, Srgb8Image
 from pbrs_farm.core.catalogue import PRINTS, Catalogue, Picture
 from pbrs_farm.core.classes import BED, CABINET, CHAIR, DESK, DRESSER, OTHERFURNITURE, SOFA, TABLE
 from pbrs_farm.core.house import Material, Texture
+from pbrs_farm.dress.content import content
+from pbrs_farm.dress.models import Model
 from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.space import HouseSpace
 from pbrs_farm.dress.style import Rgb, Style, room_style
 from pbrs_farm.dress.walls.hanging import IN_FRONT_M, WANTS, Hanging, faces_behind
 from pbrs_farm.dress.walls.hung_things import canvas, frame_material, framed, jpeg_texture, poster
-from pbrs_farm.furnishings.prints import print_pixels
-from pbrs_farm.furnishings.things import hung as hung_furniture
-from pbrs_farm.furnishings.things.assembly import Model
 from pbrs_farm.home.room_use import RoomKind
 from pbrs_farm.images import decode_photo
 
@@ -111,7 +110,7 @@ class Gallery:
             likeness = [abs(np.log(p.size[0] / p.size[1] / aspect)) for p in self._own]
             picture = self._own.pop(int(np.argmin(likeness)))
             return _cropped(picture, aspect), "photograph"
-        pixels, family = print_pixels(self._rng, aspect, self._style, self._families)
+        pixels, family = content().print_pixels(self._rng, aspect, self._style, self._families)
         self._families[family] += 1
         return pixels, family
 
@@ -274,7 +273,7 @@ def hang_pin_board(hanging: Hanging, space: HouseSpace, style: Style, share: flo
         return
     width, height = float(rng.uniform(0.55, 0.95)), float(rng.uniform(0.42, 0.65))
     frame = frame_material(rng, style)
-    made = hung_furniture.pin_board.make(rng, style, width, height, frame)
+    made = content().things["pin_board"](rng, style, width, height, frame)
     low = hanging.floor_y + _LOW_M
     places = _over_desks(hanging, space)
     if kind is not RoomKind.BEDROOM:

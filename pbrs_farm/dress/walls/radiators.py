@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
+from pbrs_farm.dress.content import content
 from pbrs_farm.dress.finish_scheme import finish_scheme
+from pbrs_farm.dress.models import Model
 from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.style import Style
 from pbrs_farm.dress.surface_finishes import material_of_finish
 from pbrs_farm.dress.walls.hanging import Hanging
-from pbrs_farm.furnishings.things import radiators
-from pbrs_farm.furnishings.things.assembly import Model
 from pbrs_farm.home.names import RADIATORS, words_of_item
 from pbrs_farm.home.room_use import RoomKind
 
@@ -36,7 +36,7 @@ def hang_radiators(hanging: Hanging, style: Style, share: float) -> None:
     paint = material_of_finish(finish_scheme(hanging.house, style).radiator)
 
     def make(wide: float, high: float) -> Model:
-        return radiators.wall_radiator.make(rng, style, wide, high, paint)
+        return content().things["wall_radiator"](rng, style, wide, high, paint)
 
     for window in room.windows:
         side = window.side_of(room.room.id)

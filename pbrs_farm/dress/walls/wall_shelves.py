@@ -8,16 +8,14 @@ import numpy as np
 
 from pbrs_farm.core.classes import OTHERPROP
 from pbrs_farm.core.house import Material
+from pbrs_farm.dress.content import content
+from pbrs_farm.dress.models import Model, Part, hanging_piece, transformed
 from pbrs_farm.dress.style import Style
+from pbrs_farm.dress.thing_materials import plain
 from pbrs_farm.dress.walls.fittings import hang_anywhere
 from pbrs_farm.dress.walls.hanging import IN_FRONT_M, WANTS, Hanging
 from pbrs_farm.dress.walls.hung_things import CUPBOARD_FORMS, faced_slab, jpeg_texture
-from pbrs_farm.furnishings.textiles.rug_patterns import RUGS, rug_pixels
-from pbrs_farm.furnishings.things import hung as hung_furniture
-from pbrs_farm.furnishings.things import radiators
-from pbrs_farm.furnishings.things.assembly import Model, Part, hanging_piece, transformed
-from pbrs_farm.furnishings.things.bodies import revolve
-from pbrs_farm.furnishings.things.materials import plain
+from pbrs_farm.geometry.bodies import revolve
 from pbrs_farm.home.room_use import RoomKind
 
 _RADIATORS: Final = 0.65  # share of bathrooms with a towel radiator
@@ -34,7 +32,7 @@ def hang_shelves(hanging: Hanging, style: Style, share: float) -> None:
     wanted = int(np.floor(rng.integers(low, high + 1) * share + rng.random()))
     is_bath = kind is RoomKind.BATHROOM
     if is_bath and rng.random() < _RADIATORS * share:
-        hang_anywhere(hanging, radiators.towel_radiator.make(rng, style), _LADDER_M, 0.2, rng)
+        hang_anywhere(hanging, content().things["towel_radiator"](rng, style), _LADDER_M, 0.2, rng)
     wood = plain(f"shelf {style.wood.name}", style.wood.mean, 0.4)
     board = wood if rng.random() < 0.6 else plain("shelf white", (0.9, 0.9, 0.88), 0.4)
     # Shelves of one room share a design, with several widths.
@@ -62,18 +60,18 @@ def _shelf(
     if kind < 0.5:
         boards = int(rng.choice([1, 2, 2, 3]))
         return (
-            hung_furniture.wall_shelf.make(rng, style, width, depth, boards, board),
+            content().things["wall_shelf"](rng, style, width, depth, boards, board),
             1.5 if boards == 1 else 1.38,
             _ABOVE_M,
         )
     if kind < 0.75:
         height = float(rng.choice([0.34, 0.34, 0.62]))
-        made = hung_furniture.open_cupboard.make(rng, style, board, width, height, depth)
+        made = content().things["open_cupboard"](rng, style, board, width, height, depth)
         return made, float(rng.uniform(1.35, 1.55)), _ABOVE_M
     n_doors = max(1, round(width / 0.45))
     height = float(rng.uniform(0.38, 0.6))
     given = (board, board, width, height, depth + 0.06, n_doors, int(rng.integers(CUPBOARD_FORMS)))
-    made = hung_furniture.wall_cupboard.make(rng, style, *given)
+    made = content().things["wall_cupboard"](rng, style, *given)
     return made, float(rng.uniform(1.4, 1.6)), 0.05
 
 
@@ -89,7 +87,7 @@ def hang_cloth(hanging: Hanging, style: Style, share: float) -> None:
 def wall_cloth(rng: np.random.Generator, style: Style, width: float, height: float) -> Model:
     """A patterned cloth that hangs from a rod, a fringe at its foot."""
     fringe, rod = 0.09, 0.009
-    pixels = rug_pixels(rng, width, height, style, str(rng.choice(list(RUGS))))
+    pixels = content().rug_pixels(rng, width, height, style, str(rng.choice(content().rugs)))
     texture = jpeg_texture("wall cloth", pixels)
     shown = Material(f"cloth {texture.id[:8]}", texture_id=texture.id, roughness=1.0)
     r, g, b = (float(c) / 255 for c in pixels.reshape(-1, 3).mean(0))

@@ -7,8 +7,8 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from pbrs_farm.core.arrays import F32, F64
+from pbrs_farm.dress.noise import noise
 from pbrs_farm.furnishings.surroundings.scenery import Rgb, SceneryMaterial
-from pbrs_farm.furnishings.textures.noise import noise
 
 _PX: Final = 256  # of a wall's picture
 COLUMNS: Final = 4  # windows side by side in a sheet of windows

@@ -7,8 +7,8 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from pbrs_farm.core.arrays import F32, F64, Bools
+from pbrs_farm.dress.noise import noise
 from pbrs_farm.furnishings.surroundings.scenery import Rgb, Scenery, SceneryMaterial, mottled
-from pbrs_farm.furnishings.textures.noise import noise
 from pbrs_farm.geometry.solids import box_quads
 
 _PX: Final = 128  # of the picture of a spray of leaves

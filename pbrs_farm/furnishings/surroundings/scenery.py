@@ -21,8 +21,8 @@ from pbrs_farm.core.arrays import F32, F64
 from pbrs_farm.core.frames import srgb_from_linear
 from pbrs_farm.core.house import LIT, OUTSIDE, Item, ItemKind, Material, Surface, Texture
 from pbrs_farm.core.mesh import faces_with_area, triangle_corners
-from pbrs_farm.furnishings.textures.maps import colour_bytes, texture_from_pixels
-from pbrs_farm.furnishings.textures.noise import noise
+from pbrs_farm.dress.noise import noise
+from pbrs_farm.dress.surface_maps import colour_bytes, texture_from_pixels
 from pbrs_farm.geometry.plan_surfaces import horizontal
 from pbrs_farm.geometry.solids import quads_surface
 from pbrs_farm.images import png_from_array

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F32
+from pbrs_farm.dress.noise import Shape2, coverage, noise, sampled, smoothstep
 from pbrs_farm.dress.style import Rgb
-from pbrs_farm.furnishings.textures.maps import SurfaceMaps, ramp, surface_maps
-from pbrs_farm.furnishings.textures.noise import Shape2, coverage, noise, sampled, smoothstep
+from pbrs_farm.dress.surface_maps import SurfaceMaps, ramp, surface_maps
 
 _INTS = NDArray[np.int64]
 

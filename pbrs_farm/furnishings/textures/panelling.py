@@ -8,9 +8,9 @@ from typing import Final
 import numpy as np
 
 from pbrs_farm.core.arrays import F32
+from pbrs_farm.dress.noise import Shape2, noise, smoothstep
 from pbrs_farm.dress.style import Rgb, Wood
-from pbrs_farm.furnishings.textures.maps import SurfaceMaps, normals_from_height, surface_maps
-from pbrs_farm.furnishings.textures.noise import Shape2, noise, smoothstep
+from pbrs_farm.dress.surface_maps import SurfaceMaps, normals_from_height, surface_maps
 from pbrs_farm.furnishings.textures.planks import BoardLayout, PlankLook, plank_maps, rows_of_planks
 
 PANELS_M: Final = {

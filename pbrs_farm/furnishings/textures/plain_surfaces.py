@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from pbrs_farm.core.arrays import F32
+from pbrs_farm.dress.noise import Shape2, blurred, noise, smoothstep
 from pbrs_farm.dress.style import Rgb
-from pbrs_farm.furnishings.textures.maps import SurfaceMaps, surface_maps
-from pbrs_farm.furnishings.textures.noise import Shape2, blurred, noise, smoothstep
+from pbrs_farm.dress.surface_maps import SurfaceMaps, surface_maps
 
 
 def paint_maps(

@@ -11,16 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F32
+from pbrs_farm.dress.noise import Shape2, coverage, halved, noise, sampled, smoothstep
 from pbrs_farm.dress.style import Rgb, Wood, mix, shade
-from pbrs_farm.furnishings.textures.maps import SurfaceMaps, ramp, surface_maps
-from pbrs_farm.furnishings.textures.noise import (
-    Shape2,
-    coverage,
-    halved,
-    noise,
-    sampled,
-    smoothstep,
-)
+from pbrs_farm.dress.surface_maps import SurfaceMaps, ramp, surface_maps
 from pbrs_farm.furnishings.textures.wood_sheet import WoodSheet, wood_sheet
 
 _INTS = NDArray[np.int64]

@@ -8,9 +8,9 @@ from functools import partial
 import numpy as np
 
 from pbrs_farm.core.arrays import F32, F64
+from pbrs_farm.dress.noise import Shape2, noise, smoothstep
 from pbrs_farm.dress.style import Rgb, mix, shade
-from pbrs_farm.furnishings.textures.maps import SurfaceMaps, surface_maps
-from pbrs_farm.furnishings.textures.noise import Shape2, noise, smoothstep
+from pbrs_farm.dress.surface_maps import SurfaceMaps, surface_maps
 
 WIDTH_M = 0.53  # width of a roll
 

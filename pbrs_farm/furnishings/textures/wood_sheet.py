@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from pbrs_farm.core.arrays import F32
+from pbrs_farm.dress.noise import Shape2, noise, smoothstep
 from pbrs_farm.dress.style import Wood
-from pbrs_farm.furnishings.textures.noise import Shape2, noise, smoothstep
 
 # Ring width in metres, bend of the rings, strength of pores, knots per square metre.
 _SPECIES: dict[str, tuple[float, float, float, float]] = {

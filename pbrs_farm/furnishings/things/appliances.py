@@ -9,11 +9,7 @@ from numpy import pi, radians
 
 from pbrs_farm.core.classes import OTHERFURNITURE
 from pbrs_farm.core.frames import LYING_ALONG_Z, rotation_z
-from pbrs_farm.furnishings.things.bodies import HALF_TURN
-from pbrs_farm.furnishings.things.cups import handle
-from pbrs_farm.furnishings.things.joints import shell
-from pbrs_farm.furnishings.things.maker import Maker, thing
-from pbrs_farm.furnishings.things.materials import (
+from pbrs_farm.dress.thing_materials import (
     BLACK_GLASS,
     BLACK_STEEL,
     CHROME,
@@ -23,7 +19,11 @@ from pbrs_farm.furnishings.things.materials import (
     glossy,
     plain,
 )
-from pbrs_farm.furnishings.things.outlines import bent, rect, rings
+from pbrs_farm.furnishings.things.cups import handle
+from pbrs_farm.furnishings.things.joints import shell
+from pbrs_farm.furnishings.things.maker import Maker, thing
+from pbrs_farm.geometry.bodies import HALF_TURN
+from pbrs_farm.geometry.outlines import bent, rect, rings
 
 # fmt: off
 

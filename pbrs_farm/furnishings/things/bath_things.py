@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pbrs_farm.core.classes import PAPER
 from pbrs_farm.core.frames import rotation_y, rotation_z
+from pbrs_farm.dress.thing_materials import plain
 from pbrs_farm.furnishings.things.maker import Maker, thing
-from pbrs_farm.furnishings.things.materials import plain
-from pbrs_farm.furnishings.things.outlines import oval, rings, scaled
+from pbrs_farm.geometry.outlines import oval, rings, scaled
 
 # fmt: off
 

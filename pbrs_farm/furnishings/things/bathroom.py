@@ -12,10 +12,7 @@ from pbrs_farm.core.classes import BATHTUB, OTHERSTRUCTURE, SINK, TOILET
 from pbrs_farm.core.frames import rotation_x, rotation_y
 from pbrs_farm.core.house import Material
 from pbrs_farm.dress.style import mix
-from pbrs_farm.furnishings.things.cloth import hanging
-from pbrs_farm.furnishings.things.joints import Inside, Look, four_legs, fronts_of, hollow
-from pbrs_farm.furnishings.things.maker import Maker, Size, family
-from pbrs_farm.furnishings.things.materials import (
+from pbrs_farm.dress.thing_materials import (
     BLACK_STEEL,
     BRASS,
     CERAMIC,
@@ -28,7 +25,10 @@ from pbrs_farm.furnishings.things.materials import (
     glossy,
     plain,
 )
-from pbrs_farm.furnishings.things.outlines import bent, d_shape, oval, rect, rings
+from pbrs_farm.furnishings.things.cloth import hanging
+from pbrs_farm.furnishings.things.joints import Inside, Look, four_legs, fronts_of, hollow
+from pbrs_farm.furnishings.things.maker import Maker, Size, family
+from pbrs_farm.geometry.outlines import bent, d_shape, oval, rect, rings
 
 # fmt: off
 

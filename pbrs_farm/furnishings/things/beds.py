@@ -11,20 +11,13 @@ from pbrs_farm.core.classes import BED
 from pbrs_farm.core.frames import rotation_x
 from pbrs_farm.core.house import Material
 from pbrs_farm.dress.style import mix
+from pbrs_farm.dress.thing_materials import BLACK_STEEL, BRASS, WHITE, WHITE_STEEL, glossy, plain
 from pbrs_farm.furnishings.things.cloth import draped
 from pbrs_farm.furnishings.things.joints import leg
 from pbrs_farm.furnishings.things.maker import Maker, Size, family
-from pbrs_farm.furnishings.things.materials import (
-    BLACK_STEEL,
-    BRASS,
-    WHITE,
-    WHITE_STEEL,
-    glossy,
-    plain,
-)
-from pbrs_farm.furnishings.things.outlines import bent
 from pbrs_farm.furnishings.things.parameters import Choice, Legs, Range
 from pbrs_farm.furnishings.things.shapes import Pair, row
+from pbrs_farm.geometry.outlines import bent
 
 # fmt: off
 

@@ -11,10 +11,10 @@ from pbrs_farm.core.catalogue import Place
 from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import Material
 from pbrs_farm.dress.style import mix
+from pbrs_farm.dress.thing_materials import plain
 from pbrs_farm.furnishings.things.boxes import rope_side
 from pbrs_farm.furnishings.things.maker import Maker, Size, family, thing
-from pbrs_farm.furnishings.things.materials import plain
-from pbrs_farm.furnishings.things.outlines import bent, d_shape, oval, polar, rect, rings, scaled
+from pbrs_farm.geometry.outlines import bent, d_shape, oval, polar, rect, rings, scaled
 
 # fmt: off
 

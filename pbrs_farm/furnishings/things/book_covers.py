@@ -11,7 +11,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from pbrs_farm.core.house import Material, Texture
 from pbrs_farm.dress.style import COLOURS, Rgb, Style, shade
-from pbrs_farm.furnishings.things.materials import any_colour
+from pbrs_farm.dress.thing_materials import any_colour
 
 # fmt: off
 

@@ -11,7 +11,7 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.classes import BOOKS, PAPER
 from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import Surface
-from pbrs_farm.furnishings.things.assembly import Model, Part, standing_piece, transformed
+from pbrs_farm.dress.models import Model, Part, standing_piece, transformed
 from pbrs_farm.furnishings.things.book_covers import N_CELLS, N_COVERS, Box4, Covers
 from pbrs_farm.geometry.solids import box
 

@@ -10,10 +10,10 @@ import numpy as np
 from pbrs_farm.core.frames import LYING_ALONG_Z, rotation_x, rotation_y, rotation_z
 from pbrs_farm.core.house import Material
 from pbrs_farm.dress.style import Rgb, shade
-from pbrs_farm.furnishings.things.bodies import sphere, stretched
+from pbrs_farm.dress.thing_materials import glass, plain
 from pbrs_farm.furnishings.things.maker import Maker, thing
-from pbrs_farm.furnishings.things.materials import glass, plain
-from pbrs_farm.furnishings.things.outlines import bent, fluted, oval, rect, rings, scaled
+from pbrs_farm.geometry.bodies import sphere, stretched
+from pbrs_farm.geometry.outlines import bent, fluted, oval, rect, rings, scaled
 
 # fmt: off
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from numpy import cos, pi, sin
 
+from pbrs_farm.dress.thing_materials import plain
 from pbrs_farm.furnishings.things.food import apple
 from pbrs_farm.furnishings.things.maker import Maker, thing
-from pbrs_farm.furnishings.things.materials import plain
-from pbrs_farm.furnishings.things.outlines import bent, fluted, oval, polar, rect, rings, scaled
+from pbrs_farm.geometry.outlines import bent, fluted, oval, polar, rect, rings, scaled
 
 # fmt: off
 

@@ -11,10 +11,10 @@ from pbrs_farm.core.classes import BOX
 from pbrs_farm.core.frames import LYING_ALONG_Z, rotation_x, rotation_y
 from pbrs_farm.core.house import Material
 from pbrs_farm.dress.style import Rgb, mix, shade
+from pbrs_farm.dress.thing_materials import plain
 from pbrs_farm.furnishings.things.maker import Maker, thing
-from pbrs_farm.furnishings.things.materials import plain
-from pbrs_farm.furnishings.things.outlines import bent, oval, polar, rect, ring_path, rings, scaled
 from pbrs_farm.furnishings.things.shapes import row
+from pbrs_farm.geometry.outlines import bent, oval, polar, rect, ring_path, rings, scaled
 
 # fmt: off
 

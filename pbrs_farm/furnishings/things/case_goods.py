@@ -25,11 +25,11 @@ from pbrs_farm.core.classes import (
 from pbrs_farm.core.frames import LYING_ALONG_Z
 from pbrs_farm.core.house import Material
 from pbrs_farm.dress.style import Rgb
+from pbrs_farm.dress.thing_materials import plain
 from pbrs_farm.furnishings.things.joints import drawer_box, hollow, is_drawer, opens, shelves
 from pbrs_farm.furnishings.things.maker import Maker, Size, Thing, thing
-from pbrs_farm.furnishings.things.materials import plain
-from pbrs_farm.furnishings.things.outlines import spaced
 from pbrs_farm.furnishings.things.shapes import Pair
+from pbrs_farm.geometry.outlines import spaced
 
 # fmt: off
 

@@ -10,8 +10,7 @@ from pbrs_farm.core.catalogue import Place
 from pbrs_farm.core.classes import LAMP
 from pbrs_farm.core.frames import rotation_y, rotation_z
 from pbrs_farm.core.house import Material
-from pbrs_farm.furnishings.things.maker import Maker, Size, family
-from pbrs_farm.furnishings.things.materials import (
+from pbrs_farm.dress.thing_materials import (
     BLACK_STEEL,
     BRASS,
     CHROME,
@@ -20,7 +19,8 @@ from pbrs_farm.furnishings.things.materials import (
     glass,
     plain,
 )
-from pbrs_farm.furnishings.things.outlines import bent, oval, polar
+from pbrs_farm.furnishings.things.maker import Maker, Size, family
+from pbrs_farm.geometry.outlines import bent, oval, polar
 
 # fmt: off
 

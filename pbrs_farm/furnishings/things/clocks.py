@@ -6,9 +6,9 @@ from itertools import product
 
 from pbrs_farm.core.frames import LYING_ALONG_Z, rotation_x, rotation_z
 from pbrs_farm.core.house import Material
+from pbrs_farm.dress.thing_materials import glass, plain
 from pbrs_farm.furnishings.things.maker import Maker, thing
-from pbrs_farm.furnishings.things.materials import glass, plain
-from pbrs_farm.furnishings.things.outlines import bent, rect, rings
+from pbrs_farm.geometry.outlines import bent, rect, rings
 
 # fmt: off
 

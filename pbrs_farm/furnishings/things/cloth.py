@@ -9,7 +9,7 @@ import numpy as np
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import Surface
-from pbrs_farm.furnishings.things.bodies import creased, smooth
+from pbrs_farm.geometry.bodies import creased, smooth
 
 
 def bulged(

@@ -9,11 +9,11 @@ import numpy as np
 from pbrs_farm.core.classes import BAG, CLOTHES
 from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import Surface
-from pbrs_farm.furnishings.things.bodies import revolve, stretched
+from pbrs_farm.dress.thing_materials import plain
 from pbrs_farm.furnishings.things.boxes import tray
 from pbrs_farm.furnishings.things.maker import Maker, thing
-from pbrs_farm.furnishings.things.materials import plain
-from pbrs_farm.furnishings.things.outlines import bent, oval, rect, rings, spaced
+from pbrs_farm.geometry.bodies import revolve, stretched
+from pbrs_farm.geometry.outlines import bent, oval, rect, rings, spaced
 
 # fmt: off
 

@@ -6,11 +6,11 @@ import numpy as np
 
 from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import Surface
-from pbrs_farm.furnishings.things import materials
-from pbrs_farm.furnishings.things.bodies import smooth
+from pbrs_farm.dress import thing_materials as materials
+from pbrs_farm.dress.thing_materials import plain
 from pbrs_farm.furnishings.things.maker import Maker, thing
-from pbrs_farm.furnishings.things.materials import plain
-from pbrs_farm.furnishings.things.outlines import bent, oval, rings
+from pbrs_farm.geometry.bodies import smooth
+from pbrs_farm.geometry.outlines import bent, oval, rings
 
 # fmt: off
 

@@ -9,8 +9,8 @@ from numpy import pi
 from pbrs_farm.core.classes import BOOKS, PAPER
 from pbrs_farm.core.frames import LYING_ALONG_X, LYING_ALONG_Z, rotation_x, rotation_y, rotation_z
 from pbrs_farm.dress.style import shade
+from pbrs_farm.dress.thing_materials import BLACK_GLASS, BLACK_STEEL, CHROME, STEEL, plain
 from pbrs_farm.furnishings.things.maker import Maker, thing
-from pbrs_farm.furnishings.things.materials import BLACK_GLASS, BLACK_STEEL, CHROME, STEEL, plain
 
 # fmt: off
 

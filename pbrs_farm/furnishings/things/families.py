@@ -25,6 +25,7 @@ from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house import ItemKind, LightPart, MaterialKind, Surface
 from pbrs_farm.core.lighting import PowerUnit
 from pbrs_farm.core.plugins import marks_in_digest, plugins
+from pbrs_farm.dress.models import GENERATED
 from pbrs_farm.dress.style import Style, style_for
 from pbrs_farm.furnishings.things import (
     bathroom,
@@ -41,7 +42,6 @@ from pbrs_farm.furnishings.things import (
     storage,
     tables,
 )
-from pbrs_farm.furnishings.things.assembly import GENERATED
 from pbrs_farm.furnishings.things.maker import Family, described_in
 
 VERSION: Final = 8

@@ -10,6 +10,16 @@ from typing import Final
 from pbrs_farm.core.catalogue import Place
 from pbrs_farm.core.classes import BOOKSHELF, CABINET
 from pbrs_farm.core.house import Material
+from pbrs_farm.dress.thing_materials import (
+    BLACK_STEEL,
+    CHROME,
+    CLEAR,
+    SILVERED,
+    STEEL,
+    WHITE,
+    WHITE_STEEL,
+    glossy,
+)
 from pbrs_farm.furnishings.things.joints import (
     Inside,
     Look,
@@ -20,16 +30,6 @@ from pbrs_farm.furnishings.things.joints import (
     shelves,
 )
 from pbrs_farm.furnishings.things.maker import Maker, Size, family
-from pbrs_farm.furnishings.things.materials import (
-    BLACK_STEEL,
-    CHROME,
-    CLEAR,
-    SILVERED,
-    STEEL,
-    WHITE,
-    WHITE_STEEL,
-    glossy,
-)
 from pbrs_farm.furnishings.things.shapes import Pair
 
 # fmt: off

@@ -5,10 +5,10 @@ from __future__ import annotations
 from numpy import pi
 
 from pbrs_farm.core.frames import LYING_ALONG_X, LYING_ALONG_Z, rotation_y
-from pbrs_farm.furnishings.things.bodies import bevelled
+from pbrs_farm.dress.thing_materials import BLACK_GLASS, STEEL, plain
 from pbrs_farm.furnishings.things.maker import Maker, thing
-from pbrs_farm.furnishings.things.materials import BLACK_GLASS, STEEL, plain
-from pbrs_farm.furnishings.things.outlines import Triple, bent, polar
+from pbrs_farm.geometry.bodies import bevelled
+from pbrs_farm.geometry.outlines import Triple, bent, polar
 
 # fmt: off
 

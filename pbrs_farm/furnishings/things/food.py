@@ -8,9 +8,9 @@ from numpy import cos, sin
 
 from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.dress.style import shade
+from pbrs_farm.dress.thing_materials import glass, plain
 from pbrs_farm.furnishings.things.maker import Maker, thing
-from pbrs_farm.furnishings.things.materials import glass, plain
-from pbrs_farm.furnishings.things.outlines import bent, polar
+from pbrs_farm.geometry.outlines import bent, polar
 
 # fmt: off
 

@@ -10,10 +10,10 @@ from pbrs_farm.core.classes import PICTURE
 from pbrs_farm.core.frames import LYING_ALONG_Z, rotation_x, rotation_y
 from pbrs_farm.core.house import Material
 from pbrs_farm.dress.style import mix
+from pbrs_farm.dress.thing_materials import glass, plain
 from pbrs_farm.furnishings.things.maker import Maker, thing
-from pbrs_farm.furnishings.things.materials import glass, plain
-from pbrs_farm.furnishings.things.outlines import bent, rect, ring_path, rings
 from pbrs_farm.furnishings.things.shapes import Pair
+from pbrs_farm.geometry.outlines import bent, rect, ring_path, rings
 
 # fmt: off
 

@@ -7,12 +7,12 @@ from typing import Final
 import numpy as np
 
 from pbrs_farm.core.frames import rotation_x, rotation_y
-from pbrs_farm.furnishings.things import materials
-from pbrs_farm.furnishings.things.bodies import bevelled, vessel
+from pbrs_farm.dress import thing_materials as materials
+from pbrs_farm.dress.thing_materials import plain
 from pbrs_farm.furnishings.things.cups import handle
 from pbrs_farm.furnishings.things.maker import Maker, thing
-from pbrs_farm.furnishings.things.materials import plain
-from pbrs_farm.furnishings.things.outlines import bent, fluted, oval, rings
+from pbrs_farm.geometry.bodies import bevelled, vessel
+from pbrs_farm.geometry.outlines import bent, fluted, oval, rings
 
 # fmt: off
 

@@ -18,13 +18,13 @@ from pbrs_farm.core.classes import CABINET, CLOTHES, MIRROR, PAPER, SHELVES, WHI
 from pbrs_farm.core.frames import LYING_ALONG_X, LYING_ALONG_Z, rotation_z
 from pbrs_farm.core.house import Material, Surface
 from pbrs_farm.dress.style import Rgb, mix, shade
-from pbrs_farm.furnishings.things.bodies import smooth
+from pbrs_farm.dress.thing_materials import MIRROR_GLASS, plain
 from pbrs_farm.furnishings.things.joints import hollow, opens, shelves
 from pbrs_farm.furnishings.things.maker import Maker, thing
-from pbrs_farm.furnishings.things.materials import MIRROR_GLASS, plain
-from pbrs_farm.furnishings.things.outlines import Profile, spaced
 from pbrs_farm.furnishings.things.papers import printed, white_paper
 from pbrs_farm.furnishings.things.shapes import Pair
+from pbrs_farm.geometry.bodies import smooth
+from pbrs_farm.geometry.outlines import Profile, spaced
 from pbrs_farm.geometry.solids import lathe, quads_surface
 
 # fmt: off

@@ -11,18 +11,10 @@ from numpy import pi
 
 from pbrs_farm.core.frames import LYING_ALONG_Z, rotation_x, rotation_z
 from pbrs_farm.core.house import Material
+from pbrs_farm.dress.thing_materials import FROSTED
 from pbrs_farm.furnishings.things.maker import Maker
-from pbrs_farm.furnishings.things.materials import FROSTED
-from pbrs_farm.furnishings.things.outlines import (
-    Outline,
-    bent,
-    d_shape,
-    rect,
-    ring_path,
-    rings,
-    scaled,
-)
 from pbrs_farm.furnishings.things.shapes import Pair
+from pbrs_farm.geometry.outlines import Outline, bent, d_shape, rect, ring_path, rings, scaled
 
 # fmt: off
 

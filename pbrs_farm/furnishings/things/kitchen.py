@@ -19,21 +19,7 @@ from pbrs_farm.core.classes import CABINET, COUNTER, OTHERFURNITURE, REFRIGERATO
 from pbrs_farm.core.frames import LYING_ALONG_Z
 from pbrs_farm.core.house import Material, Surface
 from pbrs_farm.dress.style import mix
-from pbrs_farm.furnishings.things.bodies import creased
-from pbrs_farm.furnishings.things.joints import (
-    Inside,
-    Look,
-    drawer_box,
-    drawer_front,
-    fronts_of,
-    hollow,
-    opens,
-    panel,
-    pull,
-    shell,
-)
-from pbrs_farm.furnishings.things.maker import Maker, Size, family
-from pbrs_farm.furnishings.things.materials import (
+from pbrs_farm.dress.thing_materials import (
     BLACK_GLASS,
     BLACK_STEEL,
     BRASS,
@@ -49,9 +35,23 @@ from pbrs_farm.furnishings.things.materials import (
     glossy,
     plain,
 )
-from pbrs_farm.furnishings.things.outlines import bent, d_shape, oval, rect, rings
+from pbrs_farm.furnishings.things.joints import (
+    Inside,
+    Look,
+    drawer_box,
+    drawer_front,
+    fronts_of,
+    hollow,
+    opens,
+    panel,
+    pull,
+    shell,
+)
+from pbrs_farm.furnishings.things.maker import Maker, Size, family
 from pbrs_farm.furnishings.things.parameters import Choice, Front, Pull
 from pbrs_farm.furnishings.things.shapes import Pair
+from pbrs_farm.geometry.bodies import creased
+from pbrs_farm.geometry.outlines import bent, d_shape, oval, rect, rings
 
 # fmt: off
 

@@ -11,8 +11,7 @@ from pbrs_farm.core.catalogue import Place
 from pbrs_farm.core.classes import LAMP
 from pbrs_farm.core.frames import LYING_ALONG_Z, rotation_x, rotation_z
 from pbrs_farm.core.house import Material
-from pbrs_farm.furnishings.things.maker import Maker, Size, family
-from pbrs_farm.furnishings.things.materials import (
+from pbrs_farm.dress.thing_materials import (
     BLACK_STEEL,
     BRASS,
     OPAL,
@@ -23,17 +22,9 @@ from pbrs_farm.furnishings.things.materials import (
     glossy,
     plain,
 )
-from pbrs_farm.furnishings.things.outlines import (
-    bent,
-    d_shape,
-    fluted,
-    oval,
-    polar,
-    rect,
-    rings,
-    scaled,
-)
+from pbrs_farm.furnishings.things.maker import Maker, Size, family
 from pbrs_farm.furnishings.things.parameters import Choice, Range
+from pbrs_farm.geometry.outlines import bent, d_shape, fluted, oval, polar, rect, rings, scaled
 
 # fmt: off
 

@@ -37,17 +37,11 @@ from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house import Material, Surface
 from pbrs_farm.core.joints import Joint, JointKind
 from pbrs_farm.core.mesh import triangle_corners
+from pbrs_farm.dress.models import Model, Part, hanging_piece, standing_piece, transformed
 from pbrs_farm.dress.style import COLOURS, Rgb, Style
-from pbrs_farm.furnishings.things.assembly import (
-    Model,
-    Part,
-    hanging_piece,
-    standing_piece,
-    transformed,
-)
-from pbrs_farm.furnishings.things.materials import WHITE, any_colour, glossy, metal, plain
-from pbrs_farm.furnishings.things.outlines import Triple
+from pbrs_farm.dress.thing_materials import WHITE, any_colour, glossy, metal, plain
 from pbrs_farm.furnishings.things.shapes import Shapes
+from pbrs_farm.geometry.outlines import Triple
 from pbrs_farm.home.masses import mass_kg
 
 P = ParamSpec("P")

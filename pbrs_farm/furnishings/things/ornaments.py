@@ -10,10 +10,10 @@ from numpy import cos, pi, sin
 from pbrs_farm.core.frames import LYING_ALONG_Z, rotation_x, rotation_y, rotation_z
 from pbrs_farm.core.house import Material, Surface
 from pbrs_farm.dress.style import shade
-from pbrs_farm.furnishings.things.bodies import revolve
+from pbrs_farm.dress.thing_materials import glass, plain
 from pbrs_farm.furnishings.things.maker import Maker, thing
-from pbrs_farm.furnishings.things.materials import glass, plain
-from pbrs_farm.furnishings.things.outlines import bent, oval, rect, ring_path, rings, scaled
+from pbrs_farm.geometry.bodies import revolve
+from pbrs_farm.geometry.outlines import bent, oval, rect, ring_path, rings, scaled
 
 # fmt: off
 

@@ -7,9 +7,9 @@ from numpy import pi
 from pbrs_farm.core.classes import PAPER
 from pbrs_farm.core.frames import rotation_x, rotation_y
 from pbrs_farm.core.house import Material
-from pbrs_farm.furnishings.things.bodies import slab
+from pbrs_farm.dress.thing_materials import plain
 from pbrs_farm.furnishings.things.maker import Maker, thing
-from pbrs_farm.furnishings.things.materials import plain
+from pbrs_farm.geometry.bodies import slab
 
 # fmt: off
 

@@ -30,7 +30,7 @@ from typing import (
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house import Material
 from pbrs_farm.core.shown_text import did_you_mean, hint_of_choice
-from pbrs_farm.furnishings.things.materials import plain
+from pbrs_farm.dress.thing_materials import plain
 
 P = TypeVar("P")
 

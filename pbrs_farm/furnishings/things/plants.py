@@ -12,14 +12,14 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Place
 from pbrs_farm.core.frames import rotation_y, rotation_z
 from pbrs_farm.core.house import Material
+from pbrs_farm.dress.models import transformed
 from pbrs_farm.dress.style import mix, shade
-from pbrs_farm.furnishings.things.assembly import transformed
-from pbrs_farm.furnishings.things.bodies import stretched
+from pbrs_farm.dress.thing_materials import EARTH, WICKER, plain
 from pbrs_farm.furnishings.things.cloth import sheet
 from pbrs_farm.furnishings.things.maker import Maker, Size, family
-from pbrs_farm.furnishings.things.materials import EARTH, WICKER, plain
-from pbrs_farm.furnishings.things.outlines import Triple, bent, fluted, polar, rect, rings, scaled
 from pbrs_farm.furnishings.things.shapes import Pair
+from pbrs_farm.geometry.bodies import stretched
+from pbrs_farm.geometry.outlines import Triple, bent, fluted, polar, rect, rings, scaled
 
 # fmt: off
 

@@ -8,9 +8,9 @@ from pbrs_farm.core.catalogue import Place
 from pbrs_farm.core.classes import OTHERFURNITURE
 from pbrs_farm.core.frames import LYING_ALONG_X, LYING_ALONG_Z, rotation_z
 from pbrs_farm.core.house import Material
+from pbrs_farm.dress.thing_materials import CHROME, RUBBER, WHITE_STEEL, glossy, plain
 from pbrs_farm.furnishings.things.maker import Maker, Size, family, thing
-from pbrs_farm.furnishings.things.materials import CHROME, RUBBER, WHITE_STEEL, glossy, plain
-from pbrs_farm.furnishings.things.outlines import bent
+from pbrs_farm.geometry.outlines import bent
 
 # fmt: off
 

@@ -13,11 +13,7 @@ from pbrs_farm.core.catalogue import Place
 from pbrs_farm.core.classes import CHAIR, SOFA
 from pbrs_farm.core.frames import rotation_x
 from pbrs_farm.core.house import Material
-from pbrs_farm.furnishings.things.bodies import frustum, sheared
-from pbrs_farm.furnishings.things.cloth import chair_shell, tub
-from pbrs_farm.furnishings.things.joints import Inside, Look, four_legs, fronts_of, hollow, leg
-from pbrs_farm.furnishings.things.maker import Maker, Size, family, thing
-from pbrs_farm.furnishings.things.materials import (
+from pbrs_farm.dress.thing_materials import (
     BLACK_STEEL,
     CHROME,
     STEEL,
@@ -27,9 +23,13 @@ from pbrs_farm.furnishings.things.materials import (
     glossy,
     plain,
 )
-from pbrs_farm.furnishings.things.outlines import bent, gathered, oval, rect, rings, spaced
+from pbrs_farm.furnishings.things.cloth import chair_shell, tub
+from pbrs_farm.furnishings.things.joints import Inside, Look, four_legs, fronts_of, hollow, leg
+from pbrs_farm.furnishings.things.maker import Maker, Size, family, thing
 from pbrs_farm.furnishings.things.parameters import Choice, Range
 from pbrs_farm.furnishings.things.shapes import Pair, on_side, row
+from pbrs_farm.geometry.bodies import frustum, sheared
+from pbrs_farm.geometry.outlines import bent, gathered, oval, rect, rings, spaced
 
 # fmt: off
 

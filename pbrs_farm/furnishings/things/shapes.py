@@ -15,9 +15,9 @@ from typing import TypedDict, Unpack
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import Material, Surface
-from pbrs_farm.furnishings.things import bodies
 from pbrs_farm.furnishings.things.cloth import bulged
-from pbrs_farm.furnishings.things.outlines import Outline, Profile, Triple
+from pbrs_farm.geometry import bodies
+from pbrs_farm.geometry.outlines import Outline, Profile, Triple
 
 Pair = tuple[float, float]
 Extent = float | Pair

@@ -7,9 +7,9 @@ from itertools import product
 from pbrs_farm.core.classes import CLOTHES, PILLOW, TOWEL
 from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.dress.style import Rgb, mix, shade
+from pbrs_farm.dress.thing_materials import plain
 from pbrs_farm.furnishings.things.maker import Maker, thing
-from pbrs_farm.furnishings.things.materials import plain
-from pbrs_farm.furnishings.things.outlines import rect, scaled
+from pbrs_farm.geometry.outlines import rect, scaled
 
 # fmt: off
 

@@ -11,6 +11,16 @@ from numpy import cos, pi, sin
 from pbrs_farm.core.catalogue import Place
 from pbrs_farm.core.classes import BOOKSHELF, CABINET, DRESSER, OTHERPROP, SHELVES
 from pbrs_farm.core.house import Material
+from pbrs_farm.dress.thing_materials import (
+    BLACK_STEEL,
+    BRASS,
+    CHROME,
+    SILVERED,
+    STEEL,
+    WHITE,
+    WHITE_STEEL,
+    glossy,
+)
 from pbrs_farm.furnishings.things.joints import (
     Inside,
     Look,
@@ -21,19 +31,9 @@ from pbrs_farm.furnishings.things.joints import (
     shelves,
 )
 from pbrs_farm.furnishings.things.maker import Maker, Size, family
-from pbrs_farm.furnishings.things.materials import (
-    BLACK_STEEL,
-    BRASS,
-    CHROME,
-    SILVERED,
-    STEEL,
-    WHITE,
-    WHITE_STEEL,
-    glossy,
-)
-from pbrs_farm.furnishings.things.outlines import bent, oval, polar, rect
 from pbrs_farm.furnishings.things.parameters import Choice, Front, Legs, Pull, Range
 from pbrs_farm.furnishings.things.shapes import Pair
+from pbrs_farm.geometry.outlines import bent, oval, polar, rect
 
 # fmt: off
 

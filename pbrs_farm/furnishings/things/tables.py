@@ -11,9 +11,7 @@ from numpy import pi
 from pbrs_farm.core.catalogue import Place
 from pbrs_farm.core.classes import DESK, NIGHT_STAND, OTHERFURNITURE, TABLE, TELEVISION
 from pbrs_farm.core.house import Material
-from pbrs_farm.furnishings.things.joints import Inside, Look, four_legs, fronts_of, hollow, leg
-from pbrs_farm.furnishings.things.maker import Maker, Size, family
-from pbrs_farm.furnishings.things.materials import (
+from pbrs_farm.dress.thing_materials import (
     BLACK_GLASS,
     BLACK_STEEL,
     BRASS,
@@ -24,9 +22,11 @@ from pbrs_farm.furnishings.things.materials import (
     glass,
     glossy,
 )
-from pbrs_farm.furnishings.things.outlines import bent, oval, polar, rect, rings
+from pbrs_farm.furnishings.things.joints import Inside, Look, four_legs, fronts_of, hollow, leg
+from pbrs_farm.furnishings.things.maker import Maker, Size, family
 from pbrs_farm.furnishings.things.parameters import Choice, Front, Legs, Pull, Range
 from pbrs_farm.furnishings.things.shapes import on_side
+from pbrs_farm.geometry.outlines import bent, oval, polar, rect, rings
 
 # fmt: off
 

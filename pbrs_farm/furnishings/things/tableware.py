@@ -6,10 +6,10 @@ from itertools import product
 
 from pbrs_farm.core.classes import PAPER
 from pbrs_farm.core.frames import LYING_ALONG_Z, rotation_x, rotation_y, rotation_z
-from pbrs_farm.furnishings.things.bodies import bevelled
+from pbrs_farm.dress.thing_materials import STEEL, plain
 from pbrs_farm.furnishings.things.maker import Maker, thing
-from pbrs_farm.furnishings.things.materials import STEEL, plain
-from pbrs_farm.furnishings.things.outlines import fluted, oval, rect, rings
+from pbrs_farm.geometry.bodies import bevelled
+from pbrs_farm.geometry.outlines import fluted, oval, rect, rings
 
 # fmt: off
 

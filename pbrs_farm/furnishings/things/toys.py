@@ -8,9 +8,9 @@ from numpy import pi
 
 from pbrs_farm.core.frames import LYING_ALONG_Z, rotation_y, rotation_z
 from pbrs_farm.core.house import Material
+from pbrs_farm.dress.thing_materials import plain
 from pbrs_farm.furnishings.things.maker import Maker, thing
-from pbrs_farm.furnishings.things.materials import plain
-from pbrs_farm.furnishings.things.outlines import bent, oval, rect, rings, scaled
+from pbrs_farm.geometry.outlines import bent, oval, rect, rings, scaled
 
 # fmt: off
 

@@ -7,19 +7,10 @@ from numpy import pi
 
 from pbrs_farm.core.frames import rotation_x
 from pbrs_farm.core.house import Surface
-from pbrs_farm.furnishings.things.bodies import vessel
+from pbrs_farm.dress.thing_materials import glass, plain
 from pbrs_farm.furnishings.things.maker import Maker, thing
-from pbrs_farm.furnishings.things.materials import glass, plain
-from pbrs_farm.furnishings.things.outlines import (
-    bent,
-    fluted,
-    oval,
-    polar,
-    rect,
-    ring_path,
-    rings,
-    scaled,
-)
+from pbrs_farm.geometry.bodies import vessel
+from pbrs_farm.geometry.outlines import bent, fluted, oval, polar, rect, ring_path, rings, scaled
 
 # fmt: off
 

@@ -16,11 +16,11 @@ from pbrs_farm.core.mesh import distances_to_triangles, triangle_bounds
 from pbrs_farm.core.recipe import Recipe, RepairFields, with_settings
 from pbrs_farm.dress import dressing
 from pbrs_farm.dress.dressing import Dressed, refit_after_repair
+from pbrs_farm.dress.models import hanging_piece
 from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.report import DressReport
 from pbrs_farm.dress.space import house_space
 from pbrs_farm.dress.walls.hanging import Hanging
-from pbrs_farm.furnishings.things.assembly import hanging_piece
 from pbrs_farm.geometry.solids import box
 from pbrs_farm.geometry.surface_points import item_triangles
 from pbrs_farm.prepare.finished_house import finished_house

@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pbrs_farm.dress.patterns import Pattern
 from pbrs_farm.dress.style import COVERED_ROOMS, COVERS, STYLES, Style, style_for
 from pbrs_farm.dress.surfaces.home_finish import WallFinish, covered
-from pbrs_farm.furnishings.textures.families import FAMILIES, Pattern, size_of
+from pbrs_farm.furnishings.textures.families import FAMILIES, size_of
 from pbrs_farm.home.room_use import RoomKind
 
 PAINT = WallFinish(Pattern("paint", 1))

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from pbrs_farm.dress.mutable_house import MutableHouse
+from pbrs_farm.dress.noise import blurred, noise
+from pbrs_farm.dress.patterns import Pattern, pattern_material
 from pbrs_farm.dress.style import WOODS
+from pbrs_farm.dress.surface_maps import normals_from_height
 from pbrs_farm.furnishings.textures import families
-from pbrs_farm.furnishings.textures.families import FAMILIES, Pattern, pattern_material, size_of
-from pbrs_farm.furnishings.textures.maps import normals_from_height
-from pbrs_farm.furnishings.textures.noise import blurred, noise
+from pbrs_farm.furnishings.textures.families import FAMILIES, size_of
 from pbrs_farm.furnishings.textures.wallpaper import PATTERNS
 from pbrs_farm.read.builtin.builtin_home import builtin_home
 

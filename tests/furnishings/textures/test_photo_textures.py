@@ -8,7 +8,7 @@ import pytest
 from pbrs_farm.core.catalogue import EMPTY, Catalogue, Picture
 from pbrs_farm.core.house import Texture
 from pbrs_farm.dress.mutable_house import MutableHouse
-from pbrs_farm.furnishings.textures.families import Pattern, pattern_material, photographed
+from pbrs_farm.dress.patterns import Pattern, pattern_material, photographed
 from pbrs_farm.images import jpeg_from_array
 from pbrs_farm.read.builtin.builtin_home import builtin_home
 

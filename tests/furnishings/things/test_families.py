@@ -14,7 +14,7 @@ from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house import ItemKind, Surface
 from pbrs_farm.core.mesh import closed_edge_share, face_areas, signed_volume, triangle_corners
 from pbrs_farm.core.plugins import plugins
-from pbrs_farm.furnishings.things import bodies, cloth, outlines
+from pbrs_farm.furnishings.things import cloth
 from pbrs_farm.furnishings.things.families import (
     drawn_size,
     families,
@@ -24,6 +24,7 @@ from pbrs_farm.furnishings.things.families import (
     family_shape,
     with_families,
 )
+from pbrs_farm.geometry import bodies, outlines
 
 _NAMES = sorted(families())
 _MOST_FACES = 3800
@@ -104,7 +105,7 @@ def install(
 
 _ONE = """
 from pbrs_farm.core.catalogue import Place
-from pbrs_farm.furnishings.things.bodies import cylinder
+from pbrs_farm.geometry.bodies import cylinder
 from pbrs_farm.furnishings.things.maker import Maker, Size, family
 
 

@@ -10,11 +10,11 @@ from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import Surface
 from pbrs_farm.dress.style import style_for
-from pbrs_farm.furnishings.things.bodies import slab
+from pbrs_farm.dress.thing_materials import BRASS, STEEL, WHITE
 from pbrs_farm.furnishings.things.maker import Maker, thing
-from pbrs_farm.furnishings.things.materials import BRASS, STEEL, WHITE
-from pbrs_farm.furnishings.things.outlines import Triple
 from pbrs_farm.furnishings.things.shapes import on_side, row
+from pbrs_farm.geometry.bodies import slab
+from pbrs_farm.geometry.outlines import Triple
 
 _STYLE = style_for(np.random.default_rng(1))
 

@@ -12,11 +12,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pbrs_farm.dress.models import Model
 from pbrs_farm.dress.style import style_for
-from pbrs_farm.furnishings.things.assembly import Model
+from pbrs_farm.dress.thing_materials import plain
 from pbrs_farm.furnishings.things.case_goods import CASE_GOODS, Boards
 from pbrs_farm.furnishings.things.families import families
-from pbrs_farm.furnishings.things.materials import plain
 from pbrs_farm.furnishings.things.things import THINGS
 
 _FILE = Path(__file__).with_name("recorded_things.csv")

@@ -8,11 +8,11 @@ import pytest
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Shape
 from pbrs_farm.core.mesh import closed_edge_share, signed_volume, triangle_corners
+from pbrs_farm.dress.models import Model
 from pbrs_farm.dress.style import style_for
+from pbrs_farm.dress.thing_materials import CLEAR
 from pbrs_farm.furnishings.things import books
-from pbrs_farm.furnishings.things.assembly import Model
 from pbrs_farm.furnishings.things.book_covers import N_CELLS, book_covers
-from pbrs_farm.furnishings.things.materials import CLEAR
 from pbrs_farm.furnishings.things.things import THINGS
 
 _STYLE = style_for(np.random.default_rng(1), "nordic")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -13,16 +13,16 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Place
 from pbrs_farm.core.classes import BATHTUB, BED, FLOOR_MAT, SINK, SOFA, TABLE
 from pbrs_farm.core.house import Item, ItemKind, Material, Surface
+from pbrs_farm.dress.content import content
+from pbrs_farm.dress.models import Model, hanging_piece
 from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.space import HouseSpace, RoomSpace, house_space
 from pbrs_farm.dress.style import Style, room_style
+from pbrs_farm.dress.thing_materials import plain
 from pbrs_farm.dress.walls.hanging import next_id
 from pbrs_farm.dress.walls.hung_things import jpeg_texture
-from pbrs_farm.furnishings.textiles.rug_patterns import BATH_MATS, DOOR_MATS, RUGS, rug_pixels
-from pbrs_farm.furnishings.things.assembly import Model, hanging_piece
-from pbrs_farm.furnishings.things.bodies import loft, slab
-from pbrs_farm.furnishings.things.materials import plain
-from pbrs_farm.furnishings.things.outlines import oval, rect
+from pbrs_farm.geometry.bodies import loft, slab
+from pbrs_farm.geometry.outlines import oval, rect
 from pbrs_farm.home.room_use import RoomKind
 
 # fmt: off
@@ -39,11 +39,12 @@ _LEAST_M, _MOST_M = 0.3, 6.0  # least and greatest side of a rug
 
 
 def rug(rng: np.random.Generator, width: float, length: float, style: Style,
-    patterns: Sequence[str] = tuple(RUGS), forms: Sequence[str] = _RUG_FORMS) -> Model:
+    patterns: Sequence[str] = (), forms: Sequence[str] = _RUG_FORMS) -> Model:
     """A rug with its length along x and its back at y = 0, of one of the patterns and forms.
 
     Forms: sharp or rounded corners, fringed ends, oval (half of an oval: half).
     """
+    patterns = patterns or content().rugs
     pattern, form = str(rng.choice(list(patterns))), str(rng.choice(list(forms)))
     # A border runs along straight sides, rings along round ones.
     if form == "oval" and pattern in _BORDERED:
@@ -51,7 +52,7 @@ def rug(rng: np.random.Generator, width: float, length: float, style: Style,
     elif pattern == "rings":
         form = "oval"
     thick = float(rng.uniform(0.008, 0.0095))
-    pixels = rug_pixels(rng, width, length, style, pattern)
+    pixels = content().rug_pixels(rng, width, length, style, pattern)
     texture = jpeg_texture(f"rug {pattern}", pixels)
     shown = Material(f"rug {texture.id[:8]}", texture_id=texture.id, roughness=1.0)
     # The back and the edge take the mean colour of the face.
@@ -193,7 +194,7 @@ def _bath_mat(
                 at = box.centre + out * (float(box.half[axis]) + 0.3)
                 turn = float(np.arctan2(out[0], out[2]))
                 if _lay_largest(house, space, room, style, rng, at, turn,
-                    [(0.5, 0.8), (0.45, 0.65)], from_wall=0.02, patterns=BATH_MATS,
+                    [(0.5, 0.8), (0.45, 0.65)], from_wall=0.02, patterns=content().bath_mats,
                     forms=_MAT_FORMS, bare=True):
                     return
 
@@ -221,7 +222,7 @@ def _doormats(
         out = door.inward(side)
         turn = float(np.arctan2(out[0], out[2]))
         _lay_largest(house, house_space(house), room, style, rng, at, turn,
-            [(0.45, 0.75), (0.4, 0.6)], from_wall=0.05, patterns=DOOR_MATS,
+            [(0.45, 0.75), (0.4, 0.6)], from_wall=0.05, patterns=content().door_mats,
             forms=("sharp", "sharp", "rounded", "half"), bare=True, at_doors=True)
 
 
@@ -240,7 +241,7 @@ def _shuffled(rng: np.random.Generator) -> list[tuple[float, float]]:
 
 def _lay_largest(house: MutableHouse, space: HouseSpace, room: RoomSpace, style: Style,
     rng: np.random.Generator, middle: F64, turn: float, sizes: list[tuple[float, float]], *,
-    from_wall: float = _FROM_WALL_M, patterns: Iterable[str] = RUGS,
+    from_wall: float = _FROM_WALL_M, patterns: Sequence[str] = (),
     forms: Sequence[str] = _RUG_FORMS, bare: bool = False, at_doors: bool = False) -> bool:
     """Lay the first size (width, length) that fits near the place; length goes across `turn`'s front.
 
@@ -324,8 +325,8 @@ def _covered(
     along, across = (0, 2) if sides[0] >= sides[2] else (2, 0)
     if sides[across] < _LEAST_M or sides[along] > _MOST_M:
         return None
-    pattern = str(rng.choice(list(RUGS)))
-    pixels = rug_pixels(rng, float(sides[across]), float(sides[along]), style, pattern)
+    pattern = str(rng.choice(content().rugs))
+    pixels = content().rug_pixels(rng, float(sides[across]), float(sides[along]), style, pattern)
     texture = jpeg_texture(f"rug {pattern}", pixels)
     shown = Material(f"rug {texture.id[:8]}", texture_id=texture.id, roughness=1.0)
     number = house.material(shown, [texture])

@@ -9,21 +9,16 @@ import numpy as np
 from pbrs_farm.core.catalogue import Catalogue, Place
 from pbrs_farm.core.classes import SINK, TOWEL
 from pbrs_farm.core.house import Material, Surface
+from pbrs_farm.dress.models import Model, hanging_piece
 from pbrs_farm.dress.mutable_house import MutableHouse
+from pbrs_farm.dress.patterns import Pattern, pattern_material
 from pbrs_farm.dress.space import HouseSpace, RoomSpace, house_space
 from pbrs_farm.dress.style import Style, mix, room_style
+from pbrs_farm.dress.textiles.curtains import hang_blind, hang_curtains, room_cloth, window_side
+from pbrs_farm.dress.textiles.hanging_cloth import round_rail, towel_over_rail
+from pbrs_farm.dress.textiles.rugs import cover_drawn_rugs, lay_rugs
+from pbrs_farm.dress.thing_materials import metal
 from pbrs_farm.dress.walls.hanging import WANTS, Hanging
-from pbrs_farm.furnishings.textiles.curtains import (
-    hang_blind,
-    hang_curtains,
-    room_cloth,
-    window_side,
-)
-from pbrs_farm.furnishings.textiles.hanging_cloth import round_rail, towel_over_rail
-from pbrs_farm.furnishings.textiles.rugs import cover_drawn_rugs, lay_rugs
-from pbrs_farm.furnishings.textures.families import Pattern, pattern_material
-from pbrs_farm.furnishings.things.assembly import Model, hanging_piece
-from pbrs_farm.furnishings.things.materials import metal
 from pbrs_farm.geometry.solids import box
 from pbrs_farm.home.room_use import RoomKind
 

@@ -10,8 +10,8 @@ import numpy as np
 from pbrs_farm.core.arrays import F32, Srgb8Image
 from pbrs_farm.core.frames import linear_from_srgb
 from pbrs_farm.core.house import Texture
+from pbrs_farm.dress.noise import halved
 from pbrs_farm.dress.style import Rgb
-from pbrs_farm.furnishings.textures.noise import halved
 from pbrs_farm.images import jpeg_from_array
 
 _COLOUR_QUALITY = 92

@@ -16,17 +16,17 @@ from pbrs_farm.core.mesh import edges_are_paired, signed_volume, triangle_corner
 from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.space import Passage, house_space
 from pbrs_farm.dress.style import style_for
-from pbrs_farm.furnishings.textiles import add_textiles
-from pbrs_farm.furnishings.textiles.curtains import WindowSide, is_flat
-from pbrs_farm.furnishings.textiles.hanging_cloth import (
+from pbrs_farm.dress.textiles import add_textiles
+from pbrs_farm.dress.textiles.curtains import WindowSide, is_flat
+from pbrs_farm.dress.textiles.hanging_cloth import (
     Pleats,
     pleated_panel,
     round_rail,
     towel_over_rail,
 )
-from pbrs_farm.furnishings.textiles.large_textiles import towel_rail
-from pbrs_farm.furnishings.textiles.rug_patterns import PATTERNS, inks_of, rug_pixels
-from pbrs_farm.furnishings.textiles.rugs import rug
+from pbrs_farm.dress.textiles.large_textiles import towel_rail
+from pbrs_farm.dress.textiles.rugs import rug
+from pbrs_farm.furnishings.rug_patterns import PATTERNS, inks_of, rug_pixels
 from pbrs_farm.geometry.solids import box
 from pbrs_farm.read.builtin.builtin_home import builtin_home
 

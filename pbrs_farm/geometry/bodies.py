@@ -14,8 +14,8 @@ import numpy as np
 from pbrs_farm.core.arrays import F64, I32, Bools
 from pbrs_farm.core.house import Surface
 from pbrs_farm.core.mesh import area_vectors, cross_products, lengths
-from pbrs_farm.furnishings.things.outlines import Outline, Profile, Triple, oval, rect
 from pbrs_farm.geometry import solids
+from pbrs_farm.geometry.outlines import Outline, Profile, Triple, oval, rect
 
 HALF_TURN: Final[F64] = np.diag([-1.0, 1.0, -1.0])  # about the vertical
 

@@ -13,14 +13,14 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Piece, Place, Shape
 from pbrs_farm.core.classes import BLINDS, CURTAIN
 from pbrs_farm.core.house import Item, ItemKind, Material, Surface
+from pbrs_farm.dress.models import hanging_piece
 from pbrs_farm.dress.mutable_house import MutableHouse
+from pbrs_farm.dress.patterns import Pattern, pattern_material
 from pbrs_farm.dress.space import HouseSpace, Passage, RoomSpace
 from pbrs_farm.dress.style import Style, mix, shade
+from pbrs_farm.dress.textiles.hanging_cloth import Pleats, pleated_panel, round_rail
+from pbrs_farm.dress.thing_materials import metal, plain
 from pbrs_farm.dress.walls.hanging import GAP_M, next_id
-from pbrs_farm.furnishings.textiles.hanging_cloth import Pleats, pleated_panel, round_rail
-from pbrs_farm.furnishings.textures.families import Pattern, pattern_material
-from pbrs_farm.furnishings.things.assembly import hanging_piece
-from pbrs_farm.furnishings.things.materials import metal, plain
 from pbrs_farm.geometry.solids import box, sphere
 from pbrs_farm.geometry.swept import Swept, swept_by_item
 from pbrs_farm.home.names import RADIATORS, words_of_item

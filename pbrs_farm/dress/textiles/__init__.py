@@ -1,5 +1,5 @@
 """Cloth of a home: curtains and blinds, rugs and mats, towels; no effects."""
 
-from pbrs_farm.furnishings.textiles.large_textiles import add_textiles
+from pbrs_farm.dress.textiles.large_textiles import add_textiles
 
 __all__ = ["add_textiles"]
