@@ -8,12 +8,13 @@ HOME_NAME ?= Studio
 # Processes of ours find their modules compiled: without that each takes a second of CPU more.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help setup demo lint check check-fast test test-all test-farm test-infra test-kube test-slow test-web test-sweethome3d test-study test-manual test-notebooks test-cuda gpu-check bench bench-light bench-light-tables bench-cycles bench-farm dist image docs format clean
+.PHONY: help setup demo lint check check-fast test test-all test-long test-farm test-infra test-kube test-slow test-web test-sweethome3d test-study test-manual test-notebooks test-cuda gpu-check bench bench-light bench-light-tables bench-cycles bench-farm dist image docs format clean
 
 # Markers of the tests that need more than a CPU and the packages of `make setup` and `make test-all`.
 APART := not gpu and not infra and not kube and not sweethome3d and not notebooks and not pages
 # What make test runs, and what test-all runs beside the farm's tests and the board's.
 QUICK := not long and not slow and not chaos and not web and not study and $(APART)
+LONG := (long or hypothesis) and not slow and not chaos and not web and not study and $(APART)
 REST := (long or slow or study or hypothesis) and not chaos and not web and $(APART)
 
 # $(call extra,MODULES,NAME): installs an extra of ours where one of its modules is missing. A command with commas
@@ -74,6 +75,9 @@ test-all: setup ## every other test for a machine without a GPU: long, slow, stu
 	$(BIN)/pytest -n 2 --dist loadfile --hypothesis-profile=long -m "$(REST)"; rest=$$?; \
 	wait $$farm; farm=$$?; cat out/test_all/farm.log; test $$rest = 0 -a $$farm = 0
 	$(BIN)/pytest -n 2 --dist loadfile -m web tests/board/web
+
+test-long: setup ## what make test leaves out below a minute a test: long, and all examples of hypothesis
+	$(BIN)/pytest -n 2 --dist loadfile --hypothesis-profile=long -m "$(LONG)"
 
 test-slow: setup ## the tests that take minutes
 	$(BIN)/pytest -m slow

@@ -20,24 +20,10 @@ from pbrs_farm.curate import selection_run as selecting
 from pbrs_farm.formats.histogram_json import record_from_json
 from pbrs_farm.run.develop_step import view_histogram
 from pbrs_farm.store import MemoryStore
+from tests.inputs.histogram_records import put_house
 from tests.selection.histogram_sets import FIELDS, record, reference
 
 LOW = SelectionFields(min_colour=0.2, min_depth=0.2)
-
-
-def put_house(store: MemoryStore, house: str, n_views: int, seed: int = 1, *, manifest=True):
-    rng = np.random.default_rng([seed, *house.encode()])
-    lines = []
-    for k in range(n_views):
-        view = f"0_{k // 2}_{k % 2}"
-        data = record(house, view, rng).json_bytes()
-        key = keys.view_key(house, view, "histogram.json")
-        store.put(key, data)
-        store.put(keys.view_key(house, view, "view.json"), b"{}")
-        store.put(keys.view_key(house, view, "mlt_il_ol.png"), b"no picture is opened")
-        lines.append(json.dumps({"key": key, "sha256": keys.sha256(data)}))
-    if manifest:
-        store.put(keys.house_key(house, "manifest.jsonl"), "\n".join(lines).encode())
 
 
 @pytest.fixture

@@ -111,3 +111,13 @@ def blocks_of(page: Path) -> list[Block]:
 def every_block() -> list[Block]:
     """The blocks of all pages."""
     return [block for page in PAGES for block in blocks_of(page)]
+
+
+def name_of(page: Path) -> str:
+    return str(page.relative_to(REPO))
+
+
+def blocks(page: str) -> list[tuple[str, str]]:
+    """(language, text) of each block of commands of a page."""
+    found = blocks_of(REPO / "docs" / page)
+    return [(b.language, b.text) for b in found if b.language in COMMANDS]

@@ -22,16 +22,12 @@ from pbrs_farm.commands.arguments import recipe_of
 from pbrs_farm.core.recipe import Recipe, field_paths
 from pbrs_farm.scene.home import Home
 from pbrs_farm.views.views import Frame
-from tests.docs.fenced import PAGES, REPO, Block, blocks_of
+from tests.docs.fenced import PAGES, REPO, Block, blocks_of, name_of
 
 LAB = sorted((REPO / "docs/lab").rglob("*.md"))
 HOWTO = sorted(p for p in (REPO / "docs/howto").glob("*.md") if p.stem != "index")
 MODULE_OF = {verb: module for module, verbs in MODULES.items() for verb in verbs}
 OF_NAME = {"home": Home, "scene": Home, "lit": Home, "frame": Frame, "left": Frame, "right": Frame}
-
-
-def name_of(page: Path) -> str:
-    return str(page.relative_to(REPO))
 
 
 def fences(page: Path, language: str) -> list[str]:

@@ -24,8 +24,7 @@ from PIL import Image
 
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.formats.recipe_toml import toml_from_recipe
-from tests.docs.fenced import COMMANDS, PAGES, REPO, Block, blocks_of
-from tests.docs.test_manual import name_of
+from tests.docs.fenced import COMMANDS, PAGES, REPO, Block, blocks_of, name_of
 from tests.hostile.sound_inputs import archive
 from tests.scene.homes import SMALL
 

@@ -15,7 +15,7 @@ import pytest
 
 from benchmarks.memory import descendants
 from pbrs_farm.cli import MODULES, main
-from tests.docs.test_tutorials import REPO, blocks
+from tests.docs.fenced import REPO, blocks
 from tests.workers.redis_server import free_port
 
 

@@ -10,16 +10,9 @@ from pathlib import Path
 import pytest
 
 from pbrs_farm.cli import MODULES, main
-from tests.docs.fenced import COMMANDS, blocks_of
+from tests.docs.fenced import REPO, blocks
 
-REPO = Path(__file__).parents[2]
 PAGES = sorted((REPO / "docs").rglob("*.md"))
-
-
-def blocks(page: str) -> list[tuple[str, str]]:
-    """(language, text) of each block of commands of a page."""
-    found = blocks_of(REPO / "docs" / page)
-    return [(b.language, b.text) for b in found if b.language in COMMANDS]
 
 
 @pytest.mark.pages

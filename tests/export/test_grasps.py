@@ -11,7 +11,7 @@ import trimesh
 
 from pbrs_farm.export.export_homes import export_house
 from pbrs_farm.export.grasps import FRICTION, antipodal_pairs
-from tests.export.test_home_mjcf import loose, small_home
+from tests.inputs.loose_items import loose, small_home
 
 CYLINDER = trimesh.creation.cylinder(0.035, 0.2, sections=64)
 MUG = trimesh.creation.annulus(0.035, 0.04, 0.1, sections=48)

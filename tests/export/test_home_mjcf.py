@@ -10,25 +10,13 @@ import mujoco
 import numpy as np
 import pytest
 
-from pbrs_farm.core.house import Box, House, Item, ItemKind, Material, Source
+from pbrs_farm.core.house import House
 from pbrs_farm.core.joints import Joint, JointKind
 from pbrs_farm.export.export_homes import export_house
 from pbrs_farm.geometry.opened import item_at
 from tests.export.homes import repaired_home
-from tests.geometry.test_opened import WIDE, cupboard, thing
-
-
-def small_home(*items: Item) -> House:
-    """Items on a floor of 4 m."""
-    floor = replace(thing("floor", (-2, -0.1, -2), (2, 0, 2)), kind=ItemKind.FLOOR)
-    source = Source("builtin", "", "", licence="CC0")
-    return House("small", "small", source, (), (), (floor, *items), (Material("wood"),), {})
-
-
-def loose(name: str, low: tuple[float, float, float], high: tuple[float, float, float]) -> Item:
-    item = thing(name, low, high)
-    a, b = np.array(low), np.array(high)
-    return replace(item, box=Box((a + b) / 2, (b - a) / 2, np.eye(3)))
+from tests.inputs.cupboards import WIDE, cupboard
+from tests.inputs.loose_items import loose, small_home
 
 
 def model_of(house: House, folder: Path) -> Any:

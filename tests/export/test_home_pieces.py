@@ -9,7 +9,7 @@ import pytest
 
 from pbrs_farm.core.house import FLOATING, Item
 from pbrs_farm.export.home_pieces import exported_home
-from tests.export.test_home_mjcf import loose, small_home
+from tests.inputs.loose_items import loose, small_home
 
 
 def bookcase() -> Item:

@@ -22,8 +22,8 @@ from pbrs_farm.formats.glb import gltf_from_glb
 from pbrs_farm.geometry.convex_parts import hull_faces
 from pbrs_farm.geometry.opened import item_at, moved_surface
 from tests.export.homes import repaired_home, stored
-from tests.export.test_home_mjcf import small_home
-from tests.geometry.test_opened import cupboard
+from tests.inputs.cupboards import cupboard
+from tests.inputs.loose_items import small_home
 
 _HOME = exported_home(repaired_home())
 

@@ -14,8 +14,8 @@ from pbrs_farm.core.house import ItemKind
 from pbrs_farm.core.joints import JointKind
 from pbrs_farm.export.export_homes import export_house
 from pbrs_farm.geometry.opened import item_at
-from tests.export.test_home_mjcf import loose, small_home
-from tests.geometry.test_opened import cupboard, thing
+from tests.inputs.cupboards import cupboard, thing
+from tests.inputs.loose_items import loose, small_home
 
 
 @pytest.mark.parametrize("kind", list(JointKind))

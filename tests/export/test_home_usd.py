@@ -24,8 +24,8 @@ from pbrs_farm.images import png_from_array
 from pbrs_farm.prepare.read_source import read_house
 from pbrs_farm.prepare.source import resolve
 from tests.export.homes import differences, repaired_home
-from tests.export.test_home_mjcf import small_home
-from tests.geometry.test_opened import cupboard
+from tests.inputs.cupboards import cupboard
+from tests.inputs.loose_items import small_home
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ import pytest
 
 from pbrs_farm.commands.using import write_sheets
 from pbrs_farm.gallery.sheet_parts import SheetParts
-from tests.gallery.test_contact_sheet import write_house
+from tests.inputs.sheet_house import write_house
 
 
 @pytest.fixture

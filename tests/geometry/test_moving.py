@@ -11,7 +11,7 @@ from pbrs_farm.core.house import House, MaterialKind, geometry_from_house
 from pbrs_farm.core.joints import JointKind
 from pbrs_farm.core.motions import Motion
 from pbrs_farm.geometry.moving import MovingHouse, house_at
-from tests.geometry.test_opened import cupboard, thing
+from tests.inputs.cupboards import cupboard, thing
 from tests.truth.hits import house
 
 QUARTER = (float(np.sqrt(0.5)), 0.0, float(np.sqrt(0.5)), 0.0)  # 90 degrees about y: +x goes to -z

@@ -12,7 +12,7 @@ from pbrs_farm.core.house import ItemKind
 from pbrs_farm.core.joints import JointKind
 from pbrs_farm.dress.mutable_house import moved_item
 from pbrs_farm.geometry.swept import floor_swept, swept_by_item
-from tests.geometry.test_opened import DEEP, WIDE, cupboard
+from tests.inputs.cupboards import DEEP, WIDE, cupboard
 
 
 def test_a_drawer_sweeps_its_front_as_far_as_it_comes_out() -> None:

@@ -10,32 +10,19 @@ import pytest
 from shapely.geometry import Point, Polygon
 
 from pbrs_farm.core.arrays import F64
-from pbrs_farm.core.catalogue import EMPTY, Catalogue, Piece, Shape
+from pbrs_farm.core.catalogue import EMPTY
 from pbrs_farm.core.classes import SOFA
-from pbrs_farm.core.house import House, Material, Surface
+from pbrs_farm.core.house import House, Surface
 from pbrs_farm.core.made_home import MadeHome
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.generate.generated_home import generate_home
-from pbrs_farm.geometry.solids import box_quads, quads_surface
 from pbrs_farm.prepare.furnish_rooms import furnish_rooms
 from pbrs_farm.prepare.passes import step_depends, uses_catalogue
 from pbrs_farm.prepare.source import resolve
 from pbrs_farm.read.sweethome3d.home import read_home
-from tests.generate.furnish.shelves import plain_catalogue
+from tests.inputs.box_catalogue import boxes
 
 HOME = MadeHome(2, furniture=False)
-
-
-def boxes() -> Catalogue:
-    """The plain catalogue, each piece a box of its size."""
-
-    def box(piece: Piece) -> Shape:
-        w, d, h = piece.size
-        half = np.array([w, h, d]) / 2
-        quads = box_quads(np.array([0.0, h / 2, 0.0]), half)
-        return Shape((quads_surface("box", quads, 0),), (Material("grey"),))
-
-    return Catalogue(plain_catalogue().pieces, box, "boxes")
 
 
 def empty_house() -> House:

@@ -14,7 +14,7 @@ from pbrs_farm.core.house import House, Item
 from pbrs_farm.furnishings.things.families import family_pieces, with_families
 from pbrs_farm.prepare.stand_ins import with_stand_ins
 from pbrs_farm.read.common.box_only_items import box_only_item
-from tests.prepare.test_stand_ins import empty_room
+from tests.inputs.empty_room import empty_room
 
 Triple = tuple[float, float, float]
 GROUP = {f"piece:{p.id}": p.group for p in family_pieces()}

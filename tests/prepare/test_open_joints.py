@@ -15,7 +15,7 @@ from pbrs_farm.prepare.open_joints import STOPPED, left_open, opened
 from pbrs_farm.prepare.passes import PASS
 from pbrs_farm.prepare.source import resolve, variants
 from pbrs_farm.read.builtin.builtin_home import builtin_home
-from tests.geometry.test_opened import cupboard, thing
+from tests.inputs.cupboards import cupboard, thing
 
 
 def house_of(*items: Item) -> House:

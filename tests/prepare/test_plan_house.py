@@ -19,8 +19,8 @@ from pbrs_farm.prepare.stand_ins import STAND_IN, with_stand_ins
 from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.repair import repair
 from pbrs_farm.store import MemoryStore
+from tests.inputs.box_catalogue import boxes
 from tests.inputs.plan_files import HOLES, ROOMS, TELLING, WRITERS, write_swiss, write_zind
-from tests.prepare.test_furnish_rooms import boxes
 from workers.house_files import entries_from_arguments, upload
 
 # The others give the same walls (tests/generate/test_plan_files.py).

@@ -4,19 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import pytest
 
-from pbrs_farm.core.catalogue import EMPTY, Catalogue, Piece, Place, Shape
+from pbrs_farm.core.catalogue import Catalogue, Piece, Place, Shape
 from pbrs_farm.core.house import House, Item, ItemKind, Material
-from pbrs_farm.generate.floor_plan import Plan, PlanRoom, PlanWall, RoomType
-from pbrs_farm.generate.generated_home import furnish_storeys
 from pbrs_farm.geometry.solids import box_quads, quads_surface
 from pbrs_farm.prepare.stand_ins import STAND_IN, has_box_only_items, with_stand_ins
 from pbrs_farm.read.common.box_only_items import box_only_item
-from pbrs_farm.read.sweethome3d.home import read_home
+from tests.inputs.empty_room import empty_room
 
 BED, CHAIR, TABLE = 4, 5, 7
 
@@ -42,18 +39,6 @@ PIECES = catalogue(
     ("bed", (1.6, 2.1, 0.9), BED), ("bed", (0.95, 2.05, 0.8), BED), ("chair", (0.45, 0.5, 0.9), CHAIR),
     ("dining_table", (1.4, 0.8, 0.75), TABLE),
 )  # fmt: skip
-
-
-@cache
-def empty_room() -> House:
-    """A room of 5 m by 4 m, its inner corner at the origin."""
-    corners = ((0.0, 0.0), (5.0, 0.0), (5.0, 4.0), (0.0, 4.0))
-    walls = tuple(
-        PlanWall(a, b, 0.02) for a, b in zip(corners, (*corners[1:], corners[0]), strict=True)
-    )
-    inner = ((0.01, 0.01), (4.99, 0.01), (4.99, 3.99), (0.01, 3.99))
-    plan = Plan((PlanRoom(RoomType.BEDROOM, "Room", inner),), walls, (), 2.5)
-    return read_home(furnish_storeys([plan], ((),), EMPTY, "room", seed=1).data, "room.sh3d")
 
 
 def box_only(

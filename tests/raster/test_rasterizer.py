@@ -1,5 +1,3 @@
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from scipy.ndimage import maximum_filter, minimum_filter
@@ -9,7 +7,6 @@ from pbrs_farm.core.errors import MachineFailed
 from pbrs_farm.core.frames import srgb_from_linear
 from pbrs_farm.core.house import (
     NOTHING_LEFT,
-    House,
     LightPart,
     Material,
     MaterialKind,
@@ -22,6 +19,7 @@ from pbrs_farm.raster import Rasterizer
 from pbrs_farm.raster.shader_programs import DL_SCALE, MAX_PANE_OPACITY
 from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.read.builtin.builtin_home import builtin_home
+from tests.inputs.drawn_items import items_drawn
 from tests.raster.raster_scenes import camera, house, item, square
 
 WHITE = Material("white")
@@ -31,23 +29,6 @@ BLUE = Material("blue", diffuse=(0.0, 0.0, 1.0))
 
 def byte(linear: float) -> float:
     return float(255 * srgb_from_linear(np.array(min(linear, 1.0))))
-
-
-def items_drawn(home: House, view: Camera) -> np.ndarray:
-    """(H, W) the instance id that most of a pixel's samples show, told by pictures.
-
-    Each picture paints every item red, green or blue, by one digit of its number in base three.
-    """
-    paints = tuple(Material(f"paint {k}", diffuse=tuple(np.eye(3)[k])) for k in range(3))
-    drawn = np.zeros((view.intrinsics.height_px, view.intrinsics.width_px), np.int64)
-    for digit in range(1 + int(np.log(len(home.items)) / np.log(3))):
-        items = tuple(
-            replace(i, surfaces=tuple(replace(s, material=k // 3**digit % 3) for s in i.surfaces))
-            for k, i in enumerate(home.items, start=1)
-        )
-        with Rasterizer(replace(home, items=items, materials=paints), {}) as raster:
-            drawn += 3**digit * raster.render_dl(view).argmax(axis=2)
-    return drawn
 
 
 @pytest.mark.parametrize(

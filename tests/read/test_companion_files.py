@@ -23,12 +23,11 @@ from pbrs_farm.read.objects.model_folders import find_models
 from pbrs_farm.run.house_cache import HouseCache
 from pbrs_farm.run.step_cache import StepOutput, Work, run_unless_done
 from pbrs_farm.store.memory_store import MemoryStore
+from tests.inputs.suncg_files import arch_json, write_v2
 from tests.read.suncg import suncg_root
 from tests.read.suncg.suncg_root import picture
-from tests.read.suncg.test_suncg_arch import arch_json, write_v2
 from tests.read.sweethome3d.sh3d_source import BOX_OBJ, home_xml, piece, sh3d
-from tests.read.test_reader_contract import FORMATS
-from tests.read.textured_sources import MTL, QUAD_OBJ
+from tests.read.textured_sources import FORMATS, MTL, QUAD_OBJ
 from workers.house_files import entries_from_arguments, is_left_in_place
 
 PNG = picture((10, 20, 30), "PNG")

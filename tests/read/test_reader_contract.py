@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import io
 from pathlib import Path
 
 import pytest
-from PIL import Image
 
 from pbrs_farm.assets import homes_package
 from pbrs_farm.core.errors import BadHouse
@@ -19,21 +17,13 @@ from pbrs_farm.prepare.source_ref import SourceRef
 from pbrs_farm.read.common.material_library import MaterialLibrary, texture_from_bytes
 from pbrs_farm.read.common.notes import HARMLESS, Notes
 from tests.example_homes import example_homes
+from tests.inputs.pictures import picture
 from tests.read.sweethome3d.sh3d_source import BOX_OBJ, WALLS, home_xml, piece, sh3d
 from tests.read.textured_sources import FORMATS
 
 STRICT = ReadFields(strict=True)
 STRICT_RECIPE = Recipe(read=STRICT)
 formats = pytest.mark.parametrize("kind", FORMATS)
-
-
-def picture(encoding: str = "PNG", alpha: int | None = None) -> bytes:
-    image = Image.new("RGB" if alpha is None else "RGBA", (8, 8), (200, 40, 30))
-    if alpha is not None:
-        image.putalpha(alpha)
-    buffer = io.BytesIO()
-    image.save(buffer, encoding)
-    return buffer.getvalue()
 
 
 def texture_notes(house: House) -> list[str]:

@@ -15,9 +15,9 @@ from pbrs_farm.formats import glb
 from pbrs_farm.formats.house_bundle import bundle_from_house, house_from_bundle
 from pbrs_farm.read.gltf.scene import read_gltf
 from tests.hypothesis_profiles import examples
+from tests.inputs.damaged_json import outcome, paths_of, values
 from tests.read.gltf.gltf_scenes import two_rooms
 from tests.read.small_houses import full_house
-from tests.read.suncg.test_suncg_bad import outcome, paths_of, values
 
 SCENE = two_rooms()
 SCENE.node("Lamp", mesh=SCENE.box([1, 0, 1], [1.2, 1, 1.2]), extras={"class": "lamp"})

@@ -17,7 +17,7 @@ from pbrs_farm.run.run_task import make_light_handler
 from pbrs_farm.run.step_cache import Work
 from pbrs_farm.run.steps import run_step
 from pbrs_farm.store import store_from_url
-from tests.run.test_pipeline import small
+from tests.inputs.small_recipes import small
 
 source = resolve("builtin")
 work = Work(store_from_url(sys.argv[1]), small(), source.house_id, HouseCache(), source)

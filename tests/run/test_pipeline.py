@@ -12,32 +12,16 @@ import pytest
 
 from pbrs_farm.check import verify
 from pbrs_farm.core import layers
-from pbrs_farm.core.layers import LAYER, LAYERS, MOST_VARIANTS
-from pbrs_farm.core.recipe import Recipe, recipe_from_name
+from pbrs_farm.core.layers import LAYER, LAYERS
 from pbrs_farm.images import array_from_png, layers_from_exr
 from pbrs_farm.run.local import run_local
 from pbrs_farm.run.local_run import Run, Summary
 from pbrs_farm.run.plan import wanted
 from pbrs_farm.transport.scene_tables.sky import clear_sky_lx
+from tests.inputs.small_recipes import small
 
 OPTIONAL = [name for name in layers.OPTIONAL if not LAYER[name].partner]
 ALONE = [x for x in LAYERS if not x.partner]  # what a view has without a partner
-
-
-def small() -> Recipe:
-    return recipe_from_name(
-        "preview",
-        {
-            "image.width_px": "96",
-            "image.height_px": "72",
-            "light.spp": "4",
-            "light.pilot_spp": "0",
-            "tone.variants": str(MOST_VARIANTS),
-            "cameras.cell_m": "1.0",
-            "cameras.score_width_px": "160",
-            "cameras.score_height_px": "120",
-        },
-    )
 
 
 @pytest.fixture(scope="module")

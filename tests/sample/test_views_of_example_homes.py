@@ -11,8 +11,8 @@ from pbrs_farm.read.sweethome3d.home import read_home
 from pbrs_farm.repair import repair
 from pbrs_farm.sample.house_sampler import sample_cameras
 from tests.example_homes import example_homes
+from tests.inputs.camera_rules import hold_the_rules
 from tests.sample.sampled_rooms import IndependentLook
-from tests.sample.test_paper_rules import hold_the_rules
 
 pytestmark = pytest.mark.homes
 SMALL = {"score_width_px": 160, "score_height_px": 120, "coarse_width_px": 80, "cell_m": 0.4}

@@ -2,31 +2,17 @@
 
 from __future__ import annotations
 
-import os
-import secrets
 import threading
 from collections.abc import Iterator
-from dataclasses import replace
 from mmap import ACCESS_READ, mmap
 from pathlib import Path
 
 import pytest
 
 from pbrs_farm.core.errors import ObjectMissing, StoreFailed
-from pbrs_farm.settings import settings_from_environment
-from pbrs_farm.store import MemoryStore, Store, store_from_url
+from pbrs_farm.store import MemoryStore, Store
 from pbrs_farm.store.folder import FolderStore
-
-
-def s3_store() -> Store:
-    """A fresh prefix in the bucket the environment names; skips when it names none."""
-    endpoint = os.environ.get("PBRS_S3_ENDPOINT")
-    if not endpoint:
-        pytest.skip("PBRS_S3_ENDPOINT is not set")
-    found = settings_from_environment().store
-    settings = replace(found, s3=replace(found.s3, retry_timeout_s=5.0))
-    bucket = os.environ.get("PBRS_S3_BUCKET", "pbrs")
-    return store_from_url(f"s3://{bucket}/t-{secrets.token_hex(4)}", settings)
+from tests.inputs.s3_stores import s3_store
 
 
 @pytest.fixture(params=["memory", "folder", "fsync", pytest.param("s3", marks=pytest.mark.infra)])

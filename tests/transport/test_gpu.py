@@ -104,7 +104,7 @@ def test_opengl_through_egl_draws_on_the_gpu_what_rays_see() -> None:
     from pbrs_farm.core.camera import Camera, Intrinsics
     from pbrs_farm.raster import Rasterizer
     from pbrs_farm.raycast.caster import Caster
-    from tests.raster.test_rasterizer import items_drawn
+    from tests.inputs.drawn_items import items_drawn
 
     house = builtin_home()
     stored = house.cameras[0]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +10,7 @@ import pytest
 
 from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.frames import LUMINANCE
-from pbrs_farm.core.house import House, Item, Surface
+from pbrs_farm.core.house import House
 from pbrs_farm.core.lighting import Group
 from pbrs_farm.core.recipe import LightFields
 from pbrs_farm.raycast.variant import choose_variant, mitsuba
@@ -21,14 +20,13 @@ from pbrs_farm.transport.scene_tables.sky import Sky, dark_sky, uniform_sky
 from pbrs_farm.transport.validation import known_rooms as rooms
 from pbrs_farm.transport.validation.claims import blocks, z_scores
 from pbrs_farm.transport.validation.known_rooms import furnace
-from tests.transport.metropolis.test_metropolis import METROPOLIS
-from tests.transport.test_path_tracer import FIELDS, RECIPE
+from tests.inputs.bumpy_coats import Picture, waves, with_material
+from tests.inputs.rendered_rooms import FIELDS, METROPOLIS, RECIPE
 
 pytestmark = pytest.mark.skipif(
     choose_variant().startswith("scalar"), reason="the kernels need LLVM or CUDA"
 )
 
-Picture = np.ndarray
 FLAT: Picture = np.full((4, 4, 3), (128, 128, 255), np.uint8)
 
 
@@ -36,31 +34,6 @@ def one_normal(x: float, y: float) -> Picture:
     """A normal map of one normal everywhere."""
     normal = np.array([x, y, math.sqrt(1 - x * x - y * y)])
     return np.full((2, 2, 3), np.round((normal + 1) * 127.5), np.uint8)
-
-
-def waves(slope: float, n: int = 64, periods: int = 2) -> Picture:
-    """A normal map of waves along u and v, of a largest slope."""
-    phase = 2 * np.pi * periods * (np.arange(n) + 0.5) / n
-    y, x = np.meshgrid(slope * np.cos(phase), slope * np.sin(phase), indexing="ij")
-    normals = np.stack([x, y, np.ones_like(x)], -1)
-    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
-    return np.round((normals + 1) * 127.5).astype(np.uint8)
-
-
-def spread(surface: Surface, per_m: float = 0.4) -> Surface:
-    """The surface with texture coordinates that span every one of its faces."""
-    p = surface.positions
-    uvs = per_m * np.stack([p[:, 0] + 0.6 * p[:, 1], p[:, 2] + 0.3 * p[:, 1]], -1)
-    return replace(surface, uvs=uvs.astype(np.float32))
-
-
-def with_material(house: House, **changes: object) -> House:
-    """The house with changes to its first material, and texture coordinates on every surface."""
-    items: Iterable[Item] = (
-        replace(item, surfaces=tuple(spread(s) for s in item.surfaces)) for item in house.items
-    )
-    first = replace(house.materials[0], **changes)
-    return replace(house.with_items(items), materials=(first, *house.materials[1:]))
 
 
 def floor(

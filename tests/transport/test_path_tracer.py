@@ -8,44 +8,27 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.cutouts import CutOut
 from pbrs_farm.core.frames import LUMINANCE, linear_from_srgb
 from pbrs_farm.core.house import NOTHING_LEFT, House, Material, MaterialKind, geometry_from_house
 from pbrs_farm.core.lighting import Group, Mode
-from pbrs_farm.core.recipe import LightFields, Recipe, recipe_from_name
+from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.raycast.variant import choose_variant, mitsuba
-from pbrs_farm.transport.light_result import LightResult
 from pbrs_farm.transport.light_scene import LightScene
 from pbrs_farm.transport.scalar_scene import ScalarScene
 from pbrs_farm.transport.scene_tables.material_rows import FIRST_TEXEL, material_rows
-from pbrs_farm.transport.scene_tables.sky import Sky, dark_sky, sunsky, uniform_sky
+from pbrs_farm.transport.scene_tables.sky import dark_sky, sunsky, uniform_sky
 from pbrs_farm.transport.scene_tables.texture_atlas import texture_atlas
 from pbrs_farm.transport.validation import known_rooms as rooms
 from pbrs_farm.transport.validation.claims import blocks, z_scores
 from pbrs_farm.transport.validation.known_rooms import furnace
 from pbrs_farm.truth.surface_layers import albedo_label
+from tests.inputs.rendered_rooms import FIELDS, RECIPE, rendered
 
 pytestmark = pytest.mark.skipif(
     choose_variant().startswith("scalar"), reason="the kernels need LLVM or CUDA"
 )
-
-RECIPE: Recipe = recipe_from_name("fast")
-FIELDS: LightFields = RECIPE.light.model_copy(update={"filter": "box", "pilot_spp": 0})
-
-
-def rendered(
-    house: House,
-    camera: Camera,
-    sky: Sky,
-    *,
-    seed: int = 1,
-    recipe: Recipe = RECIPE,
-    **fields: object,
-) -> LightResult:
-    scene = LightScene.load(house, {}, recipe, sky)
-    return scene.render(camera, "0_0", FIELDS.model_copy(update=fields), seed)
 
 
 @pytest.mark.parametrize("albedo", [0.0, 0.3, 0.8])

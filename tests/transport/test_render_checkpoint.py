@@ -16,7 +16,7 @@ from pbrs_farm.transport.light_scene import LightScene
 from pbrs_farm.transport.render_checkpoint import Arrays
 from pbrs_farm.transport.scene_tables.sky import sunsky, uniform_sky
 from pbrs_farm.transport.validation import known_rooms as rooms
-from tests.transport.test_path_tracer import FIELDS, RECIPE
+from tests.inputs.rendered_rooms import FIELDS, RECIPE
 
 pytestmark = pytest.mark.skipif(
     choose_variant().startswith("scalar"), reason="the kernels need LLVM or CUDA"

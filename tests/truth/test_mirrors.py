@@ -7,8 +7,8 @@ import pytest
 
 from pbrs_farm import truth
 from pbrs_farm.core.house import House, Material, MaterialKind, Surface
+from tests.inputs.label_inputs import label_inputs_of
 from tests.truth.hits import camera, house, square
-from tests.truth.test_optional_layers import label_inputs_of
 
 MIRROR = Material("mirror", MaterialKind.MIRROR)
 

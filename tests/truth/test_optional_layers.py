@@ -9,29 +9,11 @@ from pbrs_farm.core.camera import Camera, Intrinsics
 from pbrs_farm.core.classes import NYU13_FROM_NYU40, NYU13_NAMES, NYU40_NAMES
 from pbrs_farm.core.house import House, Material, MaterialKind, ModelPose, geometry_from_house
 from pbrs_farm.core.layers import LAYER, LAYERS
-from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.read.builtin.builtin_home import builtin_home
 from pbrs_farm.truth.stereo_sensor import D435, D455, stereo_depth
 from pbrs_farm.truth.tof_sensor import AZURE, KINECT2, L515, tof_depth
+from tests.inputs.label_inputs import label_inputs_of
 from tests.truth.hits import camera, hit, house, square
-
-
-def label_inputs_of(
-    home: House, view: Camera, textures: dict | None = None, seed: int = 0
-) -> truth.LabelInputs:
-    geometry = geometry_from_house(home)
-    caster = Caster(geometry)
-    record = caster.hit_record(view)
-    return truth.LabelInputs(
-        record,
-        home,
-        geometry,
-        view,
-        lambda skip: caster.hit_record(view, skip_faces=skip),
-        textures or {},
-        seed,
-        first_hit=caster.first_hit,
-    )
 
 
 def glazed() -> House:

@@ -6,7 +6,7 @@ import numpy as np
 
 from pbrs_farm.core.arrays import F64, I64
 from pbrs_farm.truth.point_tracks import MOST_POINTS, PointTracks, TrackFrame, point_tracks
-from tests.truth.test_optical_flow import HEIGHT, WIDTH, F, at, squares
+from tests.inputs.flow_squares import HEIGHT, WIDTH, F, at, squares
 
 SPEED = 0.5  # m/s to the right, of a square of 0.5 m at 2 m; the wall is at 4 m
 TIMES = (0.0, 0.5, 1.0, 5.0)

@@ -17,25 +17,13 @@ from pathlib import Path
 
 import pytest
 
+from tests.inputs.farm_processes import note, renderers
 from tests.workers.redis_server import RedisServer
 from tests.workers.refusals import REFUSALS, configured
 from tests.workers.small_farm import SmallFarm
 from tests.workers.stalling_proxy import StallingProxy
-from tests.workers.test_farm import renderers
 
 pytestmark = pytest.mark.chaos
-
-
-def note(fault: str, farm: SmallFarm, repeated: int, seconds: float) -> None:
-    """A line of the chaos table; nothing is ever lost when this is reached."""
-    path = os.environ.get("PBRS_CHAOS_TABLE")
-    if path:
-        row = {
-            "fault": fault, "tasks": sum(farm.starts().values()) - repeated, "lost": 0,
-            "repeated": repeated, "seconds": round(seconds, 1),
-        }  # fmt: skip
-        with Path(path).open("a") as file:
-            file.write(json.dumps(row) + "\n")
 
 
 def begin(farm: SmallFarm, n_houses: int = 6, slow_s: float = 0.3) -> None:

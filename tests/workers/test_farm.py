@@ -10,12 +10,11 @@ import signal
 import subprocess
 import sys
 import uuid
-from pathlib import Path
 
 import pytest
 
-from benchmarks.memory import descendants
 from pbrs_farm.core.errors import BadInput
+from tests.inputs.farm_processes import renderers
 from tests.workers.small_farm import SmallFarm
 from workers.config import config_from_environment
 from workers.logs import NoSecrets
@@ -73,16 +72,6 @@ def hostile_messages() -> list[str]:
         message("pbrs.run", ["../../etc", "h/0/gl", "r"]),
         message("pbrs.run", ["f" * 12, "h/0/gl;FLUSHALL", "r"]),
     ]
-
-
-def renderers(farm: SmallFarm, worker: str) -> list[int]:
-    """Process ids of a worker's renderers."""
-    found = []
-    for pid in descendants(farm.processes[worker].pid):
-        words = Path(f"/proc/{pid}/cmdline").read_bytes().split(b"\0")
-        if b"workers.node.renderer:make_handler" in words:
-            found.append(pid)
-    return found
 
 
 def test_celerys_parent_process_is_kept_out_of_storage() -> None:

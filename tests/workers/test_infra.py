@@ -19,7 +19,7 @@ from urllib.parse import urlsplit
 import pytest
 
 from pbrs_farm.store.secret import Secret
-from tests.store.test_contract import s3_store
+from tests.inputs.s3_stores import s3_store
 from tests.workers.redis_server import RedisServer
 from tests.workers.small_farm import REPO, SmallFarm
 from workers.client.farm_client import Farm

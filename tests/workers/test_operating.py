@@ -17,50 +17,23 @@ from pbrs_farm.cli import main
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.store.folder import FolderStore
-from tests.workers.drive import Drive
+from tests.inputs.submitted_jobs import HOUSES, environment, fail, farm, submit
 from workers.client.farm_client import Farm, new_spec
 from workers.client.text import explanation_text, status_text, workers_text
-from workers.config import FarmConfig
 from workers.ids import log_key
-from workers.job import HouseEntry
 from workers.ledger.redis_ledger import RedisLedger
-from workers.ledger.task_ledger import Fault, LedgerUnavailable
+from workers.ledger.task_ledger import LedgerUnavailable
 from workers.ledger.worker_registry import Registry
 from workers.node import supervisor
 from workers.node.faults import without_numbers
 from workers.store_identity import known_store_id, store_id
 
-HOUSES = [HouseEntry(house_id=f"h{k}", source="{}") for k in range(3)]
-
-
-@pytest.fixture
-def farm(config: FarmConfig, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Farm:
-    monkeypatch.setenv("PBRS_TEST_CONTROL", str(tmp_path))
-    url = (tmp_path / "store").as_uri()
-    return Farm(replace(config, runner="tests.workers.fake_runner:runner", store_url=url))
-
-
-def submit(farm: Farm) -> Drive:
-    job = farm.submit(HOUSES, new_spec(recipe_from_name("preview")))
-    return Drive(farm.ledger, farm.spec(job.job_id))
+__all__ = ["farm"]  # a fixture
 
 
 def registry_of(farm: Farm, **changes: object) -> Registry:
     """The registry as a worker with other settings sees it."""
     return Registry(RedisLedger(replace(farm.config, **changes), farm.ledger.client))
-
-
-def environment(farm: Farm, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The farm as the command line finds it."""
-    monkeypatch.setenv("PBRS_REDIS_URL", farm.config.redis_url.reveal())
-    monkeypatch.setenv("PBRS_STORE", farm.config.store_url)
-    monkeypatch.setenv("PBRS_FARM_PREFIX", farm.config.prefix)
-
-
-def fail(d: Drive, task: str, kind: str = "data") -> str:
-    token = d.claim(task).token
-    fault = Fault(fault=kind, fingerprint=f"{kind}: x", message="x")  # type: ignore[arg-type]
-    return d.ledger.fail(d.job.job_id, task, token, fault, delay_s=0)
 
 
 # Stores

@@ -8,7 +8,7 @@ from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.curate import selection_run as selecting
 from pbrs_farm.selection.reference_set import bytes_from_reference
 from pbrs_farm.store import MemoryStore
-from tests.curate.test_selection_run import put_house
+from tests.inputs.histogram_records import put_house
 from tests.selection.histogram_sets import reference
 from workers.client.farm_client import completed, new_spec
 from workers.ids import job_key

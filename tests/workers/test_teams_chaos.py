@@ -7,8 +7,8 @@ from collections import Counter
 
 import pytest
 
+from tests.inputs.farm_processes import note
 from tests.workers.small_farm import SmallFarm
-from tests.workers.test_chaos import note
 from workers.client.users import add_user, change_user
 
 pytestmark = pytest.mark.chaos

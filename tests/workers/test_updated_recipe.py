@@ -10,9 +10,9 @@ import pbrs_farm
 from pbrs_farm.core import keys
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.run import plan
+from tests.inputs.submitted_jobs import HOUSES, farm
 from tests.workers.drive import Drive
 from tests.workers.fake_runner import batches_of
-from tests.workers.test_operating import HOUSES, farm
 from workers.client.farm_client import Farm, new_spec
 from workers.ids import job_key
 from workers.job import work_version

@@ -13,7 +13,7 @@ from pbrs_farm.core.house import House, Item, ItemKind, corners_of_surfaces
 from pbrs_farm.core.recipe import Recipe, RepairFields, recipe_from_name
 from pbrs_farm.furnishings.surroundings import surroundings, with_surroundings
 from pbrs_farm.repair import repair
-from tests.repair.structure.test_frames_apart import RECT, with_window
+from tests.inputs.windowed_room import RECT, with_window
 
 NEAR = {"ground", "railings"}
 

@@ -16,10 +16,10 @@ from hypothesis import strategies as st
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import House
 from pbrs_farm.core.recipe import ReadFields
-from pbrs_farm.formats.house_bundle import bundle_from_house
 from pbrs_farm.prepare.source import resolve
 from pbrs_farm.read.suncg.suncg_house import read_suncg
 from tests.hypothesis_profiles import examples
+from tests.inputs.damaged_json import outcome, paths_of, values
 from tests.read.suncg import suncg_root
 from tests.read.suncg.suncg_root import HOUSE
 
@@ -279,22 +279,6 @@ def test_a_model_without_mtl_is_grey_with_a_note(root: Path) -> None:
     assert any(i.source_class == "chair" for i in house.items)
 
 
-def assert_sound(house: House) -> None:
-    """A House that later stages can run on: it packs, so its numbers are finite."""
-    bundle_from_house(house)
-    assert all(len(r.polygon) >= 3 for r in house.rooms)
-
-
-def outcome(read_it: Callable[[], House]) -> str:
-    """ "" for a sound House, the file for a BadHouse; any other exception comes through."""
-    try:
-        house = read_it()
-    except BadHouse as error:
-        return error.file
-    assert_sound(house)
-    return ""
-
-
 FILES = [
     JSON,
     "object/chair/chair.obj",
@@ -335,30 +319,6 @@ def test_whatever_the_bytes_the_outcome_is_a_house_or_a_bad_house(
             at %= len(data) + 1
             (root / name).write_bytes(data[:at] + new + data[at + n_gone :])
         outcome(lambda: read(root))
-
-
-values = st.recursive(
-    st.none()
-    | st.booleans()
-    | st.integers(-(10**20), 10**20)
-    | st.floats(allow_nan=False)
-    | st.sampled_from(["", "0", "1", "chair", "..", "#ff0000", "\x00"]),
-    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=3), inner, max_size=3),
-    max_leaves=6,
-)  # fmt: skip
-
-
-def paths_of(plain: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
-    """Where every value of a JSON tree stands."""
-    here = [path] if path else []
-    inner = (
-        plain.items()
-        if isinstance(plain, dict)
-        else enumerate(plain)
-        if isinstance(plain, list)
-        else ()
-    )
-    return here + [p for key, value in inner for p in paths_of(value, (*path, key))]
 
 
 PATHS = paths_of(suncg_root.house_json())

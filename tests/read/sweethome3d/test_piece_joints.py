@@ -12,8 +12,8 @@ from pbrs_farm.core.frames import transform_points
 from pbrs_farm.core.house import House
 from pbrs_farm.core.joints import Joint, JointKind
 from pbrs_farm.read.sweethome3d.home import read_home
+from tests.inputs.sh3d_doors import FRAME, HINGED, box, door_of, read
 from tests.read.sweethome3d.sh3d_source import home_xml, piece, sh3d
-from tests.read.sweethome3d.test_open_doors import FRAME, HINGED, box, door_of, read
 
 
 def joint_of_door(house: House) -> Joint:

@@ -235,7 +235,7 @@ def test_rooms_beside_the_file_are_taken(tmp_path: Path) -> None:
 def test_a_usdz_package_is_read_with_its_pictures(tmp_path: Path) -> None:
     from pxr import UsdUtils
 
-    from tests.read.test_reader_contract import picture
+    from tests.inputs.pictures import picture
 
     (tmp_path / "p.png").write_bytes(picture())
     home = room_home(tmp_path / "a.usda")

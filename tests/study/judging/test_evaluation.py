@@ -30,6 +30,7 @@ from pbrs_farm.views.open_views import open_views
 from pbrs_farm.views.packing.pack_shards import pack
 from pbrs_farm.views.packing.packing_plan import Packing
 from tests.curate.tum_sequence import write_sequence
+from tests.inputs.scannet_scenes import write_scene
 from tests.study.training.made_views import TINY, small_plan
 from tests.views.small_roots import fill
 
@@ -170,23 +171,6 @@ def test_photographs_without_intrinsics_are_one_line(pairs: Path) -> None:
     (pairs / "intrinsics.txt").write_text("80 zero")
     with pytest.raises(BadInput, match="expected fx, fy, cx and cy"):
         camera_of(pairs, pairs)
-
-
-def write_scene(scene: Path, camera_file: str, *, label: bool = True) -> None:
-    """A frame of ScanNet: a larger picture, depth of a wall 2 m away in mm, NYU40 labels."""
-    for name in ("color", "depth", "label", camera_file.rpartition("/")[0]):
-        (scene / name).mkdir(parents=True, exist_ok=True)
-    picture = np.zeros((968, 1296, 3), np.uint8)
-    picture[:, 648:] = 200
-    (scene / "color/000100.jpg").write_bytes(jpeg_from_array(picture))
-    depth = np.full((480, 640), 2000, np.uint16)
-    (scene / "depth/000100.png").write_bytes(png_from_array(depth))
-    if label:
-        ids = np.full((480, 640), 1, np.uint8)
-        ids[:, 320:] = 5
-        (scene / "label/000100.png").write_bytes(png_from_array(ids))
-    rows = "577.87 0 319.5 0\n0 577.87 239.5 0\n0 0 1 0\n0 0 0 1\n"
-    (scene / camera_file).write_text(rows)
 
 
 @pytest.mark.parametrize(

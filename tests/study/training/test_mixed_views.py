@@ -21,7 +21,7 @@ from pbrs_farm.study.training.run_folder import RunFolder
 from pbrs_farm.study.training.training_views import ViewArrays
 from pbrs_farm.study.training.view_sources import TrainingSource, training_views
 from tests.curate.tum_sequence import write_sequence
-from tests.study.judging.test_evaluation import write_scene
+from tests.inputs.scannet_scenes import write_scene
 from tests.study.training.made_views import TINY, small_plan, views
 from tests.views.small_roots import fill
 

@@ -19,8 +19,8 @@ from pbrs_farm.transport.light_scene import LightScene
 from pbrs_farm.transport.scene_tables.sky import sunsky
 from pbrs_farm.transport.validation import known_rooms as rooms
 from pbrs_farm.transport.validation.claims import blocks, z_scores
+from tests.inputs.bumpy_coats import waves, with_material
 from tests.transport import hard_rooms
-from tests.transport.test_maps import waves, with_material
 
 if choose_variant().startswith("scalar"):
     pytest.skip("the kernels need LLVM or CUDA", allow_module_level=True)

@@ -8,28 +8,17 @@ import pytest
 from pbrs_farm.core.errors import RenderFailed
 from pbrs_farm.core.frames import LUMINANCE
 from pbrs_farm.core.lighting import Group
-from pbrs_farm.core.recipe import LightFields
 from pbrs_farm.raycast.variant import choose_variant
 from pbrs_farm.transport.light_scene import LightScene
 from pbrs_farm.transport.scene_tables.sky import dark_sky, sunsky, uniform_sky
 from pbrs_farm.transport.validation import known_rooms as rooms
 from pbrs_farm.transport.validation.claims import blocks, z_scores
 from pbrs_farm.transport.validation.known_rooms import furnace
+from tests.inputs.rendered_rooms import FIELDS, METROPOLIS, RECIPE, rendered
 from tests.transport import hard_rooms
-from tests.transport.test_path_tracer import FIELDS, RECIPE, rendered
 
 pytestmark = pytest.mark.skipif(
     choose_variant().startswith("scalar"), reason="the kernels need LLVM or CUDA"
-)
-
-METROPOLIS: LightFields = FIELDS.model_copy(
-    update={
-        "integrator": "metropolis",
-        "direct_spp": 32,
-        "mutations_per_pixel": 128,
-        "chains": 2048,
-        "pilot_spp": 4,
-    }
 )
 
 

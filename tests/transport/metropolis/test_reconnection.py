@@ -16,9 +16,8 @@ from pbrs_farm.transport.light_scene import LightScene
 from pbrs_farm.transport.scene_tables.sky import dark_sky
 from pbrs_farm.transport.validation import known_rooms as rooms
 from pbrs_farm.transport.validation.claims import blocks, z_scores
+from tests.inputs.rendered_rooms import FIELDS, METROPOLIS, RECIPE
 from tests.transport import hard_rooms
-from tests.transport.metropolis.test_metropolis import METROPOLIS
-from tests.transport.test_path_tracer import FIELDS, RECIPE
 
 pytestmark = pytest.mark.skipif(
     choose_variant().startswith("scalar"), reason="the kernels need LLVM or CUDA"

@@ -9,7 +9,7 @@ import pytest
 
 from pbrs_farm.cli import main
 from pbrs_farm.core.errors import BadInput
-from tests.workers.test_operating import environment, fail, farm, submit
+from tests.inputs.submitted_jobs import environment, fail, farm, submit
 from workers.client.farm_client import Farm
 from workers.client.rerun import rerun
 

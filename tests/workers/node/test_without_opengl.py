@@ -10,7 +10,7 @@ from pbrs_farm.core.errors import BadHouse, MachineFailed
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.run.step_cache import Work
 from pbrs_farm.store import MemoryStore
-from tests.workers.node.test_slot import TASK, Bench, bench
+from tests.inputs.slot_bench import TASK, Bench, bench
 from workers.client.farm_client import completed, new_spec
 from workers.house_files import entries_from_arguments
 from workers.ids import GL, job_key
