@@ -61,15 +61,15 @@ def shading_by_group(
     as of `develop`.
     """
     albedo = diffuse[ALBEDO]
-    found = {
+    shading = {
         group: np.divide(diffuse[name], albedo, out=np.zeros_like(albedo), where=albedo > 0)
         for group, name in IMAGE_OF_GROUP.items()
     }
     if not denoise:
-        return found
+        return shading
     # Divide first, and guide by normals alone: no pattern of a surface is left in its shading.
     grey = np.where(albedo > 0, np.float32(_GUIDE_GREY), np.float32(0))
-    noisy = LinearAovs(found[Group.OUTDOOR], found[Group.INDOOR], grey, aovs.normal)
+    noisy = LinearAovs(shading[Group.OUTDOOR], shading[Group.INDOOR], grey, aovs.normal)
     clean = denoise_aovs(noisy, wraps=wraps)
     return {Group.OUTDOOR: clean.outdoor, Group.INDOOR: clean.indoor}
 
@@ -82,5 +82,5 @@ def intrinsic_parts(
     albedo: (H, W, 3) linear, of the label. The residual may be negative.
     """
     stored = np.clip(shading, 0, _MOST_HALF).astype(np.float16)
-    left = radiance - albedo * stored.astype(np.float32)
-    return stored, np.asarray(np.clip(left, -_MOST_HALF, _MOST_HALF), np.float16)
+    residual = radiance - albedo * stored.astype(np.float32)
+    return stored, np.asarray(np.clip(residual, -_MOST_HALF, _MOST_HALF), np.float16)

@@ -77,8 +77,8 @@ def photometric_warnings(room: Room, lux: dict[str, float], *, is_day: bool = Tr
     ):
         value = lux[group]
         if (is_expected and value < low) or value > high:
-            what = f"room {room.id}: {group} light gives {value:g} lx on the floor"
-            lines.append(f"{what}, expected {low:g} to {high:g}")
+            text = f"room {room.id}: {group} light gives {value:g} lx on the floor"
+            lines.append(f"{text}, expected {low:g} to {high:g}")
     dark = darkness_of_room(room, lux)
     return [*lines, dark] if dark else lines
 
@@ -104,14 +104,14 @@ def floor_points(room: Room, n: int, seed: int) -> F64:
     rng = np.random.default_rng(seed)
     low, high = room.polygon.min(0), room.polygon.max(0)
     shape = room_shape(room)
-    kept: list[F64] = []
+    inside: list[F64] = []
     for _attempt in range(_MAX_ATTEMPTS):
         tried = low + (high - low) * rng.random((4 * n, 2))
-        kept.append(tried[shapely.contains_xy(shape, tried[:, 0], tried[:, 1])])
-        if sum(len(k) for k in kept) >= n:
+        inside.append(tried[shapely.contains_xy(shape, tried[:, 0], tried[:, 1])])
+        if sum(len(k) for k in inside) >= n:
             break
     # Fill up with the polygon's middle should it be too thin to hit.
-    plan = np.concatenate([*kept, np.repeat(room.polygon.mean(0)[None], n, 0)])[:n]
+    plan = np.concatenate([*inside, np.repeat(room.polygon.mean(0)[None], n, 0)])[:n]
     return np.stack([plan[:, 0], np.full(n, room.floor_y + _ABOVE_FLOOR_M), plan[:, 1]], 1)
 
 

@@ -74,10 +74,10 @@ def _lamp_interiors(tables: SceneTables, faces: I64, lamps: I64, probabilities: 
     )
     for k, bulb_m in enumerate(spheres[:, 3].tolist()):
         # Take the lamp's faces from the nearest on until the share is reached.
-        own = np.flatnonzero(lamps == k)
-        own = own[np.argsort(reach[own], kind="stable")]
-        last = np.searchsorted(np.cumsum(probabilities[own]), INTERIOR_SHARE)
-        spheres[k, 3] = max(reach[own][last], 1.2 * bulb_m) if len(own) else 0
+        rows = np.flatnonzero(lamps == k)
+        rows = rows[np.argsort(reach[rows], kind="stable")]
+        last = np.searchsorted(np.cumsum(probabilities[rows]), INTERIOR_SHARE)
+        spheres[k, 3] = max(reach[rows][last], 1.2 * bulb_m) if len(rows) else 0
     return spheres
 
 
@@ -133,8 +133,8 @@ def _candidates(tables: SceneTables) -> tuple[I64, I64]:
     # Keep the faces that look largest from their lamp, should there be very many.
     faces, lamps = faces[near], lamps[near]
     size = face_areas(_corners_of_faces(tables, faces)) / np.maximum(nearest[near], 0.02) ** 2
-    kept = np.sort(np.argsort(-size, kind="stable")[: _MAX_FACES * max(len(tables.lamps), 1)])
-    return faces[kept], lamps[kept]
+    largest = np.sort(np.argsort(-size, kind="stable")[: _MAX_FACES * max(len(tables.lamps), 1)])
+    return faces[largest], lamps[largest]
 
 
 def _exitance(

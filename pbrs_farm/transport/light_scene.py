@@ -117,8 +117,8 @@ class LightScene:
             shown = {
                 beyond.materials[s.material].texture_id for i in beyond.items for s in i.surfaces
             }
-            own = {name: texture for name, texture in textures.items() if name in shown}
-            outside = beyond, tables_from_house(beyond, own, recipe)
+            used = {name: texture for name, texture in textures.items() if name in shown}
+            outside = beyond, tables_from_house(beyond, used, recipe)
         glass = None if recipe.materials.preset == "released" else panes_of_house(inside)
         panes = None if glass is None else tables_from_house(glass, {}, recipe)
         moving = None
@@ -192,13 +192,13 @@ class LightScene:
         RenderFailed for blur or split by Metropolis.
         """
         # Emitters and their weights are those of the pilot's view; it is kept for the next one.
-        own = pilot or Pilot(camera, seed, self._time_s)
+        view_pilot = pilot or Pilot(camera, seed, self._time_s)
         kept = checkpoint or NoCheckpoint()
         move = self._mover(camera, shutter_s)
         now_s = self._time_s
         try:
             result = self._render(
-                camera, room_id, fields, seed, kept, own, anchors, splits_diffuse, move
+                camera, room_id, fields, seed, kept, view_pilot, anchors, splits_diffuse, move
             )
         finally:
             self.move_to(now_s)
@@ -260,15 +260,15 @@ class LightScene:
         self, pilot: Pilot, fields: LightFields
     ) -> tuple[Emitters, EmitterWeights]:
         """The emitters weighted by a pilot, which is measured at its own time."""
-        now_s, at = self._time_s, (pilot.camera, fields, pilot.seed, pilot.time_s)
+        now_s, setting = self._time_s, (pilot.camera, fields, pilot.seed, pilot.time_s)
         if not self._view_emitters.is_built:
             self.move_to(None)
             self._view_emitters.build(pilot.camera.eye)
-        if not self._view_emitters.knows(*at):
+        if not self._view_emitters.knows(*setting):
             self.move_to(pilot.time_s)
-        found = self._view_emitters.of_pilot(*at)
+        emitters = self._view_emitters.of_pilot(*setting)
         self.move_to(now_s)
-        return found
+        return emitters
 
     def _check_split(self, fields: LightFields, room_id: str, seed: int) -> None:
         """Raise where diffuse light cannot be split off."""

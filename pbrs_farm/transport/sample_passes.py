@@ -64,13 +64,13 @@ def path_sums(
         per_launch = min(per_launch, fields.spp)
     # Launch until samples, budget or noise say that it is enough.
     total, spp = _kept_sums(checkpoint, "path")
-    left = _noise_left(total, spp, view)
-    while spp < goal and left > 1 and (n := budget.n_that_fit(min(per_launch, goal - spp))) > 0:
+    noise = _noise_left(total, spp, view)
+    while spp < goal and noise > 1 and (n := budget.n_that_fit(min(per_launch, goal - spp))) > 0:
         total = _plus(total, _traced(view, spp, n, n_lamps=n_lamps))
         spp += n
         budget.record(n)
-        left = _noise_left(total, spp, view)
-        share = max(spp / goal, budget.share, 1 / max(left, 1) ** 2)
+        noise = _noise_left(total, spp, view)
+        share = max(spp / goal, budget.share, 1 / max(noise, 1) ** 2)
         checkpoint.keep("path", min(share, 1.0), _state_of(total, spp))
     assert total is not None, "a first launch always fits"
     return total, spp

@@ -53,12 +53,12 @@ def surface_streams(points: NDArray[np.floating], anchors: NoiseAnchors) -> Stre
 def _places_among_equals(values: NDArray[np.uint64]) -> NDArray[np.uint64]:
     """(N,) number of equal values before each one."""
     order = np.argsort(values, kind="stable")
-    held = values[order]
-    place = np.arange(len(held))
-    is_first = np.append(True, held[1:] != held[:-1])
-    found = np.empty(len(held), np.uint64)
-    found[order] = place - np.maximum.accumulate(np.where(is_first, place, 0))
-    return found
+    ordered = values[order]
+    place = np.arange(len(ordered))
+    is_first = np.append(True, ordered[1:] != ordered[:-1])
+    places = np.empty(len(ordered), np.uint64)
+    places[order] = place - np.maximum.accumulate(np.where(is_first, place, 0))
+    return places
 
 
 def _cells(points: NDArray[np.floating], camera: Camera, number: int) -> NDArray[np.uint64]:
@@ -70,9 +70,9 @@ def _cells(points: NDArray[np.floating], camera: Camera, number: int) -> NDArray
     axes = opencv_world_from_camera(camera.world_from_camera)[:3, :3].T
     local = np.stack([x * a[0] + y * a[1] + z * a[2] for a in axes], -1)
     px = np.floor(camera.intrinsics.pixels(local)) + _REACH_PX
-    told = ((px >= 0) & (px < 2 * _REACH_PX)).all(1)  # NaN is not
-    column, row = px[told].astype(np.int64).T
-    cell[finite[told]] = row * (2 * _REACH_PX) + column
+    in_reach = ((px >= 0) & (px < 2 * _REACH_PX)).all(1)  # NaN is not
+    column, row = px[in_reach].astype(np.int64).T
+    cell[finite[in_reach]] = row * (2 * _REACH_PX) + column
     return _mixed(cell.astype(np.uint64) ^ _mixed(np.array([number], np.uint64)))
 
 

@@ -157,9 +157,9 @@ def apply_lens(light: F64, sensor: SensorFields) -> F64:
         shift = sensor.aberration_px * width / _ABERRATION_WIDTH_PX / corner / 2
         light = light.copy()
         for channel, scale in ((0, 1 - shift), (2, 1 + shift)):
-            at = [(g - m) * scale + m - 0.5 for g, m in zip((y, x), middle, strict=True)]
+            positions = [(g - m) * scale + m - 0.5 for g, m in zip((y, x), middle, strict=True)]
             light[..., channel] = ndimage.map_coordinates(
-                light[..., channel], at, order=1, mode="nearest"
+                light[..., channel], positions, order=1, mode="nearest"
             )
     if sensor.vignetting == 0:
         return light
@@ -184,8 +184,8 @@ def demosaic(raw: F64) -> F64:
     padded = np.pad(raw, 2, mode="reflect")
 
     def filtered(kernel: Sequence[Sequence[float]]) -> F64:
-        found = ndimage.correlate(padded, np.array(kernel) / 8, mode="nearest")
-        return np.asarray(found[2:-2, 2:-2])
+        values = ndimage.correlate(padded, np.array(kernel) / 8, mode="nearest")
+        return np.asarray(values[2:-2, 2:-2])
 
     # Green at red and blue; a colour at green between its own along rows, or columns; at the other.
     green = filtered(_GREEN_KERNEL)

@@ -46,20 +46,20 @@ def white_balance(radiance: RadianceImage, albedo: RadianceImage, fields: ToneFi
 def _illuminant(radiance: RadianceImage, albedo: RadianceImage) -> F32 | None:
     """(3,) the light's colour; None when fewer than 16 pixels tell it."""
     # Go by channel, each in one piece: a third of the time of (N, 3) rows.
-    seen, surface = _channels(radiance), _channels(albedo)
-    usable = (_least(surface) > 0.02) & (_least(seen) > 0)
+    radiances, surface = _channels(radiance), _channels(albedo)
+    usable = (_least(surface) > 0.02) & (_least(radiances) > 0)
     if usable.sum() < 16:
         return None
     if not usable.all():
-        seen, surface = [c[usable] for c in seen], [c[usable] for c in surface]
+        radiances, surface = [c[usable] for c in radiances], [c[usable] for c in surface]
     # Take the better lit half without the very brightest.
-    light = [c / s for c, s in zip(seen, surface, strict=True)]
+    light = [c / s for c, s in zip(radiances, surface, strict=True)]
     level = sum(c * w for c, w in zip(light, LUMINANCE.astype(np.float32), strict=True))
     low, high = np.percentile(level, _LIT_PERCENTILES)
     lit = np.flatnonzero((level >= low) & (level <= high))
-    found = np.exp(np.array([np.median(np.log(c[lit])) for c in light], np.float32))
+    colour = np.exp(np.array([np.median(np.log(c[lit])) for c in light], np.float32))
     is_filled = _one_colour_fills(np.stack([c[lit] for c in surface], -1))
-    return _clamp_to_lamps_and_skies(found) if is_filled else found
+    return _clamp_to_lamps_and_skies(colour) if is_filled else colour
 
 
 def _channels(image: RadianceImage) -> list[F32]:
@@ -104,6 +104,6 @@ def _clamp_to_lamps_and_skies(light: F32) -> F32:
     mean = (red + green + blue) / 3
     tint = np.clip(green - (red + blue) / 2, *_TINT)
     warmth = np.clip(red - blue, *_WARMTH)
-    others = mean - tint / 3  # mean of red and blue
-    logs = [others + warmth / 2, mean + 2 * tint / 3, others - warmth / 2]
+    red_blue = mean - tint / 3  # mean of red and blue
+    logs = [red_blue + warmth / 2, mean + 2 * tint / 3, red_blue - warmth / 2]
     return np.exp(np.array(logs, np.float32))

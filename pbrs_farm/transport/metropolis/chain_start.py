@@ -62,8 +62,8 @@ def pixel_importance(shape: tuple[int, int], pixels: NDArray[np.uint32], luminan
 
 def _blend_tiles(n: int, side: int, n_tiles: int) -> F64:
     """(n, n_tiles) linear weights of tiles of `side` pixels at each of n pixels."""
-    at = np.clip((np.arange(n) + 0.5) / side - 0.5, 0, n_tiles - 1)
-    return np.asarray(np.maximum(1 - np.abs(at[:, None] - np.arange(n_tiles)[None]), 0))
+    tile = np.clip((np.arange(n) + 0.5) / side - 0.5, 0, n_tiles - 1)
+    return np.asarray(np.maximum(1 - np.abs(tile[:, None] - np.arange(n_tiles)[None]), 0))
 
 
 def _path_keys(n: int, seed: int) -> Any:

@@ -48,17 +48,17 @@ def render_groups(
     # Run the chains of both groups in turns, so that the noise of their sum can decide.
     runs = _chain_runs(view, checkpoint.kept("chains"))
     n_steps = min((run.n_steps for run in runs.values()), default=0)
-    wanted = max((run.n_wanted for run in runs.values()), default=0)
-    goal = _NO_END if runs and budget.is_limited else wanted
-    left = _noise_left(view, direct, runs, n_steps)
+    n_wanted = max((run.n_wanted for run in runs.values()), default=0)
+    goal = _NO_END if runs and budget.is_limited else n_wanted
+    noise = _noise_left(view, direct, runs, n_steps)
     steps = ROUND_STEPS * _rounds_per_launch(view, runs)
-    while n_steps < goal and left > 1 and (n_steps == 0 or budget.left_s > 0):
+    while n_steps < goal and noise > 1 and (n_steps == 0 or budget.left_s > 0):
         n = min(steps, goal - n_steps)
         for run in runs.values():
             run.advance(n)
         n_steps += n
-        left = _noise_left(view, direct, runs, n_steps)
-        share = max(n_steps / goal, budget.share, 1 / max(left, 1) ** 2)
+        noise = _noise_left(view, direct, runs, n_steps)
+        share = max(n_steps / goal, budget.share, 1 / max(noise, 1) ** 2)
         share = direct_share + (1 - direct_share) * min(share, 1.0)
         checkpoint.keep("chains", share, _state_of(runs))
     return direct, {g: _estimate(view, runs, g) for g in Group}
@@ -70,9 +70,9 @@ def _chain_runs(view: SampledView, kept: Arrays) -> dict[Group, ChainRun]:
     runs = {}
     for k, group in enumerate(Group):
         prefix = f"{group.value}."
-        own = {n.removeprefix(prefix): a for n, a in kept.items() if n.startswith(prefix)}
+        part = {n.removeprefix(prefix): a for n, a in kept.items() if n.startswith(prefix)}
         own_view = replace(view, seed=view.seed + k)
-        run = chain_run(own_view, group, min_segments=first, kept=own)
+        run = chain_run(own_view, group, min_segments=first, kept=part)
         if run is not None:
             runs[group] = run
     return runs

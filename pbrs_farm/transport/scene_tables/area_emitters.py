@@ -79,8 +79,8 @@ def _faces_by_surface(geometry: Geometry, keep: Bools) -> dict[int, I64]:
     """Number of a surface -> its kept faces; a surface's faces are consecutive."""
     numbers, starts = np.unique(geometry.face_surface, return_index=True)
     runs = np.split(np.arange(len(geometry.face_surface)), starts[1:])
-    found = {int(n): faces[keep[faces]] for n, faces in zip(numbers, runs, strict=True)}
-    return {number: faces for number, faces in found.items() if len(faces)}
+    faces_of = {int(n): faces[keep[faces]] for n, faces in zip(numbers, runs, strict=True)}
+    return {number: faces for number, faces in faces_of.items() if len(faces)}
 
 
 def _flux_and_rgb(

@@ -40,11 +40,11 @@ def panes_of_house(house: House) -> House | None:
     ]
     clear = Material("pane", kind=MaterialKind.GLASS, opacity=0.0)
     materials = tuple(clear if p else m for m, p in zip(house.materials, is_pane, strict=True))
-    found = replace(house.with_items(i for i in items if i.surfaces), materials=materials)
+    panes = replace(house.with_items(i for i in items if i.surfaces), materials=materials)
     has_area = any(
-        faces_with_area(corners_of_surfaces(i.surfaces), 1e-6).any() for i in found.items
+        faces_with_area(corners_of_surfaces(i.surfaces), 1e-6).any() for i in panes.items
     )
-    return found if has_area else None
+    return panes if has_area else None
 
 
 def nearest_portals(portals: F64, eye: F64) -> F64:

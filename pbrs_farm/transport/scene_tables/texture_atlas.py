@@ -52,7 +52,7 @@ def texture_atlas(
     """
     # Leave texel 0 out: a first texel of 0 means that there is no texture.
     parts: list[NDArray[np.uint32]] = [np.zeros(1, np.uint32)]
-    known = {name: p for name, p in textures.items() if p.size}
+    pictures = {name: p for name, p in textures.items() if p.size}
     first = 1
 
     def added(texels: NDArray[np.uint32]) -> Slot:
@@ -61,18 +61,18 @@ def texture_atlas(
         first += texels.size
         return first - texels.size, texels.shape[1], texels.shape[0]
 
-    colours = sorted({m.texture_id for m in house.materials if m.texture_id in known})
+    colours = sorted({m.texture_id for m in house.materials if m.texture_id in pictures})
     cutting = {m.texture_id for m in house.materials if m.alpha_cutout}
     slots = {}
     for name in colours:
-        slots[name] = added(_packed_colours(known[name]))
+        slots[name] = added(_packed_colours(pictures[name]))
         if name in cutting:
-            added(_alpha_texels(known[name]))
+            added(_alpha_texels(pictures[name]))
     # Pair the maps; materials without maps need no texels.
     map_slots: dict[MapKey, Slot] = {}
     for key in dict.fromkeys(map_key(m) for m in house.materials):
-        roughness = known.get(key[0] or "") if with_roughness else None
-        normal = known.get(key[1] or "")
+        roughness = pictures.get(key[0] or "") if with_roughness else None
+        normal = pictures.get(key[1] or "")
         if roughness is not None or normal is not None:
             map_slots[key] = added(_packed_maps(roughness, normal, key[2]))
     return TextureAtlas(np.concatenate(parts), slots, map_slots)
@@ -183,10 +183,10 @@ def _resize_repeating(values: F32, height: int, width: int) -> F32:
         if old == n:
             continue
         # Place centres at half integers.
-        at = (np.arange(n) + 0.5) * old / n - 0.5
-        low = np.floor(at)
+        positions = (np.arange(n) + 0.5) * old / n - 0.5
+        low = np.floor(positions)
         shape = (-1, 1, 1) if axis == 0 else (1, -1, 1)
-        t = (at - low).astype(np.float32).reshape(shape)
+        t = (positions - low).astype(np.float32).reshape(shape)
         index = low.astype(np.int64)
         a, b = np.take(values, index % old, axis), np.take(values, (index + 1) % old, axis)
         values = a * (1 - t) + b * t

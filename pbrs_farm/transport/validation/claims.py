@@ -68,8 +68,8 @@ def z_scores(a: Sequence[F64], b: Sequence[F64]) -> F64:
     scale = 0.5 * (x.mean(0) + y.mean(0))
     x, y = x / scale, y / scale
     # Divide the difference by its standard error.
-    own = x.var(0, ddof=1) / len(x) + y.var(0, ddof=1) / len(y)
-    return np.asarray((x.mean(0) - y.mean(0)) / np.sqrt(np.maximum(own, own.mean())))
+    variance = x.var(0, ddof=1) / len(x) + y.var(0, ddof=1) / len(y)
+    return np.asarray((x.mean(0) - y.mean(0)) / np.sqrt(np.maximum(variance, variance.mean())))
 
 
 @dataclass(frozen=True, slots=True)
@@ -228,25 +228,25 @@ def _groups_sum(variant: str) -> LightClaim:
     # Keep the bulb's geometry in the room without lamp light: the paths must be the same.
     dim = rooms.window_room(0.7, lumen=1e-30)
     room = _window_room()
-    (both,) = _rendered(variant, room, uniform_sky(_SKY_OF_ONE), _spp(16), 1)
+    (sum_of_groups,) = _rendered(variant, room, uniform_sky(_SKY_OF_ONE), _spp(16), 1)
     (day,) = _rendered(variant, dim, uniform_sky(_SKY_OF_ONE), _spp(16), 1)
     (night,) = _rendered(variant, room, dark_sky(), _spp(16), 1)
-    off = float(np.abs(both.mode(Mode.MLT_IL_OL) - (day.outdoor + night.indoor)).max())
+    off = float(np.abs(sum_of_groups.mode(Mode.MLT_IL_OL) - (day.outdoor + night.indoor)).max())
     return LightClaim(
         "sky alone + lamps alone = both in one trace, to the bit",
         f"largest difference {off:g}",
         "0",
-        off == 0 and bool(both.outdoor.any()) and bool(both.indoor.any()),
+        off == 0 and bool(sum_of_groups.outdoor.any()) and bool(sum_of_groups.indoor.any()),
     )
 
 
 def _doubled_emitters(variant: str) -> LightClaim:
     # Double the sky and the bulb: powers of two keep every bit of the mantissa.
-    (one,) = _rendered(variant, _window_room(), uniform_sky((1, 1, 1)), _spp(16), 1)
+    (single,) = _rendered(variant, _window_room(), uniform_sky((1, 1, 1)), _spp(16), 1)
     (two,) = _rendered(
         variant, rooms.window_room(0.7, lumen=1600), uniform_sky((2, 2, 2)), _spp(16), 1
     )
-    a, b = one.mode(Mode.MLT_IL_OL), two.mode(Mode.MLT_IL_OL)
+    a, b = single.mode(Mode.MLT_IL_OL), two.mode(Mode.MLT_IL_OL)
     off = float(np.abs(b - 2 * a).max())
     return LightClaim(
         "emitters x 2 = radiance x 2, to the bit",
