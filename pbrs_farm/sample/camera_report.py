@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterable, Sequence
 from enum import IntEnum
 
+from pbrs_farm.core.camera import View
 from pbrs_farm.core.record import Record
 
 
@@ -20,6 +22,34 @@ class SectorReport(Record):
     winner_score: float | None = None  # None = no camera
     runner_up_score: float | None = None
     reason: str = ""  # why there is no camera
+
+    @classmethod
+    def of_verdicts(
+        cls,
+        sector: int,
+        verdicts: Iterable[int],
+        views: Sequence[View],
+        runner_up_score: float | None,
+        *,
+        n_rescored: int = 0,
+        word: str = "refused",
+    ) -> SectorReport:
+        """The report on a sector from the verdict of each candidate; word: of the reason."""
+        tally = Counter(verdicts)
+        refused = {rule.label: tally[rule] for rule in REJECTIONS if tally[rule]}
+        most_first = sorted(refused.items(), key=lambda pair: -pair[1])
+        counts = ", ".join(f"{n} {rule.replace('_', ' ')}" for rule, n in most_first)
+        return cls(
+            sector=sector,
+            n_candidates=tally.total(),
+            refused=refused,
+            n_kept=tally[Verdict.LOWER_SCORE] + tally[Verdict.WINNER],
+            n_rescored=n_rescored,
+            views=tuple(view.id for view in views),
+            winner_score=views[0].score if views else None,
+            runner_up_score=runner_up_score,
+            reason="" if views else f"every candidate was {word}: {counts}",
+        )
 
 
 class RoomReport(Record):

@@ -7,7 +7,6 @@ among those of all rooms.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -22,7 +21,7 @@ from pbrs_farm.core.classes import NYU13_NAMES
 from pbrs_farm.core.house import Geometry, House, Room
 from pbrs_farm.core.recipe import CameraFields
 from pbrs_farm.core.shot import view_id
-from pbrs_farm.sample.camera_report import REJECTIONS, RoomReport, SectorReport, Verdict
+from pbrs_farm.sample.camera_report import RoomReport, SectorReport, Verdict
 from pbrs_farm.sample.candidates import grid_candidates
 from pbrs_farm.sample.eye_probes import EnclosureLimits, ItemCounter, count_items, enclosure_limits
 from pbrs_farm.sample.paper_rules import rejections, room_grid
@@ -201,26 +200,11 @@ def sector_report(scored: RoomCandidates, sector: int, views: Sequence[View]) ->
     views: of this sector, in order of choice. Call it after `choose`, which writes the verdicts.
     """
     verdict = scored.verdict[scored.candidates.sector == sector]
-    # Count by the first rule that rejected; name the commonest where no view is left.
-    tally = Counter(verdict.tolist())
-    refused = {rule.label: tally[rule] for rule in REJECTIONS if tally[rule]}
     ranked = scored.ranked(sector)
     winners = np.flatnonzero(scored.verdict[ranked] == Verdict.WINNER)
     other_scores = scored.worth(np.delete(ranked, winners[:1] if len(winners) else slice(0, 1)))
-    most = ", ".join(
-        f"{n} {rule.replace('_', ' ')}" for rule, n in sorted(refused.items(), key=lambda p: -p[1])
-    )
-    return SectorReport(
-        sector=sector,
-        n_candidates=len(verdict),
-        refused=refused,
-        n_kept=tally[Verdict.LOWER_SCORE] + tally[Verdict.WINNER],
-        n_rescored=0,
-        views=tuple(view.id for view in views),
-        winner_score=views[0].score if views else None,
-        runner_up_score=round(float(other_scores.max()), 4) if len(other_scores) else None,
-        reason="" if views else f"every candidate was rejected: {most}",
-    )
+    runner_up = round(float(other_scores.max()), 4) if len(other_scores) else None
+    return SectorReport.of_verdicts(sector, verdict.tolist(), views, runner_up, word="rejected")
 
 
 def room_report(

@@ -5,7 +5,6 @@ No effects: the counter that it is given renders the pictures.
 
 from __future__ import annotations
 
-from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,7 +18,7 @@ from pbrs_farm.core.recipe import CameraFields
 from pbrs_farm.core.shot import view_id
 from pbrs_farm.geometry.plan_surfaces import room_shape
 from pbrs_farm.sample import paper_rules, released_rules
-from pbrs_farm.sample.camera_report import REJECTIONS, RoomReport, SectorReport, Verdict
+from pbrs_farm.sample.camera_report import RoomReport, SectorReport, Verdict
 from pbrs_farm.sample.candidates import Candidates, Grid, grid_candidates, n_cells
 from pbrs_farm.sample.eye_probes import ItemCounter, count_items
 from pbrs_farm.sample.sector_search import (
@@ -242,23 +241,8 @@ class RoomSampler:
     def _report(
         self, sector: int, verdict: NDArray[np.uint8], full: FullScores, views: list[View]
     ) -> SectorReport:
-        tally = Counter(verdict.tolist())
         ranking = full.ranking
-        rejected = {rule.label: tally[rule] for rule in REJECTIONS if tally[rule]}
-        return SectorReport(
-            sector=sector,
-            n_candidates=len(verdict),
-            refused=rejected,
-            n_kept=tally[Verdict.LOWER_SCORE] + tally[Verdict.WINNER],
-            n_rescored=len(full.score),
-            views=tuple(view.id for view in views),
-            winner_score=views[0].score if views else None,
-            runner_up_score=self._reported(full.score[ranking[1]]) if len(ranking) > 1 else None,
-            reason="" if views else f"every candidate was refused: {_label_counts(rejected)}",
+        runner_up = self._reported(full.score[ranking[1]]) if len(ranking) > 1 else None
+        return SectorReport.of_verdicts(
+            sector, verdict.tolist(), views, runner_up, n_rescored=len(full.score)
         )
-
-
-def _label_counts(rejected: dict[str, int]) -> str:
-    # Name the rule that rejected most first.
-    most = sorted(rejected.items(), key=lambda pair: -pair[1])
-    return ", ".join(f"{n} {rule.replace('_', ' ')}" for rule, n in most)
