@@ -26,8 +26,9 @@ from pbrs_farm.dress.thing_materials import (
     plain,
 )
 from pbrs_farm.furnishings.things.cloth import hanging
-from pbrs_farm.furnishings.things.joints import Inside, Look, four_legs, fronts_of, hollow
+from pbrs_farm.furnishings.things.joints import Inside, Look, fronts_of, hollow
 from pbrs_farm.furnishings.things.maker import Maker, Size, family
+from pbrs_farm.furnishings.things.shapes import row
 from pbrs_farm.geometry.outlines import bent, d_shape, oval, rect, rings
 
 # fmt: off
@@ -204,8 +205,8 @@ def vanity(m: Maker, size: Size) -> None:
             m.box(0.24, low, 0.03, against=back, of=look.body)
         case 1:
             with m.moved(at=(0.0, 0.0, -0.02)):
-                four_legs(m, m.pick("square", "tapered", "round"), w - 0.04, d - 0.06, low + 0.001,
-                    0.035, 0.03, 0.0, m.pick(m.timber, BLACK_STEEL))
+                m.legs(m.pick("square", "tapered", "round"), w - 0.04, d - 0.06, low + 0.001, 0.035,
+                    0.03, of=m.pick(m.timber, BLACK_STEEL))
         case 2:
             m.box(w - 0.06, (-0.0001, 0.08), (back, hd - 0.09), of=look.body)
     n = 2 if w > 0.62 else 1
@@ -297,10 +298,9 @@ def bathtub(m: Maker, size: Size) -> None:
             if m.chance(0.5):
                 m.box(w - 0.02, h - 0.04, 0.038, 0.003, against=hd - 0.05, of=apron)
             else:
-                for k in range(m.pick(3, 4, 10)):
-                    m.box((-hw + 0.01 + k * (w - 0.02) / 10,
-                        -hw + 0.01 + (k + 1) * (w - 0.02) / 10), h - 0.04, 0.038, 0.003,
-                        against=hd - 0.05, of=apron)
+                boards = [*row(0.01 - hw, hw - 0.01, 10)]
+                for board in boards[: m.pick(3, 4, 10)]:
+                    m.box(board, h - 0.04, 0.038, 0.003, against=hd - 0.05, of=apron)
                 m.box(w - 0.02, h - 0.04, 0.03, against=hd - 0.052, of=apron)
             with m.of(colour):
                 bath_hollow(m, w, d, h, p)

@@ -13,7 +13,6 @@ from pbrs_farm.core.house import Material
 from pbrs_farm.dress.style import mix
 from pbrs_farm.dress.thing_materials import BLACK_STEEL, BRASS, WHITE, WHITE_STEEL, glossy, plain
 from pbrs_farm.furnishings.things.cloth import draped
-from pbrs_farm.furnishings.things.joints import leg
 from pbrs_farm.furnishings.things.maker import Maker, Size, family
 from pbrs_farm.furnishings.things.parameters import Choice, Legs, Range
 from pbrs_farm.furnishings.things.shapes import Pair, row
@@ -111,7 +110,7 @@ def bed_frame(m: Maker, size: Size, p: Bed, low: float) -> None:
         body, thick = (p.bar, 0.035) if is_metal else (p.frame, 0.055)
         corners = product((-w / 2 + 0.05, w / 2 - 0.05), (back + 0.03, front - 0.05))
         for kind, (x, z) in zip(p.legs, corners, strict=True):
-            leg(m, kind, (x, z), (x, z), low + 0.001, thick, body)
+            m.leg(kind, (x, z), low + 0.001, thick, of=body)
     else:
         m.box(w - 0.08, low + 0.001, (back, front - 0.04))
     if p.under == "drawers":

@@ -204,10 +204,7 @@ def _glass_door(m: Maker, look: Look, x: Pair, y: Pair, z: float, opens_left: bo
     a, b, c, e = x[0] + 0.0015, x[1] - 0.0015, y[0] + 0.0015, y[1] - 0.0015
     r = 0.05
     with m.of(look.front):
-        m.box(r, (c, e), 0.02, 0.0015, left=a, against=z)
-        m.box((b - r, b), (c, e), 0.02, 0.0015, against=z)
-        m.box((a + r, b - r), r, 0.02, 0.0015, on=c, against=z)
-        m.box((a + r, b - r), (e - r, e), 0.02, 0.0015, against=z)
+        m.frame((a, b), (c, e), r, 0.02, 0.0015, against=z)
     m.box((a + r, b - r), (c + r, e - r), 0.004, against=z + 0.008, of=CLEAR)
     pull(m, "square", b - r / 2 if opens_left else a + r / 2, (c + e) / 2, z + 0.02, False, 0.12,
         look.pull_material)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
-from itertools import product
 from typing import Final, NamedTuple
 
 from numpy import pi
@@ -13,8 +12,8 @@ from pbrs_farm.core.frames import LYING_ALONG_Z, rotation_x, rotation_z
 from pbrs_farm.core.house import Material
 from pbrs_farm.dress.thing_materials import FROSTED
 from pbrs_farm.furnishings.things.maker import Maker
-from pbrs_farm.furnishings.things.shapes import Pair
-from pbrs_farm.geometry.outlines import Outline, bent, d_shape, rect, ring_path, rings, scaled
+from pbrs_farm.furnishings.things.shapes import Pair, row
+from pbrs_farm.geometry.outlines import Outline, bent, d_shape, rect, ring_path, rings
 
 # fmt: off
 
@@ -136,21 +135,16 @@ def panel(m: Maker, kind: str, x: Pair, y: Pair, z: float, material: Material) -
     rail = min(0.065, 0.22 * (b - a), 0.3 * (d - c))
     with m.of(material):
         if kind in ("shaker", "glazed"):
-            m.box(rail, (c, d), 0.019, 0.0015, left=a, against=z)
-            m.box((b - rail, b), (c, d), 0.019, 0.0015, against=z)
-            m.box((a + rail, b - rail), rail, 0.019, 0.0015, on=c, against=z)
-            m.box((a + rail, b - rail), (d - rail, d), 0.019, 0.0015, against=z)
+            m.frame((a, b), (c, d), rail, 0.019, 0.0015, against=z)
+            inner = (a + rail, b - rail), (c + rail, d - rail)
             if kind == "shaker":
-                m.box((a + rail, b - rail), (c + rail, d - rail), 0.011, against=z)
+                m.box(*inner, 0.011, against=z)
             else:
-                m.box((a + rail, b - rail), (c + rail, d - rail), 0.004, against=z + 0.006,
-                    of=FROSTED)
+                m.box(*inner, 0.004, against=z + 0.006, of=FROSTED)
         elif kind == "grooved":
             m.box((a, b), (c, d), 0.012, against=z)
-            n = max(2, round((b - a) / 0.11))
-            for k in range(n):
-                m.box((a + (b - a) * k / n + 0.001, a + (b - a) * (k + 1) / n - 0.001), (c, d),
-                    0.007, 0.002, against=z + 0.012)
+            for board in row(a, b, max(2, round((b - a) / 0.11)), gap=0.002):
+                m.box(board, (c, d), 0.007, 0.002, against=z + 0.012)
         else:
             m.box((a, b), (c, d), 0.019, 0.002, against=z)
             if kind == "raised" and b - a > 0.16 and d - c > 0.12:
@@ -270,40 +264,3 @@ def fronts_of(m: Maker, look: Look, x: Pair, y: Pair, z: float, columns: Sequenc
             if inside.has_boards and not is_drawer(kind, (c, d)):
                 shelves(m, space, (c, min(d, inside.top)), (inside.back, z), look.body,
                     inside.rail if k % 2 == 0 else None)
-
-
-def leg(m: Maker, kind: str, foot: Pair, top: Pair, high: float, thick: float,
-    material: Material) -> None:
-    """One of furniture's legs from foot (x, z) to top (x, z) at a height.
-
-    Square, round, tapered, hairpin or bun.
-    """
-    a, b = (foot[0], 0.0, foot[1]), (top[0], high, top[1])
-    with m.of(material):
-        match kind:
-            case "square":
-                m.box(thick, high, thick, 0.003, x=top[0], z=top[1])
-            case "round":
-                m.tube([a, b], thick / 2, n=12)
-            case "tapered":
-                m.tube([a, b], 0.3 * thick, n=12, end=0.55 * thick)
-            case "bun":
-                m.revolve(scaled(thick, high, [(0, 0), (0.3, 0), (0.62, 0.3), (0.62, 0.6),
-                    (0.35, 0.85), (0.5, 1), (0, 1)]), at=(top[0], 0.0, top[1]))
-            case "hairpin":
-                for s in (-1.0, 1.0):
-                    m.tube([(foot[0], 0.004, foot[1]), (top[0] + s * 0.035, high, top[1])], 0.005,
-                        n=6)
-                m.rod((foot[0] - 0.008, foot[0] + 0.008), 0.005, foot[1], 0.005, n=6)
-            case "turned":
-                m.revolve(scaled(thick, high, [(0, 0), (0.35, 0), (0.4, 0.06), (0.28, 0.1),
-                    (0.5, 0.3), (0.42, 0.62), (0.55, 0.7), (0.4, 0.74), (0.55, 0.78), (0.55, 1),
-                    (0, 1)]), n=14, at=(top[0], 0.0, top[1]))
-
-
-def four_legs(m: Maker, kind: str, w: float, d: float, high: float, thick: float, inset: float,
-    splay: float, material: Material) -> None:
-    """Four legs under a top w wide and d deep, inset from its edges, leaning outwards by splay."""
-    for sx, sz in product((-1.0, 1.0), (-1.0, 1.0)):
-        leg(m, kind, (sx * (w / 2 - inset + splay), sz * (d / 2 - inset + splay)),
-            (sx * (w / 2 - inset), sz * (d / 2 - inset)), high, thick, material)

@@ -49,7 +49,7 @@ from pbrs_farm.furnishings.things.joints import (
 )
 from pbrs_farm.furnishings.things.maker import Maker, Size, family
 from pbrs_farm.furnishings.things.parameters import Choice, Front, Pull
-from pbrs_farm.furnishings.things.shapes import Pair
+from pbrs_farm.furnishings.things.shapes import Pair, row
 from pbrs_farm.geometry.bodies import creased
 from pbrs_farm.geometry.outlines import bent, d_shape, oval, rect, rings
 
@@ -576,10 +576,8 @@ def fridge_space(m: Maker, x: Pair, y: Pair, z: Pair, material: Material, r: flo
     low, high = y[0] + wall + 0.003, y[1] - wall - 0.003
     n = max(1, round((high - low) / 0.26))
     if filling == "drawers":
-        for k in range(n):
-            m.box((a + 0.004, b - 0.004), (low + (high - low) * k / n + 0.006,
-                low + (high - low) * (k + 1) / n - 0.014), (c[0], c[1] + 0.04), 0.006,
-                of=CLEAR_PLASTIC)
+        for drawer in row(low - 0.004, high - 0.004, n, gap=0.02):
+            m.box((a + 0.004, b - 0.004), drawer, (c[0], c[1] + 0.04), 0.006, of=CLEAR_PLASTIC)
     for k in range(1, n) if filling == "shelves" else ():
         level = low + (high - low) * k / n
         m.box((a, b), 0.005, (c[0], c[1]), on=level, of=CLEAR_PLASTIC)

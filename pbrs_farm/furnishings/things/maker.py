@@ -1,18 +1,19 @@
 """Generated furniture and items: functions that draw numbers and add solids; no effects.
 
-`@thing` decorates a function that draws numbers and materials from its maker and adds
-solids, which are plain functions of bodies.py and cloth.py:
+`@thing` decorates a function that draws numbers and materials from its maker and adds solids, by the
+methods of shapes.py or by `add`:
 
     @thing(group="vase")
     def vase(m: Maker) -> None:
         \"\"\"A vase, a third of them of glass.\"\"\"
         r, tall = m.uniform(0.04, 0.08), m.uniform(0.15, 0.33)
         with m.of(glass() if m.chance(0.3) else m.china()):
-            m.add(vessel([(0, 0), (r, 0), (r, tall)], 0.004))
+            m.vessel([(0, 0), (r, 0), (r, tall)], 0.004)
 
-A function without a decorator is a shared part; it takes the maker too. With
-`@family` a function describes furniture of the generated catalogue: it also takes the size that was
-drawn for a variation. pbrs_farm.plugin exports these names for other packages.
+A function without a decorator is a shared part; it takes the maker too. With `@family` a function
+describes furniture of the generated catalogue: it also takes the size that was drawn for a
+variation, and its parameters if it has some (parameters.py). pbrs_farm.plugin exports these names
+for other packages.
 
 Metres, y up. Furniture has its back at -z and its front at +z; wall items have their back at z = 0. The
 order of draws decides the result of a seed: an inserted draw changes all later ones.

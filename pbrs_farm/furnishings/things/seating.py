@@ -24,7 +24,7 @@ from pbrs_farm.dress.thing_materials import (
     plain,
 )
 from pbrs_farm.furnishings.things.cloth import chair_shell, tub
-from pbrs_farm.furnishings.things.joints import Inside, Look, four_legs, fronts_of, hollow, leg
+from pbrs_farm.furnishings.things.joints import Inside, Look, fronts_of, hollow
 from pbrs_farm.furnishings.things.maker import Maker, Size, family, thing
 from pbrs_farm.furnishings.things.parameters import Choice, Range
 from pbrs_farm.furnishings.things.shapes import Pair, on_side, row
@@ -48,8 +48,8 @@ def ottoman(m: Maker) -> None:
         if m.chance(0.4):
             for x, z in product((-0.22, 0.0, 0.22), (-0.2, 0.2)):
                 m.sphere((x * w, h - 0.004, z * d), 0.011, n=6)
-    four_legs(m, m.pick("tapered", "bun", "square"), w, d, low + 0.004, 0.045, 0.06, 0.0,
-        m.pick(m.timber, m.dark_timber, BLACK_STEEL))
+    m.legs(m.pick("tapered", "bun", "square"), w, d, low + 0.004, 0.045, 0.06,
+        of=m.pick(m.timber, m.dark_timber, BLACK_STEEL))
 
 
 @thing(group="stool", nyu40=CHAIR, place=Place.FLOOR)
@@ -83,10 +83,10 @@ def seat_legs(m: Maker, kind: str, w: float, d: float, high: float, material: Ma
                     (x, 0.008, hd - 0.08), (x, high + 0.01, hd - 0.08)], 0.03, n=3), 0.008,
                     of=material)
     if kind not in ("plinth", "sled"):
-        four_legs(m, kind, w, d, high + 0.002, 0.05, 0.08, 0.03 if kind == "tapered" else 0.0,
-            material)
+        m.legs(kind, w, d, high + 0.002, 0.05, 0.08, 0.03 if kind == "tapered" else 0.0,
+            of=material)
     if w > 1.5 and kind not in ("plinth", "sled"):
-        leg(m, kind, (0.0, 0.0), (0.0, 0.0), high + 0.002, 0.05, material)
+        m.leg(kind, (0.0, 0.0), high + 0.002, 0.05, of=material)
 
 
 def skirt(m: Maker, w: float, d: float, high: float, fold: Sequence[float]) -> None:
@@ -241,25 +241,23 @@ def chaise_sofa(m: Maker, size: Size) -> None:
     z1 = -hd + main
     for x, z in ((-hw + 0.1, -hd + 0.1), (hw - 0.1, -hd + 0.1), (-s * (hw - 0.1), z1 - 0.1),
         (s * (hw - 0.1), hd - 0.1), (s * (hw - wide + 0.1), hd - 0.1)):
-        leg(m, m.pick("tapered", "square", "round"), (x, z), (x, z), low + 0.002, 0.05, m.timber)
+        m.leg(m.pick("tapered", "square", "round"), (x, z), low + 0.002, 0.05, of=m.timber)
     with m.of(material):
         m.rounded(w, 0.16, (-hd + 0.01, z1 - 0.01), 0.02, n=1, on=low)
-        a, b = min(s * hw, s * (hw - wide)), max(s * hw, s * (hw - wide))
+        a, b = on_side(s, hw - wide, hw)
         m.rounded((a, b), 0.16, (z1 - 0.1, hd - 0.01), 0.02, n=1, on=low)
         m.rounded((a + (0.003 if s > 0 else aw), b - (aw if s > 0 else 0.003)), (low + 0.15, seat),
             (-hd + back - 0.02, hd), 0.05)
         c, e = (-hw + aw, a) if s > 0 else (b, hw - aw)
-        for k in range(2):
-            m.rounded((c + (e - c) * k / 2 + 0.003, c + (e - c) * (k + 1) / 2 - 0.003),
-                (low + 0.15, seat), (-hd + back - 0.02, z1), 0.05)
+        for part in row(c, e, 2, gap=0.006):
+            m.rounded(part, (low + 0.15, seat), (-hd + back - 0.02, z1), 0.05)
         m.rounded(w - 2 * aw + 0.04, (low, h - 0.06), back, 0.05, against=-hd)
         for x in (-1.0, 0.0, 1.0):
             m.bulged(((w - 2 * aw) / 3 - 0.01, 0.18, h - seat + 0.02), n=7, edge=0.45, bulge=3.4,
                 turn=rotation_x(pi / 2 - 0.16), at=(x * (w - 2 * aw) / 3,
                 seat + (h - seat) / 2 - 0.01, -hd + back + 0.075))
         for x in (-1.0, 1.0):
-            m.rounded((min(x * hw, x * (hw - aw)), max(x * hw, x * (hw - aw))), (low, ah),
-                (-hd + 0.005, z1 - 0.02), 0.04)
+            m.rounded(on_side(x, hw - aw, hw), (low, ah), (-hd + 0.005, z1 - 0.02), 0.04)
 
 
 @family(group="armchair", nyu40=CHAIR, place=Place.FLOOR, variants=36,
@@ -286,8 +284,8 @@ def armchair(m: Maker, size: Size) -> None:
                     turn=rotation_x(pi / 2 - 0.18), at=(0.0, seat + (h - seat) / 2 - 0.015,
                     -hd + 0.21))
                 for s in (-1.0, 1.0):
-                    m.rounded((min(s * hw, s * (hw - aw)), max(s * hw, s * (hw - aw))), (low, ah),
-                        (-hd + 0.01, hd - 0.015), min(0.05, 0.4 * aw))
+                    m.rounded(on_side(s, hw - aw, hw), (low, ah), (-hd + 0.01, hd - 0.015),
+                        min(0.05, 0.4 * aw))
         case 1:  # with wings
             seat_legs(m, m.pick("tapered", "turned"), w, d - 0.04, low, feet_stuff)
             with m.of(material):
@@ -298,14 +296,14 @@ def armchair(m: Maker, size: Size) -> None:
                     (rect(w - 0.12, 0.14, 0.06, z=-hd + 0.07), h - 0.03),
                     (rect(w - 0.18, 0.08, 0.03, z=-hd + 0.07), h)])
                 for s in (-1.0, 1.0):
-                    m.rounded((min(s * hw, s * (hw - 0.12)), max(s * hw, s * (hw - 0.12))),
-                        (low, seat + 0.2), (-hd + 0.05, hd - 0.03), 0.05)
-                    m.rounded((min(s * hw, s * (hw - 0.1)), max(s * hw, s * (hw - 0.1))),
-                        (seat + 0.12, h - 0.04), 0.28, 0.05, against=-hd + 0.02)
+                    m.rounded(on_side(s, hw - 0.12, hw), (low, seat + 0.2), (-hd + 0.05, hd - 0.03),
+                        0.05)
+                    m.rounded(on_side(s, hw - 0.1, hw), (seat + 0.12, h - 0.04), 0.28, 0.05,
+                        against=-hd + 0.02)
         case 2:  # a tub: a back that runs round into the arms
             ah = seat + m.uniform(0.12, 0.2) if m.chance(0.5) else h - 0.02
-            four_legs(m, "tapered" if feet == "sled" else feet, w, d, low + 0.02, 0.045, 0.14, 0.05,
-                feet_stuff)
+            m.legs("tapered" if feet == "sled" else feet, w, d, low + 0.02, 0.045, 0.14, 0.05,
+                of=feet_stuff)
             with m.of(material):
                 m.loft(rings(oval, [(w * 0.86, d * 0.86, low), (w * 0.96, d * 0.96, low + 0.05),
                     (w * 0.97, d * 0.97, seat - 0.1)], n=26, power=2.6))
@@ -337,7 +335,7 @@ def armchair(m: Maker, size: Size) -> None:
                 m.turned([(0.26, 0.0), (0.25, 0.012), (0.03, 0.03), (0.03, 0.3)], n=28,
                     of=m.pick(CHROME, BLACK_STEEL, STEEL))
             else:
-                four_legs(m, "tapered", w, d, 0.3, 0.04, 0.22, 0.14, feet_stuff)
+                m.legs("tapered", w, d, 0.3, 0.04, 0.22, 0.14, of=feet_stuff)
             with m.of(material):
                 m.loft(rings(oval, [(w * 0.5, d * 0.5, 0.29), (w * 0.8, d * 0.8, 0.33),
                     (w * 0.86, d * 0.86, seat - 0.03), (w * 0.8, d * 0.8, seat)], n=26))
@@ -480,7 +478,7 @@ def spindle_chair(m: Maker, size: Size, p: Chair) -> None:
     hw, hd, seat = w / 2, d / 2, p.seat_m
     m.loft(rings(oval, [(w - 0.01, d - 0.07, seat - 0.03), (w, d - 0.06, seat - 0.02),
         (w, d - 0.06, seat - 0.006), (w - 0.02, d - 0.08, seat)], z=0.03, power=2.6))
-    four_legs(m, "tapered", w, d - 0.04, seat - 0.02, 0.034, 0.1, 0.075, p.frame)
+    m.legs("tapered", w, d - 0.04, seat - 0.02, 0.034, 0.1, 0.075, of=p.frame)
     for z in (-0.12, 0.14):
         m.rod((-hw + 0.07, hw - 0.07), 0.2, z, 0.008, n=6)
     for t in spaced(-1.0, 1.0, p.bars):
@@ -502,7 +500,7 @@ def shell_chair(m: Maker, size: Size, p: Chair) -> None:
                 (x, 0.008, hd - 0.03), (x * 0.8, seat - 0.03, hd - 0.12)], 0.03, n=3), 0.008,
                 of=material)
     else:
-        four_legs(m, p.legs, w, d, seat - 0.02, 0.032, 0.13, 0.1, p.leg_materials[0])
+        m.legs(p.legs, w, d, seat - 0.02, 0.032, 0.13, 0.1, of=p.leg_materials[0])
     is_hard = p.back == "shell"
     sheet = chair_shell(w, d, seat, h, 0.012 if is_hard else 0.05)
     m.add(sheet, of=p.shell if is_hard else p.cloth)
@@ -534,10 +532,10 @@ def kitchen_stool(m: Maker, size: Size) -> None:
     form, legs = (m.pick("round", "square", "saddle", "pad"),
         m.pick("tapered", "round", "hairpin", "square"))
     if legs == "square":
-        four_legs(m, "square", w, d, h - 0.02, 0.032, 0.02, 0.0, frame)
+        m.legs("square", w, d, h - 0.02, 0.032, 0.02, of=frame)
     else:
-        four_legs(m, legs, w, d, h - 0.02, 0.034, 0.075 if form in ("round", "pad") else 0.05,
-            0.055 if form in ("round", "pad") else 0.034, frame)
+        m.legs(legs, w, d, h - 0.02, 0.034, 0.075 if form in ("round", "pad") else 0.05,
+            0.055 if form in ("round", "pad") else 0.034, of=frame)
     if h > 0.55 or m.chance(0.3):
         for s in (-1.0, 1.0):
             m.rod((-w / 2 + 0.03, w / 2 - 0.03), 0.22, s * (d / 2 - 0.035), 0.008, n=6, of=frame)
@@ -565,8 +563,8 @@ def hall_bench(m: Maker, size: Size) -> None:
     soft = m.cloth()
     match form:
         case 0:  # on legs
-            four_legs(m, m.pick("tapered", "square", "hairpin"), w, d, h - 0.05, 0.045, 0.06, 0.0,
-                m.pick(material, BLACK_STEEL))
+            m.legs(m.pick("tapered", "square", "hairpin"), w, d, h - 0.05, 0.045, 0.06,
+                of=m.pick(material, BLACK_STEEL))
             m.board(w, d, h - 0.055, h - 0.03, 0.01, 0.004, of=material)
             m.rounded(w, (h - 0.05, h), d, 0.02, of=soft)
         case 1:  # boards, a shelf for shoes

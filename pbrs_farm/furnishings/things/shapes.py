@@ -11,17 +11,26 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import product
 from typing import TypedDict, Unpack
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import Material, Surface
 from pbrs_farm.furnishings.things.cloth import bulged
 from pbrs_farm.geometry import bodies
-from pbrs_farm.geometry.outlines import Outline, Profile, Triple
+from pbrs_farm.geometry.outlines import Outline, Profile, Triple, scaled
 
 Pair = tuple[float, float]
 Extent = float | Pair
 """A size, or the two coordinates that a solid reaches from and to."""
+
+
+# profiles of legs: shares of the thickness and the height
+_BUN = [(0, 0), (0.3, 0), (0.62, 0.3), (0.62, 0.6), (0.35, 0.85), (0.5, 1), (0, 1)]
+_TURNED = [
+    *[(0, 0), (0.35, 0), (0.4, 0.06), (0.28, 0.1), (0.5, 0.3), (0.42, 0.62), (0.55, 0.7)],
+    *[(0.4, 0.74), (0.55, 0.78), (0.55, 1), (0, 1)],
+]
 
 
 class PutBox(TypedDict, total=False):
@@ -98,6 +107,77 @@ class Shapes:
         """A box as of `box`, its edges round with radius r in 2 n steps: cushions, upholstery."""
         for low, high in _corners((w, h, d), (left, on, against), (x, z), mirrored):
             self.add(bodies.rounded(low, high, r, n=n), **put)
+
+    def frame(
+        self,
+        x: Pair,
+        y: Pair,
+        t: float,
+        d: Extent,
+        cut: float = 0.0,
+        *,
+        against: float | None = None,
+        **put: Unpack[PutBox],
+    ) -> None:
+        """A frame of four bars t wide between two x and two y, d deep, the sides at full height."""
+        inner = (x[0] + t, x[1] - t)
+        for w, h in (
+            ((x[0], x[0] + t), y),
+            ((x[1] - t, x[1]), y),
+            (inner, (y[0], y[0] + t)),
+            (inner, (y[1] - t, y[1])),
+        ):
+            self.box(w, h, d, cut, against=against, **put)
+
+    def leg(
+        self,
+        kind: str,
+        top: Pair,
+        high: float,
+        thick: float,
+        *,
+        foot: Pair | None = None,
+        of: Material | None = None,
+    ) -> None:
+        """A leg up to a point (x, z) at height `high`, from `foot` on the floor, else from below.
+
+        kind: square, round, tapered, turned, hairpin or bun.
+        """
+        x, z = top
+        a, b = foot or top
+        match kind:
+            case "square":
+                self.box(thick, high, thick, 0.003, x=x, z=z, of=of)
+            case "round":
+                self.tube([(a, 0.0, b), (x, high, z)], thick / 2, n=12, of=of)
+            case "tapered":
+                self.tube([(a, 0.0, b), (x, high, z)], 0.3 * thick, n=12, end=0.55 * thick, of=of)
+            case "bun":
+                self.revolve(scaled(thick, high, _BUN), at=(x, 0.0, z), of=of)
+            case "hairpin":
+                for s in (-0.035, 0.035):
+                    self.tube([(a, 0.004, b), (x + s, high, z)], 0.005, n=6, of=of)
+                self.rod((a - 0.008, a + 0.008), 0.005, b, 0.005, n=6, of=of)
+            case "turned":
+                self.revolve(scaled(thick, high, _TURNED), n=14, at=(x, 0.0, z), of=of)
+
+    def legs(
+        self,
+        kind: str,
+        w: float,
+        d: float,
+        high: float,
+        thick: float,
+        inset: float,
+        splay: float = 0.0,
+        *,
+        of: Material | None = None,
+    ) -> None:
+        """Four legs below a top w by d, inset from its edges, leaning outwards by `splay`."""
+        for sx, sz in product((-1.0, 1.0), (-1.0, 1.0)):
+            foot = (sx * (w / 2 - inset + splay), sz * (d / 2 - inset + splay))
+            top = (sx * (w / 2 - inset), sz * (d / 2 - inset))
+            self.leg(kind, top, high, thick, foot=foot, of=of)
 
     def rod(
         self,

@@ -21,18 +21,10 @@ from pbrs_farm.dress.thing_materials import (
     WHITE_STEEL,
     glossy,
 )
-from pbrs_farm.furnishings.things.joints import (
-    Inside,
-    Look,
-    four_legs,
-    fronts_of,
-    hollow,
-    panel,
-    shelves,
-)
+from pbrs_farm.furnishings.things.joints import Inside, Look, fronts_of, hollow, panel, shelves
 from pbrs_farm.furnishings.things.maker import Maker, Size, family
 from pbrs_farm.furnishings.things.parameters import Choice, Front, Legs, Pull, Range
-from pbrs_farm.furnishings.things.shapes import Pair
+from pbrs_farm.furnishings.things.shapes import Pair, row
 from pbrs_farm.geometry.outlines import bent, oval, polar, rect
 
 # fmt: off
@@ -143,7 +135,7 @@ def plain_bookcase(m: Maker, size: Size, p: Bookcase) -> None:
             if p.foot == "plinth":
                 m.box(w - 0.01, low, (-f / 2, f / 2 - 0.03))
         if p.foot == "legs":
-            four_legs(m, p.legs, w, f, low + 0.001, 0.045, 0.05, 0.0, p.leg_material)
+            m.legs(p.legs, w, f, low + 0.001, 0.045, 0.05, of=p.leg_material)
     if p.form == "fronts_below":
         look = Look(p.front_kind, p.front, p.body, p.body, p.pull, p.pull_material)
         high = low + (h - low - t) * min(p.front_rows, n) / n + t
@@ -326,7 +318,7 @@ def wardrobe(m: Maker, size: Size, p: Wardrobe) -> None:
     if p.plinth:
         m.box(w - 0.02, low, (-hd, f - 0.03), of=p.body)
     else:
-        four_legs(m, p.legs, w, d - 0.06, low + 0.001, 0.06, 0.07, 0.0, p.body)
+        m.legs(p.legs, w, d - 0.06, low + 0.001, 0.06, 0.07, of=p.body)
     if p.crown:
         m.box(w, 0.02, (-hd, f + 0.025), 0.005, on=top, of=p.body)
         m.box(w, (top + 0.02, h), d, 0.008, of=p.body)
@@ -400,8 +392,8 @@ def drawer_chest(m: Maker, size: Size) -> None:
     if legs == "plinth":
         m.box(w - 0.032, low, (-d / 2, f - 0.03), of=body)
     else:
-        four_legs(m, legs, w, d - 0.03, low + 0.001, 0.05, 0.055,
-            0.02 if legs == "tapered" else 0.0, m.pick(body, body, BLACK_STEEL))
+        m.legs(legs, w, d - 0.03, low + 0.001, 0.05, 0.055, 0.02 if legs == "tapered" else 0.0,
+            of=m.pick(body, body, BLACK_STEEL))
     rows, y0, y1 = max(2, round((h - low) / m.uniform(0.18, 0.26))), low, h - t - 0.002
     wide = w > 0.95
     form = m.weighted(0.4, 0.35, 0.25)
@@ -437,8 +429,8 @@ def sideboard_cabinet(m: Maker, size: Size) -> None:
     if legs == "plinth":
         m.box(w - 0.02, low, (-d / 2, f - 0.03), of=body)
     else:
-        four_legs(m, legs, w, d - 0.05, low + 0.001, 0.045, 0.06,
-            0.025 if legs == "tapered" else 0.0, m.pick(body, BLACK_STEEL))
+        m.legs(legs, w, d - 0.05, low + 0.001, 0.045, 0.06, 0.025 if legs == "tapered" else 0.0,
+            of=m.pick(body, BLACK_STEEL))
     with m.moved(at=(0.0, 0.0, -0.025)):
         case(m, w, h, d - 0.05, low, t, body, True)
     n = max(1, round(w / 0.45))
@@ -563,9 +555,8 @@ def coat_panel(m: Maker, w: float, h: float, d: float, hw: float, hd: float,
     if m.chance(0.5):
         m.box(w, (0.44, h), 0.02, 0.003, against=-hd, of=panel_of)
     else:
-        for k in range(8):
-            m.box((-hw + k * w / 8 + 0.001, -hw + (k + 1) * w / 8 - 0.004), (0.44, h), 0.02, 0.003,
-                against=-hd, of=panel_of)
+        for board in row(-hw - 0.0015, hw - 0.0015, 8, gap=0.005):
+            m.box(board, (0.44, h), 0.02, 0.003, against=-hd, of=panel_of)
         for y in (0.6, h - 0.2):
             m.box(w - 0.02, 0.05, 0.014, on=y, against=-hd + 0.002, of=panel_of)
     m.box(w, (0.42, 0.45), d, 0.003, of=panel_of)

@@ -22,10 +22,10 @@ from pbrs_farm.dress.thing_materials import (
     glass,
     glossy,
 )
-from pbrs_farm.furnishings.things.joints import Inside, Look, four_legs, fronts_of, hollow, leg
+from pbrs_farm.furnishings.things.joints import Inside, Look, fronts_of, hollow
 from pbrs_farm.furnishings.things.maker import Maker, Size, family
 from pbrs_farm.furnishings.things.parameters import Choice, Front, Legs, Pull, Range
-from pbrs_farm.furnishings.things.shapes import on_side
+from pbrs_farm.furnishings.things.shapes import on_side, row
 from pbrs_farm.geometry.outlines import bent, oval, polar, rect, rings
 
 # fmt: off
@@ -40,8 +40,8 @@ def under_top(m: Maker, kind: str, w: float, d: float, high: float, material: Ma
     hw, hd = w / 2, d / 2
     match kind:
         case "legs" | "rails":
-            four_legs(m, leg_kind, w, d, high, 0.055, 0.07 if leg_kind in ("tapered",
-                "hairpin") else 0.035, 0.03 if leg_kind == "tapered" else 0.0, material)
+            m.legs(leg_kind, w, d, high, 0.055, 0.07 if leg_kind in ("tapered",
+                "hairpin") else 0.035, 0.03 if leg_kind == "tapered" else 0.0, of=material)
             if kind == "rails":
                 with m.of(material):
                     m.box(w - 0.08, (high - 0.085, high), 0.02, 0.002, against=0.045 - d / 2,
@@ -104,9 +104,8 @@ def top_of(m: Maker, kind: str, w: float, d: float, low: float, high: float,
             case "round":
                 m.disc(w, d, low, high, 0.006, n=40)
             case "boards":
-                for k in range(5):
-                    m.box(w, (low, high), (-d / 2 + k * d / 5 + 0.0005,
-                        -d / 2 + (k + 1) * d / 5 - 0.0005), 0.003)
+                for plank in row(-d / 2, d / 2, 5, gap=0.001):
+                    m.box(w, (low, high), plank, 0.003)
 
 
 @dataclass(frozen=True, slots=True)
@@ -200,8 +199,8 @@ def coffee_table(m: Maker, size: Size) -> None:
                     0.016, body)
                 fronts_of(m, look, (-hw + 0.02, hw - 0.02), (h - t - 0.16, h - t - 0.002),
                     hd - 0.045, [("flap",)] * m.pick(1, 2), False, Inside(-hd + 0.028))
-                four_legs(m, m.pick("tapered", "square", "round"), w, d, h - t - 0.158, 0.05, 0.06,
-                    0.0, body)
+                m.legs(m.pick("tapered", "square", "round"), w, d, h - t - 0.158, 0.05, 0.06,
+                    of=body)
             else:
                 m.box(0.025, h - t, d - 0.02, 0.002, left=0.01 - w / 2, mirrored="x", of=body)
                 m.box(w - 0.07, (0.08, 0.1), d - 0.04, of=body)
@@ -218,13 +217,13 @@ def coffee_table(m: Maker, size: Size) -> None:
         case 3:  # two that nest
             with m.moved(at=(-0.12 * w, 0.0, -0.08 * d)):
                 m.disc(w * 0.76, d * 0.84, h - t, h, 0.005, n=36, of=body)
-                four_legs(m, "round", w * 0.6, d * 0.62, h - t + 0.001, 0.024, 0.0, 0.0,
-                    m.pick(BLACK_STEEL, m.metal, body))
+                m.legs("round", w * 0.6, d * 0.62, h - t + 0.001, 0.024, 0.0,
+                    of=m.pick(BLACK_STEEL, m.metal, body))
             with m.moved(at=(0.27 * w, 0.0, 0.19 * d)):
                 m.disc(w * 0.46, d * 0.62, h * 0.72 - t, h * 0.72, 0.005, n=36,
                     of=m.pick(body, WHITE, m.timber))
-                four_legs(m, "round", w * 0.34, d * 0.44, h * 0.72 - t + 0.001, 0.024, 0.0, 0.0,
-                    m.pick(BLACK_STEEL, m.metal, body))
+                m.legs("round", w * 0.34, d * 0.44, h * 0.72 - t + 0.001, 0.024, 0.0,
+                    of=m.pick(BLACK_STEEL, m.metal, body))
         case 4:  # a tray on crossed legs, a block
             if m.chance(0.5):
                 under_top(m, "crossed", w, d, h - 0.02, body, "square")
@@ -318,7 +317,7 @@ def desk(m: Maker, size: Size, p: Desk) -> None:
             hollow(m, x, (low - 0.11, y), (-hd + 0.02, hd - 0.05), 0.012, p.body)
             fronts_of(m, look, x, (low - 0.11, low - 0.002), hd - 0.05, [("flap",)] * p.flaps,
                 False, Inside(-hd + 0.028))
-            four_legs(m, p.legs[0], w, d, low - 0.108, 0.05, 0.06, 0.0, p.leg_materials[0])
+            m.legs(p.legs[0], w, d, low - 0.108, 0.05, 0.06, of=p.leg_materials[0])
         case "shelf":
             under_top(m, "panels", w, d, y, p.body, "square")
             m.box(w - 0.1, 0.015, d - 0.08, on=low - 0.14, of=p.body)
@@ -339,7 +338,7 @@ def desk_drawers(m: Maker, size: Size, p: Desk, look: Look) -> None:
         if is_single:
             foot = -s * (hw - 0.05)
             for z, kind, of in zip((-hd + 0.05, hd - 0.05), p.legs, p.leg_materials, strict=True):
-                leg(m, kind, (foot, z), (foot, z), low + 0.001, 0.045, of)
+                m.leg(kind, (foot, z), low + 0.001, 0.045, of=of)
 
 
 @family(group="nightstand", nyu40=NIGHT_STAND, place=Place.FLOOR, variants=40,
@@ -363,8 +362,8 @@ def nightstand(m: Maker, size: Size) -> None:
         if legs == "plinth":
             m.box(w - 0.02, low, (-hd, hd - 0.06), of=body)
         else:
-            four_legs(m, legs, w, d - 0.03, low + 0.001, 0.045, 0.045,
-                0.02 if legs == "tapered" else 0.0, m.pick(body, body, BLACK_STEEL, m.metal))
+            m.legs(legs, w, d - 0.03, low + 0.001, 0.045, 0.045, 0.02 if legs == "tapered" else 0.0,
+                of=m.pick(body, body, BLACK_STEEL, m.metal))
         m.board(w, d - 0.012, h - t, h, 0.006, 0.004, z=-0.006, n=2, of=body)
         if form == 0:
             hollow(m, (-hw + 0.005, hw - 0.005), (low, h - t), (-hd, hd - 0.05), 0.016, body)
@@ -390,7 +389,7 @@ def nightstand(m: Maker, size: Size) -> None:
                 under_top(m, "foot", w, d, h - t + 0.001, m.pick(body, BLACK_STEEL, m.metal),
                     "round")
             else:
-                four_legs(m, "tapered", w * 0.8, d * 0.8, h - t + 0.001, 0.03, 0.06, 0.04, body)
+                m.legs("tapered", w * 0.8, d * 0.8, h - t + 0.001, 0.03, 0.06, 0.04, of=body)
                 m.disc(w * 0.7, d * 0.7, h * 0.4, h * 0.4 + 0.014, 0.003, n=28, of=body)
         case 3:  # a cube of boards, open to the front
             with m.of(body):
@@ -432,8 +431,8 @@ def tv_bench(m: Maker, size: Size) -> None:
     if legs == "plinth":
         m.box(w - 0.04, low, (-hd + 0.02, hd - 0.07), of=body)
     else:
-        four_legs(m, legs, w, d - 0.03, low + 0.001, 0.05, 0.08, 0.03 if legs == "tapered" else 0.0,
-            m.pick(body, BLACK_STEEL, m.metal))
+        m.legs(legs, w, d - 0.03, low + 0.001, 0.05, 0.08, 0.03 if legs == "tapered" else 0.0,
+            of=m.pick(body, BLACK_STEEL, m.metal))
     n = m.pick(2, 3, 3, 4)
     open = m.pick((), (0,), (1,), (n - 1,), (0, 1))
     f = hd - 0.05
