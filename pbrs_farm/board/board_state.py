@@ -1,4 +1,4 @@
-"""What one running board is made of. Effects: opens the index, starts and ends its threads."""
+"""State of a running board. Effects: opens the index, starts and ends its threads."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from pbrs_farm.store.object_store import Store
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Board:
-    """One running board: what its routes share."""
+    """Objects shared by the routes of a board."""
 
     options: BoardOptions
     reader: RootReader
@@ -35,30 +35,29 @@ class Board:
     templates: Environment
     assets: dict[str, Asset]
     audit: Audit
-    streams: threading.Semaphore  # pages that listen
-    ending: threading.Event  # set when the board is to end
-    farm: LiveFarm | None = None  # None: a folder alone is shown
+    streams: threading.Semaphore  # free event streams
+    ending: threading.Event  # set at the end of the board
+    farm: LiveFarm | None = None  # None for a root without a farm
 
     def start(self) -> None:
-        """Begin to look at the root."""
+        """Start to read the root."""
         self.refresher.start()
 
     def end(self) -> None:
-        """Stop what was started."""
+        """Stop the threads."""
         self.refresher.end()
 
 
 def new_board(store: Store, options: BoardOptions, farm: LiveFarm | None = None) -> Board:
-    """A board of an output root; what it makes is kept below options.cache, by the root's URL.
+    """A board of an output root with its cache below options.cache, not started yet.
 
-    Nothing runs yet: `Board.start` begins to look at the root, which is only read. Two boards of
-    one root with one cache share their index. Without a farm there are no pages of jobs and no
-    users but the board's own token.
+    Two boards with one root and one cache share their index. Without a farm there are no pages of
+    jobs, and the board's own token is the only one.
     """
     folder = options.cache / keys.digest(store.url)
     reader = RootReader(store)
     index = ViewIndex(folder / "index.sqlite")
-    found = assets()
+    static = assets()
     return Board(
         options=options,
         reader=reader,
@@ -66,11 +65,9 @@ def new_board(store: Store, options: BoardOptions, farm: LiveFarm | None = None)
         queries=Queries(index),
         refresher=Refresher(reader, index, farm.finished_houses if farm is not None else None),
         pictures=PictureCache(folder / "pictures"),
-        sessions=Sessions(options.token, farm.user_with)
-        if farm is not None
-        else Sessions(options.token),
-        templates=environment(found),
-        assets=found,
+        sessions=Sessions(options.token, *([farm.user_with] if farm is not None else [])),
+        templates=environment(static),
+        assets=static,
         audit=Audit(folder / "audit.jsonl"),
         streams=threading.Semaphore(options.limits.streams),
         ending=threading.Event(),

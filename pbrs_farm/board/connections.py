@@ -1,8 +1,7 @@
-"""Connections of the board: how many, and how long one may take to ask. Effects: closes some.
+"""Limits of connections: number and time until a request. Effects: closes connections.
 
-Who connects and does not ask holds no place for long: a request's header must be whole within a
-deadline, and where an address or the board has too many connections, the one that waits longest
-without a request makes room.
+The header of a request must be complete within a deadline. If an address or the board has too many
+connections, the one without a request for the longest time is closed.
 """
 
 from __future__ import annotations
@@ -19,11 +18,7 @@ from pbrs_farm.board.options import BoardLimits, is_loopback
 
 
 def connection_class(limits: BoardLimits) -> type[asyncio.Protocol]:
-    """uvicorn's connection under these limits.
-
-    A class of its own for each call, as uvicorn makes the connections itself and passes no
-    arguments.
-    """
+    """uvicorn's connection with these limits; a class, since uvicorn passes no arguments."""
 
     class Connection(_Bounded):
         pass
@@ -33,32 +28,32 @@ def connection_class(limits: BoardLimits) -> type[asyncio.Protocol]:
 
 
 class _Bounded(H11Protocol):
-    """A connection that must ask in time."""
+    """A connection with a deadline."""
 
     limits = BoardLimits()
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
         self._since = time.monotonic()
-        self._deadline: asyncio.TimerHandle | None = None  # of the header that is awaited
+        self._deadline: asyncio.TimerHandle | None = None  # of the next header
 
     @property
     def address(self) -> str:
-        """Of who connected."""
+        """Address of the client."""
         return self.client[0] if self.client else ""
 
     @property
     def is_asking(self) -> bool:
-        """A request is being answered."""
+        """True during a request."""
         return self.cycle is not None and not self.cycle.response_complete
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         super().connection_made(transport)
         self._await_header()
-        own = [c for c in self.connections if c.address == self.address]  # type: ignore[union-attr]
-        if len(own) > self.limits.connections_per_address:
-            self._make_room(own)
-        # This machine's own probes get in even when others fill the board.
+        same = [c for c in self.connections if c.address == self.address]  # type: ignore[union-attr]
+        if len(same) > self.limits.connections_per_address:
+            self._make_room(same)
+        # Probes of this machine have no limit.
         elif len(self.connections) > self.limits.connections and not is_loopback(self.address):
             self._make_room(self.connections)
 
@@ -83,9 +78,9 @@ class _Bounded(H11Protocol):
             self._deadline = None
 
     def _make_room(self, among: Iterable[Any]) -> None:
-        """End the one that waits longest without a request; where none does, this one."""
+        """Close the connection idle for the longest time, or else this one."""
         idle = [c for c in among if c is not self and not c.is_asking]
         ended = min(idle, key=lambda c: c._since, default=self)
-        # It counts no more, though its transport ends in the loop's next round.
+        # Its transport ends in the next round of the loop, but it counts no more.
         self.connections.discard(ended)
         ended.transport.abort()

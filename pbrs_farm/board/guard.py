@@ -1,6 +1,6 @@
-"""What every request passes before a route sees it: rate, size, host, origin, session.
+"""Checks of every request before its route: rate, size, host, origin, session.
 
-An ASGI middleware, so that it also stands before streams and errors. Effects: none but answers.
+An ASGI middleware, so that it applies to streams and errors too.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from pbrs_farm.board.options import BoardOptions
 from pbrs_farm.board.sessions import COOKIE, Sessions
 
-_MAX_ADDRESSES: Final = 4096  # that are remembered
+_MAX_ADDRESSES: Final = 4096  # maximum number of remembered addresses
 LOGIN: Final = "/login"
 HEALTH: Final = "/health"
 _READS: Final = ("GET", "HEAD")
-_OPEN: Final = ("/static/", HEALTH, LOGIN)  # readable by everybody who may reach the board
+_OPEN: Final = ("/static/", HEALTH, LOGIN)  # readable without a token
 _CSP: Final = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:;"
     " connect-src 'self'; form-action 'self'; base-uri 'none'; frame-ancestors 'none'"
@@ -45,41 +45,40 @@ HEADERS: Final = {
 
 
 class Buckets:
-    """A bucket per address, filled at a rate; used from one thread."""
+    """Token buckets per address; used from one thread."""
 
     def __init__(
         self, per_s: float, burst: float, clock: Callable[[], float] = time.monotonic
     ) -> None:
         self._per_s, self._burst, self._clock = per_s, burst, clock
-        self._left: OrderedDict[str, tuple[float, float]] = OrderedDict()  # tokens, at which time
+        self._tokens: OrderedDict[str, tuple[float, float]] = OrderedDict()  # tokens, time
 
     def takes(self, address: str) -> bool:
-        """Whether the address may ask once more now; if so, it has.
+        """Take a token of the address; False without one.
 
-        Tokens of the address come back with time. Only so many addresses are remembered: the one
-        that asked longest ago is forgotten first, and starts with a full bucket again.
+        The address with the oldest request is forgotten first, and starts with a full bucket again.
         """
-        now, left = self._clock(), self._filled(address)
-        may = left >= 1
-        self._left.pop(address, None)
-        self._left[address] = (left - 1 if may else left, now)
-        while len(self._left) > _MAX_ADDRESSES:
-            self._left.popitem(last=False)
+        now, tokens = self._clock(), self._filled(address)
+        may = tokens >= 1
+        self._tokens.pop(address, None)
+        self._tokens[address] = (tokens - 1 if may else tokens, now)
+        while len(self._tokens) > _MAX_ADDRESSES:
+            self._tokens.popitem(last=False)
         return may
 
     def would_take(self, address: str) -> bool:
-        """Whether the address may ask once more now; asking this costs nothing."""
+        """True if the address has a token."""
         return self._filled(address) >= 1
 
     def _filled(self, address: str) -> float:
         now = self._clock()
-        left, since = self._left.get(address, (self._burst, now))
-        return min(self._burst, left + (now - since) * self._per_s)
+        tokens, since = self._tokens.get(address, (self._burst, now))
+        return min(self._burst, tokens + (now - since) * self._per_s)
 
 
 class Guard:
-    """Lets through what may pass; sets scope["session"], "" for who has shown no token, and
-    scope["user"], "" for who has shown none or the board's own.
+    """Passes valid requests on, with scope["session"], "" without a token, and scope["user"], "" without
+    a token or with the board's own.
     """
 
     def __init__(self, app: ASGIApp, options: BoardOptions, sessions: Sessions) -> None:
@@ -91,7 +90,7 @@ class Guard:
         self._hosts |= {name.lower() for name in options.allowed_hosts}
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer the request, or hand it on."""
+        """Refuse the request, or pass it on."""
         if scope["type"] != "http":
             if scope["type"] == "lifespan":
                 await self._app(scope, receive, send)
@@ -104,35 +103,35 @@ class Guard:
             await self._app(scope, receive, _with_headers(send))
 
     async def _refusal(self, scope: Scope, receive: Receive) -> Response | None:
-        """The answer to a request that may not pass, None to one that may."""
+        """The refusal of a request, None for a valid one."""
         headers, method, path = Headers(scope=scope), scope["method"], scope["path"]
         address = (scope.get("client") or ("", 0))[0]
-        # Who looks whether the board lives is answered whatever else its address asks.
+        # Health checks have no rate limit.
         if path != HEALTH and not self._rates.takes(address):
             return _text_response(429, "too many requests: wait a little", {"Retry-After": "2"})
         if len(scope["raw_path"]) + len(scope["query_string"]) > self._options.limits.target_bytes:
             return _text_response(414, "the address is too long")
         if not self._is_our_host(headers.get("host", "")):
-            return _text_response(
-                400, "this board is not called so: pbrs-farm board --allow-host NAME"
-            )
+            return _text_response(400, "unknown host name: pbrs-farm board --allow-host NAME")
         if method not in (*_READS, "POST"):
-            return _text_response(405, "the board knows GET and POST", {"Allow": "GET, HEAD, POST"})
-        # Who asks: a session's cookie, or a script that shows the token itself.
+            return _text_response(
+                405, "the board supports GET and POST", {"Allow": "GET, HEAD, POST"}
+            )
+        # The user has a cookie of a session, or a script sends the token.
         cookie = _cookie(headers.get("cookie", ""))
         user = self._sessions.user_of(cookie) if cookie else None
         session = cookie if user is not None else ""
         scheme, _, word = headers.get("authorization", "").partition(" ")
         is_script = False
         if scheme.lower() == "bearer":
-            # A wrong one counts as a wrong login; after too many the right one waits, too.
+            # Wrong tokens count as wrong logins; after too many, valid ones are refused too.
             if not self._logins.would_take(address):
                 return _too_many_tries()
-            found = await anyio.to_thread.run_sync(self._sessions.user_with, word)
-            is_script = found is not None
+            token_user = await anyio.to_thread.run_sync(self._sessions.user_with, word)
+            is_script = token_user is not None
             if not is_script:
                 self._logins.takes(address)
-            user = user or found
+            user = user or token_user
         scope["session"], scope["user"] = session, user or ""
         scope["may_change"] = (bool(session) or is_script) and not self._options.is_readonly
         if method in _READS:
@@ -174,7 +173,7 @@ class Guard:
         return None
 
     def _is_our_host(self, host: str) -> bool:
-        """A name from the options, or an address: no foreign name can be made to point here."""
+        """True for names in the options and IP addresses, against DNS rebinding."""
         name = _host_name(host)
         try:
             ipaddress.ip_address(name)
@@ -191,7 +190,7 @@ def _host_name(host: str) -> str:
 
 
 def _is_own_page(headers: Headers) -> bool:
-    """Whether a change comes from a page of this board, as far as the browser says."""
+    """True if the browser names no other page as the origin."""
     if headers.get("sec-fetch-site", "same-origin") not in ("same-origin", "none"):
         return False
     origin = headers.get("origin")
@@ -207,22 +206,19 @@ def _cookie(text: str) -> str:
 
 
 async def _body(receive: Receive, most: int) -> bytes | None:
-    """The whole body, None where it is larger than most; what is too much is not kept."""
-    body, more, is_within = b"", True, True
+    """The whole body, None if it is larger than most."""
+    body, more = b"", True
     while more:
         message = await receive()
-        if message["type"] == "http.disconnect":
-            return None
-        body = body + message.get("body", b"") if is_within else b""
-        is_within = is_within and len(body) <= most
-        if not is_within:
+        body += message.get("body", b"")
+        if message["type"] == "http.disconnect" or len(body) > most:
             return None
         more = message.get("more_body", False)
     return body
 
 
 def _repeated(body: bytes | None, receive: Receive) -> Receive:
-    """receive, with the body that was read already given once more."""
+    """receive, starting with an earlier body."""
     if body is None:
         return receive
     messages: list[Message] = [{"type": "http.request", "body": body, "more_body": False}]
@@ -254,22 +250,15 @@ def _text_response(status: int, text: str, headers: dict[str, str] | None = None
 
 
 def form_values(body: bytes) -> dict[str, str]:
-    """Name -> value of a form's body; of a name that stands twice the last.
-
-    {} for a body that is not UTF-8 or has more than 64 fields. Empty values are kept. Nothing is
-    checked: values are text from anybody.
-    """
+    """Name -> last value of a form's body; {} if it is not UTF-8 or has more than 64 fields."""
     try:
-        found = parse_qs(body.decode("utf-8"), keep_blank_values=True, max_num_fields=64)
+        fields = parse_qs(body.decode("utf-8"), keep_blank_values=True, max_num_fields=64)
     except ValueError:
         return {}
-    return {name: values[-1] for name, values in found.items()}
+    return {name: values[-1] for name, values in fields.items()}
 
 
 async def form_of(request: Request) -> dict[str, str]:
-    """The form of a request that passed the guard.
-
-    The guard has read and bounded the body; without it the form is empty.
-    """
+    """The form of a request, whose body the guard has read."""
     body: Any = request.scope.get("board_body") or b""
     return form_values(body)

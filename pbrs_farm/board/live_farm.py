@@ -1,8 +1,4 @@
-"""What a farm does now, asked of Redis once for all who look. Effects: reads Redis and the store.
-
-Many pages may be open: each answer is kept for two seconds, so that looking costs the farm the same
-whether one looks or a hundred.
-"""
+"""State of a farm, cached for two seconds for all open pages. Effects: reads Redis and the store."""
 
 from __future__ import annotations
 
@@ -25,12 +21,12 @@ if TYPE_CHECKING:
     from workers.client.farm_client import Farm
 
 T = TypeVar("T")
-_KEPT_S: Final = 2.0  # an answer that Redis gave
-_MAX_KEPT: Final = 200  # answers
-_MAX_LOG: Final = 200_000  # characters of a log, its end
+_KEPT_S: Final = 2.0  # lifetime of an answer
+_MAX_KEPT: Final = 200  # maximum number of answers
+_MAX_LOG: Final = 200_000  # characters from the end of a log
 _COMMAND: Final = re.compile(r"\[reproduce: (.+?)\]")
 _LOG: Final = logging.getLogger(__name__)
-_SHOWN: Final = 20  # lines that the page shows
+_SHOWN: Final = 20  # number of lines on the page
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,9 +34,9 @@ class FarmNow:
     """All jobs and workers."""
 
     jobs: tuple[dict[str, Any], ...] = ()  # rows of workers/client/job_rows.py, newest first
-    workers: tuple[dict[str, Any], ...] = ()  # rows of Farm.workers, with what each runs
+    workers: tuple[dict[str, Any], ...] = ()  # rows of Farm.workers with tasks
     storage: str = "ok"
-    fault: str = ""  # why the farm does not answer, or ""
+    fault: str = ""  # of a farm without an answer, or ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,54 +45,46 @@ class JobNow:
 
     status: dict[str, Any]  # Farm.status
     row: dict[str, Any]  # of workers/client/job_rows.py
-    failures: tuple[dict[str, Any], ...] = ()  # kinds, with the command that reproduces one
+    failures: tuple[dict[str, Any], ...] = ()  # kinds, each with a command to reproduce it
     running: tuple[dict[str, Any], ...] = ()  # task, worker, seconds
 
 
 @dataclass(slots=True)
 class _KeptAnswer:
-    at: float
+    time: float
     value: Any
 
 
 @dataclass(slots=True)
 class LiveFarm:
-    """A farm behind a memory of two seconds; safe to ask from many threads."""
+    """A farm behind a cache of two seconds, for many threads."""
 
     farm: Farm
     clock: Callable[[], float] = time.monotonic
     _kept: dict[str, _KeptAnswer] = field(default_factory=dict)
     _asking: threading.Lock = field(default_factory=threading.Lock)
     _finished: set[str] = field(default_factory=set)
-    _n_finished: dict[str, int] = field(default_factory=dict)  # of each job, when asked last
+    _n_finished: dict[str, int] = field(default_factory=dict)  # of each job, at the last request
 
     def now(self) -> FarmNow:
-        """All jobs and workers; says so where the farm does not answer."""
+        """All jobs and workers, or a fault."""
         return self._asked("", self._read_farm)
 
     def job(self, job: str) -> JobNow:
-        """One job. Raises BadInput for one there is not, LedgerUnavailable."""
+        """One job. Raises BadInput for an unknown one, LedgerUnavailable."""
         return self._asked(job, lambda: self._read_job(job))
 
     def log(self, job: str, task: str) -> str:
-        """The end of a task's stored log. Raises BadInput where there is none.
-
-        Only the last part of a long log.
-        """
-        text = self.farm.logs(job, task)
-        return text[-_MAX_LOG:]
+        """The end of a task's stored log. Raises BadInput without one."""
+        return self.farm.logs(job, task)[-_MAX_LOG:]
 
     def finished_houses(self) -> set[str]:
-        """The houses of every job that need no more work; those known before if Redis is silent.
-
-        Grows only: what was finished stays so while the board runs. Asks the farm once a job that
-        finished something since.
-        """
+        """The finished houses of all jobs; the previous ones if Redis does not answer."""
         try:
             for job in self.farm.ledger.known_jobs():
                 view = self.farm.ledger.view(job)
                 n = int(view.counts.get("houses:done", 0)) if view is not None else 0
-                # Ask only where a house was finished since.
+                # Read only jobs with newly finished houses.
                 if n and n != self._n_finished.get(job):
                     self._finished |= self.farm.finished_houses(job, besides=self._finished)
                     self._n_finished[job] = n
@@ -105,7 +93,7 @@ class LiveFarm:
         return self._finished
 
     def user_with(self, token: str) -> str:
-        """Which user of the farm has this token; "" for none, or where the farm does not answer."""
+        """User of the farm with this token; "" without one or without an answer."""
         try:
             user = self.farm.users.named_by(token)
         except PbrsError as error:
@@ -114,9 +102,9 @@ class LiveFarm:
         return user.name if user is not None else ""
 
     def acting_as(self, name: str, place: str) -> Farm:
-        """The farm as a user sees it; "" is who has the board's own token, and may all.
+        """The farm with the rights of a user; "" is an admin with the board's own token.
 
-        Raises BadInput for a user who was removed.
+        Raises BadInput for a removed user.
         """
         from workers.ledger.task_ledger import User
         from workers.ledger.user_table import known_user
@@ -125,21 +113,20 @@ class LiveFarm:
         return self.farm.acting_as(user, place)
 
     def forget(self) -> None:
-        """Ask anew next time: something was changed."""
+        """Discard the cached answers after a change."""
         with self._asking:
             self._kept.clear()
 
     def _asked(self, name: str, ask: Callable[[], T]) -> T:
-        # Whoever comes while somebody asks waits for that answer.
         with self._asking:
-            kept = self._kept.get(name)
-            if kept is None or self.clock() - kept.at > _KEPT_S:
+            answer = self._kept.get(name)
+            if answer is None or self.clock() - answer.time > _KEPT_S:
                 value = ask()
                 while len(self._kept) >= _MAX_KEPT:
                     self._kept.pop(next(iter(self._kept)))
-                kept = self._kept[name] = _KeptAnswer(self.clock(), value)
-        answer: T = kept.value
-        return answer
+                answer = self._kept[name] = _KeptAnswer(self.clock(), value)
+        result: T = answer.value
+        return result
 
     def _read_farm(self) -> FarmNow:
         from workers.client.job_rows import job_rows
@@ -149,7 +136,7 @@ class LiveFarm:
             workers = self.farm.workers()
             active = [row["job"] for row in jobs if row["running"]]
             now = self.farm.ledger.now()
-            # What each worker runs, of the jobs that run something.
+            # Tasks of each worker.
             runs: dict[str, list[str]] = {}
             for job in active:
                 for task, (worker, since) in self.farm.ledger.claims(job).items():
@@ -175,27 +162,23 @@ class LiveFarm:
 
 
 def _with_command(kind: dict[str, Any]) -> dict[str, Any]:
-    """A kind of failure with the command that makes one of it happen again."""
+    """A kind of failure with the command to reproduce it."""
     example = shown(kind["example"], 2 * MAX_MESSAGE)
-    found = _COMMAND.search(example)
+    match = _COMMAND.search(example)
     task = kind["tasks"][0] if kind["tasks"] else ""
-    command = found[1] if found else kind["command"]
+    command = match[1] if match else kind["command"]
     return {**kind, "example": example, "task": task, "command": command}
 
 
 class Audit:
-    """A file of JSON lines, one a change."""
+    """A file with a JSON line per change."""
 
     def __init__(self, file: Path) -> None:
         self._file = file
         self._lock = threading.Lock()
 
     def note(self, *, address: str, user: str, what: str, of: str, answer: str) -> None:
-        """Write one line: when, who, from which address, what was done to what, what came of it.
-
-        Lines are appended and also logged, and none is ever changed. Write it after the thing was
-        done or refused, with what came of it.
-        """
+        """Append and log a line: time, user, address, action, its object and its result."""
         row = {
             "utc": datetime.now(UTC).isoformat(timespec="seconds"),
             "address": address,
@@ -210,10 +193,7 @@ class Audit:
         _LOG.warning("audit: %s", line)
 
     def last(self) -> list[dict[str, Any]]:
-        """The last changes, newest first.
-
-        [] where nothing was ever done. Lines of older boards have no user, which is "" here.
-        """
+        """The last changes, newest first; user is "" in lines of older boards."""
         try:
             with self._file.open(encoding="utf-8") as file:
                 lines = deque(file, maxlen=_SHOWN)

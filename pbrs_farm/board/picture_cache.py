@@ -1,4 +1,4 @@
-"""Pictures that were made once, as files of a folder. Effects: writes and removes files there."""
+"""Cache of pictures in a folder. Effects: writes and removes files there."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from typing import Final
 from pbrs_farm.core import keys
 
 _LOG: Final = logging.getLogger(__name__)
-MAX_BYTES: Final = 4 * 10**9  # of the folder; the oldest go first
-_AT_ONCE: Final = 2  # pictures made at the same time: a page of thumbnails may not take every core
-_SWEEP_EVERY: Final = 2000  # pictures made between two looks at the folder's size
+MAX_BYTES: Final = 4 * 10**9  # of the folder; the oldest files are removed first
+_AT_ONCE: Final = 2  # number of pictures made in parallel
+_SWEEP_EVERY: Final = 2000  # number of new pictures between two checks of the folder's size
 
 
 class PictureCache:
-    """Bytes by the words they were made from."""
+    """Pictures by their words."""
 
     def __init__(self, folder: Path, *, max_bytes: int = MAX_BYTES) -> None:
         self.folder = folder
@@ -29,16 +29,14 @@ class PictureCache:
         self.folder.mkdir(parents=True, exist_ok=True)
 
     def file(self, words: tuple[str, ...], ending: str) -> Path:
-        """Where the picture of these words is kept; the name is a digest, no word of a request."""
+        """File of a picture; its name is a digest of the words."""
         digest = keys.digest(list(words))
         return self.folder / digest[:2] / f"{digest}.{ending}"
 
     def get(self, words: tuple[str, ...], ending: str, make: Callable[[], bytes]) -> bytes:
-        """The picture of these words, made when there is none yet. Raises what make raises.
+        """The cached picture of these words, made by the first call. Raises errors of make.
 
-        Whatever decides the picture belongs among the words, the version of its files too: nothing
-        is ever made again. One picture is made at a time, and who waits for the same one finds it
-        made.
+        The words must determine the picture, so they include the version of its files.
         """
         path = self.file(words, ending)
         try:
@@ -61,23 +59,19 @@ class PictureCache:
             part.write_bytes(data)
             part.replace(path)
         except OSError as error:
-            _LOG.warning("cannot keep %s: %s", path, error)  # a full disk: made again next time
+            _LOG.warning("cannot keep %s: %s", path, error)
             part.unlink(missing_ok=True)
         self._n_made += 1
         if self._n_made % _SWEEP_EVERY == 0:
             self.sweep()
 
     def sweep(self) -> None:
-        """Remove the files made first until the folder is within its size.
-
-        By the time at which they were written, not last read. What is removed is made again when
-        asked for.
-        """
-        found = sorted(
+        """Remove the oldest files until the folder is within its size."""
+        files = sorted(
             (e.stat().st_mtime, e.stat().st_size, e.path) for e in _cached_files(self.folder)
         )
-        excess = sum(size for _time, size, _path in found) - self._max_bytes
-        for _time, size, path in found:
+        excess = sum(size for _time, size, _path in files) - self._max_bytes
+        for _time, size, path in files:
             if excess <= 0:
                 return
             Path(path).unlink(missing_ok=True)
@@ -87,8 +81,8 @@ class PictureCache:
 def _cached_files(folder: Path) -> list[os.DirEntry[str]]:
     with os.scandir(folder) as parts:
         folders = [entry.path for entry in parts if entry.is_dir()]
-    found: list[os.DirEntry[str]] = []
+    files: list[os.DirEntry[str]] = []
     for path in folders:
         with os.scandir(path) as entries:
-            found += [entry for entry in entries if entry.is_file()]
-    return found
+            files += [entry for entry in entries if entry.is_file()]
+    return files

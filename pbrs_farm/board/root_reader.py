@@ -1,7 +1,6 @@
-"""Reads the objects of an output root, of bounded size and never outside of it. Effects: the store's.
+"""Objects of an output root, with a limit of size and never outside of it. Effects: reads the store.
 
-Whatever a request names comes here as a key: the store refuses a key that could leave the root, and
-a link inside a folder that leads out of it is refused here.
+The store refuses keys that leave the root; links out of a folder are refused here.
 """
 
 from __future__ import annotations
@@ -17,12 +16,12 @@ from pbrs_farm.store.folder import FolderStore
 from pbrs_farm.store.object_store import Store, check_key
 
 MAX_JSON_BYTES = 64 * 2**20  # of a view.json, house.json, cameras.json
-MAX_PICTURE_BYTES = 256 * 2**20  # of a layer that is shown
-PIECE_BYTES = 2**20  # of an object that is handed on as it is read
+MAX_PICTURE_BYTES = 256 * 2**20  # of a displayed layer
+PIECE_BYTES = 2**20  # of a streamed object
 
 
 class RootReader:
-    """The store of an output root, to be read."""
+    """The store of an output root for reading."""
 
     def __init__(self, store: Store) -> None:
         self.store = store
@@ -30,11 +29,11 @@ class RootReader:
 
     @property
     def url(self) -> str:
-        """Where the root is, without secrets."""
+        """URL of the root without secrets."""
         return self.store.url
 
     def size(self, key: str) -> int | None:
-        """Bytes of the object, None when there is none that may be read."""
+        """Size of an object in bytes, None if it is not readable."""
         try:
             self._check_inside(key)
             head = self.store.head(key)
@@ -43,16 +42,12 @@ class RootReader:
         return None if head is None else head.n_bytes
 
     def get(self, key: str, most_bytes: int = MAX_JSON_BYTES) -> bytes:
-        """The object's bytes. Raises StoreFailed, ObjectMissing where there is none of that size.
-
-        Bounded, since stored files may come from anybody: give most_bytes where more than JSON is
-        read. A key that leads out of the root is refused.
-        """
+        """Bytes of an object. Raises ObjectMissing, StoreFailed also for more than most_bytes."""
         self._size_within(key, most_bytes)
         return self.store.get(key)
 
     def has_house(self, house: str) -> bool:
-        """Whether the root has a file of a house; where the store does not answer, it may have."""
+        """True if the root has a file of a house, or if the store does not answer."""
         if self.size(house_key(house, "house.json")) is not None:
             return True
         try:
@@ -61,32 +56,22 @@ class RootReader:
             return True
 
     def pieces(self, key: str, most_bytes: int) -> tuple[int, Iterator[bytes]]:
-        """The object's size and its bytes piece by piece. Raises as get.
-
-        The size is asked first; an object that shrinks meanwhile fails while it is being sent.
-        """
+        """Size of an object and its bytes in pieces. Raises as get."""
         n_bytes = self._size_within(key, most_bytes)
         starts = range(0, n_bytes, PIECE_BYTES)
         return n_bytes, (
-            self.store.get_range(key, at, min(PIECE_BYTES, n_bytes - at)) for at in starts
+            self.store.get_range(key, start, min(PIECE_BYTES, n_bytes - start)) for start in starts
         )
 
     def get_or_none(self, key: str, most_bytes: int = MAX_JSON_BYTES) -> bytes | None:
-        """The object's bytes, None where they cannot be had.
-
-        For what a page can do without. It hides a store that does not answer: take `get` where the
-        difference matters.
-        """
+        """Bytes of an object; None if it is missing or the store fails."""
         try:
             return self.get(key, most_bytes)
         except PbrsError:
             return None
 
     def json_object(self, key: str) -> dict[str, Any]:
-        """The JSON object under a key, {} where there is none or it is damaged.
-
-        Fields may be missing or of any type: check each that is used.
-        """
+        """The JSON object of a key, {} if it is missing or damaged; fields may have any type."""
         data = self.get_or_none(key)
         try:
             value = json.loads(data) if data is not None else {}

@@ -25,16 +25,15 @@ from pbrs_farm.board.pages import farming, house_scene, lists, login, relighting
 from pbrs_farm.board.pages.rendering import page
 from pbrs_farm.core.errors import BadInput, PbrsError
 
-_THREADS: Final = 8  # that answer at once: each holds a connection to the index
+_THREADS: Final = 8  # each with a connection to the index
 _VIEW: Final = "/homes/{house}/views/{view}"
 _BACKLOG = 256
 
 
 def application(board: Board) -> ASGIApp:
-    """The application of a board; it starts and ends the board's threads with itself.
+    """The ASGI application of a board, which starts and ends the board's threads.
 
-    An ASGI application whose requests all pass the guard; what raises becomes an answer with the
-    fault's status. Limits of connections are set by `server_of`: another server needs its own.
+    All requests pass the guard. `server_of` sets limits of connections.
     """
 
     @asynccontextmanager
@@ -52,7 +51,7 @@ def application(board: Board) -> ASGIApp:
         lifespan=lifespan,
     )
     app.state.board = board
-    # Outside of everything, so that answers to errors carry its headers, too.
+    # The outermost layer, so that errors have its headers too.
     return Guard(app, board.options, board.sessions)
 
 
@@ -89,7 +88,7 @@ def _routes() -> list[Route]:
 
 def _not_found(request: Request, error: Exception) -> Response:
     assert isinstance(error, HTTPException)
-    # Of what is below a home, a way back to it.
+    # Link to the home of a missing view.
     house = request.path_params.get("house", "") if "view" in request.path_params else ""
     home = house if request.app.state.board.queries.home(house) else ""
     return page(request, "message.html", error.status_code, text=error.detail, home=home)
@@ -101,12 +100,12 @@ def _failed(request: Request, error: Exception) -> Response:
 
 
 def _broken(_request: Request, _error: Exception) -> Response:
-    # The traceback is in the log; a browser gets none of it.
-    return PlainTextResponse("the board failed at this: its log says why\n", 500)
+    # The traceback goes to the log only.
+    return PlainTextResponse("internal error: see the log of the board\n", 500)
 
 
 class _Server(uvicorn.Server):
-    """A server that tells the board's streams to end before it waits for them."""
+    """A server that ends the board's streams at its shutdown."""
 
     def __init__(self, board: Board, config: uvicorn.Config) -> None:
         super().__init__(config)
@@ -118,11 +117,7 @@ class _Server(uvicorn.Server):
 
 
 def server_of(board: Board) -> uvicorn.Server:
-    """The server of a board; `run` or `serve` it. It believes no forwarded address.
-
-    Access is not logged. Behind a proxy every request has the proxy's address, as forwarded ones
-    could be made up.
-    """
+    """The server of a board, without log of access and without trust in forwarded addresses."""
     return _Server(
         board,
         uvicorn.Config(
@@ -142,11 +137,7 @@ def server_of(board: Board) -> uvicorn.Server:
 
 
 def bound_socket(host: str, port: int) -> socket.socket:
-    """A socket that listens there; BadInput when the port is taken or the address not ours.
-
-    It can be bound again at once after a board has ended. Port 0 takes a free one: ask the socket
-    which.
-    """
+    """A listening socket; port 0 = any free port. BadInput if the address is not available."""
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     listening = socket.socket(family, socket.SOCK_STREAM)
     listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

@@ -1,7 +1,4 @@
-"""The board's own style, scripts and vendored libraries, held in memory. Effects: reads the package.
-
-A request names an asset by a key of this table: it never becomes a path.
-"""
+"""The board's style, scripts and vendored libraries, in memory. Effects: reads the package."""
 
 from __future__ import annotations
 
@@ -21,21 +18,21 @@ _TYPES: Final = {
 
 @dataclass(frozen=True, slots=True)
 class Asset:
-    """One file of the package that browsers load."""
+    """A file of the package for browsers."""
 
     data: bytes
-    zipped: bytes  # the same, gzip
+    zipped: bytes  # with gzip
     content_type: str
-    version: str  # of its bytes
+    version: str  # digest of the bytes
 
 
 def assets() -> dict[str, Asset]:
     """Name -> asset, of the package's folders static and vendor."""
     package = files("pbrs_farm.board")
-    found = [f for folder in ("static", "vendor") for f in (package / folder).iterdir()]
+    static = [f for folder in ("static", "vendor") for f in (package / folder).iterdir()]
     return {
         file.name: _asset(file.name, file.read_bytes())
-        for file in sorted(found, key=lambda f: f.name)
+        for file in sorted(static, key=lambda f: f.name)
         if file.name.rpartition(".")[2] in _TYPES
     }
 

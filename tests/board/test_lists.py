@@ -354,7 +354,7 @@ def test_words_of_the_board_are_explained(client: httpx.Client) -> None:
     assert set(OF_A_CANDIDATE) == {v.label.replace("_", " ") for v in Verdict}
     assert set(OF_A_SELECTION) == {*REASONS, *RULE_REASONS.values()}
     page = html.unescape(client.get("/homes/a-1/views/0_0_1").text)
-    for word in ("sector", "cut", "visible"):
+    for word in ("sector", "cropped", "visible"):
         assert f"<dt>{word}</dt><dd>{OF_A_VIEW[word]}</dd>" in page
     assert "<dt>noise</dt>" not in page  # which this view does not tell
     assert OF_A_CANDIDATE["below min score"] in html.unescape(client.get("/homes/a-1").text)

@@ -1,1 +1,1 @@
-"""What stands in an output root, as rows of an SQLite file that answer within milliseconds."""
+"""Index of an output root in an SQLite file."""

@@ -1,4 +1,4 @@
-"""The houses of an output root and the rows of their views. Effects: reads the store."""
+"""Rows of houses and views for the index. Effects: reads the store."""
 
 from __future__ import annotations
 
@@ -18,42 +18,38 @@ from pbrs_farm.core.shown_text import MAX_MESSAGE, shown
 
 LAYER_BIT: Final = {layer.name: 1 << k for k, layer in enumerate(LAYERS)}
 _BIT_OF_FILE: Final = {layer.file: 1 << k for k, layer in enumerate(LAYERS)}
-_MAX_WARNINGS: Final = 8  # of a view that are kept
+_MAX_WARNINGS: Final = 8  # maximum number per view
 
 
 @dataclass(frozen=True, slots=True)
 class ViewRow:
-    """A view as the index keeps it."""
+    """A view in the index."""
 
     id: str
-    room: str  # name that can be shown
-    layers: int  # bit k: the file of LAYERS[k] is there
+    room: str  # printable name
+    layers: int  # bit k: the file of LAYERS[k] exists
     classes: int  # bit k: NYU40 class k is in view
     warnings: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class HouseRow:
-    """A house as the index keeps it."""
+    """A house in the index."""
 
     id: str
     name: str
-    credit: str  # the line its pictures must carry, or ""
+    credit: str  # required credit line, or ""
     n_rooms: int
     views: tuple[ViewRow, ...]
 
 
 def read_house(reader: RootReader, house: str) -> HouseRow:
-    """The house and its views, from the store.
-
-    What is damaged is left out and the rest stays, since a run may still be writing: the board
-    shows what there is.
-    """
+    """A house and its views from the store, without damaged parts."""
     facts = reader.json_object(keys.house_key(house, "house.json"))
     source = facts.get("source")
     credit = source.get("attribution") if isinstance(source, dict) else ""
     rooms = _room_names(facts.get("rooms"))
-    # Every file of a view is a key below views/<view>/.
+    # Files of a view have keys below views/<view>/.
     prefix = keys.house_key(house, "views/")
     named = (key.removeprefix(prefix).partition("/") for key in view_keys(reader, house))
     views = [
@@ -65,7 +61,7 @@ def read_house(reader: RootReader, house: str) -> HouseRow:
 
 
 def _room_names(rooms: Any) -> dict[str, str]:
-    """Room id -> its name, or its type, or its id."""
+    """Room id -> name, or else type, or else id."""
     names: dict[str, str] = {}
     for room in rooms if isinstance(rooms, list) else ():
         if isinstance(room, dict) and "id" in room:
@@ -103,11 +99,7 @@ def _class_bits(instances: Any) -> int:
 
 
 def verdicts(reader: RootReader) -> dict[tuple[str, str], str]:
-    """(house, view) -> "" where the last selection kept it, else why not; {} without a selection.
-
-    A selection that is missing or damaged gives {}: a board shows the views all the same. At the
-    paper's scale the file has hundreds of megabytes and is read whole.
-    """
+    """(house, view) -> reason of the last selection, "" for kept; {} if it is missing or damaged."""
     run = reader.json_object(keys.SELECTION).get("run")
     if not run:
         return {}
@@ -120,9 +112,6 @@ def verdicts(reader: RootReader) -> dict[tuple[str, str], str]:
 
 
 def selection_fingerprint(reader: RootReader) -> str:
-    """A text that changes when another selection was made.
-
-    "" without a selection. Reads the small selection.json, not the table of verdicts.
-    """
+    """Digest of the last selection, "" without one."""
     data = reader.get_or_none(keys.SELECTION)
     return "" if data is None else keys.sha256(data)

@@ -1,9 +1,9 @@
-"""Questions to the index: filters, pages, menus. Effects: reads the index."""
+"""Queries of the index: filters, pages, menus. Effects: reads the index."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import asdict, dataclass, fields, replace
 from functools import lru_cache
 from typing import Any, Final, Generic, TypeVar
@@ -15,7 +15,7 @@ from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.layers import LAYERS
 from pbrs_farm.core.lighting import ALL_MODES
 
-T = TypeVar("T")  # what a page lists
+T = TypeVar("T")  # type of the rows of a page
 
 VIEWS_PER_PAGE: Final = 48
 HOMES_PER_PAGE: Final = 24
@@ -28,41 +28,32 @@ _CLASS_NUMBER: Final = {name: k for k, name in enumerate(NYU40_NAMES) if k}
 
 @dataclass(frozen=True, slots=True)
 class ViewFilter:
-    """Which views a gallery page shows; "" = all. What cannot be meant counts as not said."""
+    """Filter of views; "" = all."""
 
     home: str = ""
     room: str = ""
     has: str = ""  # a class's name
-    mode: str = ""  # a lighting mode whose picture must be there
+    mode: str = ""  # a lighting mode with a picture
     verdict: str = ""  # of VERDICTS
-    reason: str = ""  # why a selection refused it
+    reason: str = ""  # of a refusal
     warned: str = ""  # "1" = with warnings, "0" = without
-    words: str = ""  # in the names of home and room, and in ids
-    layer: str = ""  # what thumbnails show
+    words: str = ""  # part of the name of home or room, or of an id
+    layer: str = ""  # of the thumbnails
     page: int = 1
 
     def url(self, path: str = "/views", **changes: Any) -> str:
-        """The address of the same filter with changes; what stands at its default is left out.
-
-        A change of anything but the page goes back to page 1, since the pages of another filter are
-        others.
-        """
+        """Address of the filter with changes, without default values; changes go to page 1."""
         values = asdict(replace(self, **({"page": 1} | changes)))
-        said = {k: v for k, v in values.items() if v != _DEFAULTS[k]}
-        return f"{path}?{urlencode(said)}" if said else path
+        fields = {k: v for k, v in values.items() if v != _DEFAULTS[k]}
+        return f"{path}?{urlencode(fields)}" if fields else path
 
 
 _DEFAULTS: Final = {f.name: f.default for f in fields(ViewFilter)}
 
 
 def filter_from_query(query: Mapping[str, str]) -> ViewFilter:
-    """The filter that an address says.
-
-    Never fails: a value that is not of its closed list is left out, words are cut, and a page that
-    is no number is 1.
-    """
+    """The filter of an address; unknown values are ignored and long words truncated."""
     words = {name: query.get(name, "").strip()[:_MAX_WORD] for name in _DEFAULTS if name != "page"}
-    # Take of each closed list only what stands in it.
     allowed: dict[str, Collection[str]] = {
         "has": _CLASS_NUMBER, "mode": [m.value for m in ALL_MODES], "verdict": VERDICTS,
         "warned": ("0", "1"), "layer": LAYER_BIT,
@@ -72,7 +63,7 @@ def filter_from_query(query: Mapping[str, str]) -> ViewFilter:
 
 
 def page_number(text: str) -> int:
-    """A page's number from an address, 1 where it is none."""
+    """Number of a page in an address, 1 for anything else."""
     is_number = text.isascii() and text.isdigit() and len(text) < 9
     return min(max(1, int(text)), _MAX_PAGE) if is_number else 1
 
@@ -91,16 +82,13 @@ class ListedView:
     version: str  # of the house's files
 
     def has(self, layer: str) -> bool:
-        """Whether the file of a layer is there."""
+        """True if the view has the file of a layer."""
         return bool(self.layers & LAYER_BIT[layer])
 
-    def shown_layer(self, wanted: str = "") -> str:
-        """The layer a thumbnail shows: the one wanted, else the best picture there is, or "".
-
-        A wanted layer that the view lacks gives "", not another in its place.
-        """
-        if wanted:
-            return wanted if self.has(wanted) else ""
+    def shown_layer(self, layer: str = "") -> str:
+        """The layer of a thumbnail: the given one or else the best picture; "" if it is missing."""
+        if layer:
+            return layer if self.has(layer) else ""
         best = [*(mode.value for mode in reversed(ALL_MODES)), "semantic", "depth"]
         return next((name for name in best if self.has(name)), "")
 
@@ -129,78 +117,71 @@ class Page(Generic[T]):
 
 
 class Queries:
-    """Answers of one index."""
+    """Queries of one index."""
 
     def __init__(self, index: ViewIndex) -> None:
         self._index = index
         self._count = lru_cache(maxsize=256)(self._counted)
         self._menu = lru_cache(maxsize=8)(self._menus)
 
-    def views(self, wanted: ViewFilter) -> Page[ListedView]:
-        """The views of a page, by house and id.
-
-        A number beyond the last page gives the last. Counting is kept as long as the index does not
-        change.
-        """
-        where, values = _where(wanted)
+    def views(self, view_filter: ViewFilter) -> Page[ListedView]:
+        """The views of a page, or of the last one, by house and id."""
+        where, values = _where(view_filter)
         n_rows = self._count(where, values, self._index.generation)
-        n_pages = max(1, -(-n_rows // VIEWS_PER_PAGE))
-        number = min(wanted.page, n_pages)
-        # Find the page's keys first, which an index holds, then read those rows alone.
-        found = self._index.rows(
+        # Select the keys of the page first, from an SQL index, then only their rows.
+        sql = (
             f"{_VIEW} WHERE (v.house, v.id) IN (SELECT v.house, v.id FROM view v {where}"
-            " ORDER BY v.house, v.id LIMIT ? OFFSET ?) ORDER BY v.house, v.id",
-            (*values, VIEWS_PER_PAGE, (number - 1) * VIEWS_PER_PAGE),
+            " ORDER BY v.house, v.id LIMIT ? OFFSET ?) ORDER BY v.house, v.id"
         )
-        return Page(tuple(map(_view, found)), number, n_pages, n_rows)
+        return self._page(sql, values, n_rows, view_filter.page, VIEWS_PER_PAGE, _view)
+
+    def _page(
+        self, sql: str, values: tuple[Any, ...], n_rows: int, number: int, per_page: int,
+        read: Callable[[Any], T],
+    ) -> Page[T]:  # fmt: skip
+        """A page of the rows of a statement that ends with LIMIT and OFFSET."""
+        n_pages = max(1, -(-n_rows // per_page))
+        number = min(number, n_pages)
+        rows = self._index.rows(sql, (*values, per_page, (number - 1) * per_page))
+        return Page(tuple(map(read, rows)), number, n_pages, n_rows)
 
     def view(self, house: str, view: str) -> ListedView | None:
-        """One view, None when the index has none of these ids."""
-        found = self._index.rows(f"{_VIEW} WHERE v.house = ? AND v.id = ?", (house, view))
-        return _view(found[0]) if found else None
+        """A view, or None."""
+        rows = self._index.rows(f"{_VIEW} WHERE v.house = ? AND v.id = ?", (house, view))
+        return _view(rows[0]) if rows else None
 
     def neighbours(self, house: str, view: str) -> tuple[str, str]:
-        """The ids of the views before and after one of a house, "" at the ends."""
-        before = self._index.rows(
-            "SELECT max(id) AS id FROM view WHERE house = ? AND id < ?", (house, view)
+        """Ids of the previous and the next view of a house, "" at the ends."""
+        (row,) = self._index.rows(
+            "SELECT (SELECT max(id) FROM view WHERE house = ?1 AND id < ?2) AS previous,"
+            " (SELECT min(id) FROM view WHERE house = ?1 AND id > ?2) AS next",
+            (house, view),
         )
-        after = self._index.rows(
-            "SELECT min(id) AS id FROM view WHERE house = ? AND id > ?", (house, view)
-        )
-        return before[0]["id"] or "", after[0]["id"] or ""
+        return row["previous"] or "", row["next"] or ""
 
     def views_of(self, house: str) -> list[ListedView]:
         """All views of a house."""
         return [_view(r) for r in self._index.rows(f"{_VIEW} WHERE v.house = ?", (house,))]
 
     def homes(self, words: str, number: int) -> Page[ListedHome]:
-        """The homes of a page, by name. words: part of a name or id.
-
-        Sorted by name, then id. A number beyond the last page gives the last. Letters in words
-        match anywhere in a name or id; "" lists all.
-        """
+        """The homes of a page, or of the last one, by name. words: part of a name or id."""
         where = f"WHERE {_NAMED}" if words else ""
         values = (_pattern(words),) if words else ()
         n_rows = self._index.rows(f"SELECT count(*) AS n FROM house {where}", values)[0]["n"]
-        n_pages = max(1, -(-n_rows // HOMES_PER_PAGE))
-        number = min(number, n_pages)
-        found = self._index.rows(
-            f"SELECT * FROM house {where} ORDER BY name, id LIMIT ? OFFSET ?",
-            (*values, HOMES_PER_PAGE, (number - 1) * HOMES_PER_PAGE),
-        )
-        return Page(tuple(map(self._home, found)), number, n_pages, n_rows)
+        sql = f"SELECT * FROM house {where} ORDER BY name, id LIMIT ? OFFSET ?"
+        return self._page(sql, values, n_rows, number, HOMES_PER_PAGE, self._home)
 
     def home(self, house: str) -> ListedHome | None:
-        """One home, None when the index has none of that id."""
-        found = self._index.rows("SELECT * FROM house WHERE id = ?", (house,))
-        return self._home(found[0]) if found else None
+        """A home, or None."""
+        rows = self._index.rows("SELECT * FROM house WHERE id = ?", (house,))
+        return self._home(rows[0]) if rows else None
 
     def menus(self) -> dict[str, list[tuple[str, str]]]:
-        """Name of a filter -> (value, text) of what it can be; at most 200 of each."""
+        """Name of a filter -> (value, text) of its options, at most 200."""
         return self._menu(self._index.generation)
 
     def n_views(self) -> int:
-        """How many views there are."""
+        """Number of views."""
         return self._count("", (), self._index.generation)
 
     def _home(self, row: Any) -> ListedHome:
@@ -228,7 +209,7 @@ class Queries:
             classes |= row["classes"]
             layers |= row["layers"]
         return {
-            # Too many homes for a menu: they are found by words.
+            # Without a menu, many homes can be searched by words.
             "home": [(r["id"], r["name"]) for r in homes] if len(homes) <= _MAX_MENU else [],
             "room": [(r["room"], f"{r['room']} ({r['n']:,})") for r in rooms],
             "reason": [(r["reason"], f"{r['reason']} ({r['n']:,})") for r in reasons],
@@ -249,20 +230,15 @@ _VIEW: Final = (
 
 
 def _view(row: Any) -> ListedView:
+    warnings = tuple(json.loads(row["warnings"]))
     return ListedView(
-        house=row["house"],
-        house_name=row["house_name"],
-        id=row["id"],
-        room=row["room"],
-        layers=row["layers"],
-        warnings=tuple(json.loads(row["warnings"])),
-        reason=row["reason"],
-        version=row["fingerprint"],
-    )
+        row["house"], row["house_name"], row["id"], row["room"], row["layers"], warnings,
+        row["reason"], row["fingerprint"],
+    )  # fmt: skip
 
 
-def _where(wanted: ViewFilter) -> tuple[str, tuple[Any, ...]]:
-    """A filter as SQL with its values; every value of a request is bound, none is text of SQL."""
+def _where(view_filter: ViewFilter) -> tuple[str, tuple[Any, ...]]:
+    """A filter as SQL with bound values."""
     tests: list[str] = []
     values: list[Any] = []
 
@@ -270,29 +246,27 @@ def _where(wanted: ViewFilter) -> tuple[str, tuple[Any, ...]]:
         tests.append(test)
         values.extend(bound)
 
-    if wanted.home:
-        add("v.house = ?", wanted.home)
-    if wanted.room:
-        add("v.room = ?", wanted.room)
-    if wanted.has:
-        add("v.classes & ? != 0", 1 << _CLASS_NUMBER[wanted.has])
-    if wanted.mode:
-        add("v.layers & ? != 0", LAYER_BIT[wanted.mode])
-    if wanted.verdict:
-        add(
-            {"kept": "v.reason = ''", "refused": "v.reason != ''"}.get(
-                wanted.verdict, "v.reason IS NULL"
-            )
-        )
-    if wanted.reason:
-        add("v.reason = ?", wanted.reason)
-    if wanted.warned:
-        add("v.warnings != '[]'" if wanted.warned == "1" else "v.warnings = '[]'")
-    if wanted.words:
-        # Match each home's name once, not once a view.
+    f = view_filter
+    if f.home:
+        add("v.house = ?", f.home)
+    if f.room:
+        add("v.room = ?", f.room)
+    if f.has:
+        add("v.classes & ? != 0", 1 << _CLASS_NUMBER[f.has])
+    if f.mode:
+        add("v.layers & ? != 0", LAYER_BIT[f.mode])
+    if f.verdict:
+        tests_of = {"kept": "v.reason = ''", "refused": "v.reason != ''"}
+        add(tests_of.get(f.verdict, "v.reason IS NULL"))
+    if f.reason:
+        add("v.reason = ?", f.reason)
+    if f.warned:
+        add("v.warnings != '[]'" if f.warned == "1" else "v.warnings = '[]'")
+    if f.words:
+        # Match the name of each home once, not per view.
         homes = f"SELECT id FROM house WHERE {_NAMED}"
         views = "v.id LIKE ? ESCAPE '\\' OR v.room LIKE ? ESCAPE '\\'"
-        add(f"(v.house IN ({homes}) OR {views})", *[_pattern(wanted.words)] * 3)
+        add(f"(v.house IN ({homes}) OR {views})", *[_pattern(f.words)] * 3)
     return ("WHERE " + " AND ".join(tests) if tests else ""), tuple(values)
 
 

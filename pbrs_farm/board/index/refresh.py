@@ -1,4 +1,4 @@
-"""Keeps an index up to date with its output root, in a thread of its own. Effects: reads the store."""
+"""Thread that keeps an index up to date. Effects: reads the store, writes the index."""
 
 from __future__ import annotations
 
@@ -16,33 +16,37 @@ from pbrs_farm.core.errors import PbrsError
 from pbrs_farm.store.folder import FolderStore
 
 _LOG: Final = logging.getLogger(__name__)
-_CHUNK_VIEWS: Final = 500  # entered in one transaction
-_FOLDER_S: Final = 5.0  # between two looks at a folder
-_STORE_S: Final = 60.0  # between two looks at a store, which cost
-_SHARE: Final = 0.1  # of the time that looking may take at most
+_CHUNK_VIEWS: Final = 500  # views per transaction
+_FOLDER_S: Final = 5.0  # between reads of a folder
+_STORE_S: Final = 60.0  # between reads of another store
+_SHARE: Final = 0.1  # maximum share of the time for reading
 
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """How far the index is."""
+    """Progress of the index."""
 
-    n_houses: int = 0  # that are to be read, 0 when all are
+    n_houses: int = 0  # to be read, 0 at the end
     n_read: int = 0
-    is_listing: bool = False  # before the first look has found which homes there are
-    fault: str = ""  # why the store cannot be read, or ""
+    is_listing: bool = False  # before the first list of homes
+    fault: str = ""  # of the store, or ""
 
     @property
     def text(self) -> str:
-        """What is being read, for people; "" when all is read, or nothing can be."""
+        """Progress as text; "" at the end and for a fault."""
         if self.n_houses:
-            return f"Reading homes: {self.n_read:,} of {self.n_houses:,}. What is read already is shown."
+            return (
+                f"Reading homes: {self.n_read:,} of {self.n_houses:,}. Homes read so far are shown."
+            )
         return (
-            "Looking for homes in the root. A large one takes a while." if self.is_listing else ""
+            "Looking for homes in the root. This can take a while for a large root."
+            if self.is_listing
+            else ""
         )
 
 
 class Refresher:
-    """Looks at the root again and again; `progress` says how far it is."""
+    """Reads the root periodically; `progress` is the state of the first read."""
 
     def __init__(
         self, reader: RootReader, index: ViewIndex, finished: FinishedHouses | None = None
@@ -54,11 +58,11 @@ class Refresher:
         self.progress = Progress(is_listing=True)
 
     def start(self) -> None:
-        """Begin to look."""
+        """Start the thread."""
         self._thread.start()
 
     def end(self) -> None:
-        """Stop, and wait until it has."""
+        """Stop the thread and wait for its end."""
         self._ended.set()
         if self._thread.is_alive():
             self._thread.join(timeout=10.0)
@@ -76,19 +80,14 @@ class Refresher:
             self._ended.wait(max(pause_s, took_s * (1 / _SHARE - 1)))
 
     def refresh(self) -> None:
-        """Enter what is new or changed, forget what is gone.
-
-        Runs in the refresher's thread; tests call it directly. A house is read again when its
-        fingerprint differs, so a root of many homes that did not change costs a listing.
-        """
-        known = self._index.fingerprints()
+        """Read houses with a new fingerprint, and remove deleted ones."""
+        indexed = self._index.fingerprints()
         now = self._houses.fingerprints()
-        changed = [house for house, print_ in now.items() if known.get(house) != print_]
-        gone = known.keys() - now.keys()
-        if gone:
-            self._index.remove(sorted(gone))
+        changed = [house for house, print_ in now.items() if indexed.get(house) != print_]
+        removed = indexed.keys() - now.keys()
+        if removed:
+            self._index.remove(sorted(removed))
         self._read(changed, now)
-        # The verdicts of the last selection stand apart.
         selection = selection_fingerprint(self._reader)
         if selection != self._index.fact("selection") or (changed and selection):
             self._index.set_verdicts(verdicts(self._reader), selection)

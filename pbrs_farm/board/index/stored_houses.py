@@ -1,9 +1,9 @@
-"""Which houses an output root holds, and whether they changed. Effects: reads the store.
+"""Houses of an output root, with fingerprints of their content. Effects: reads the store.
 
-A folder is looked at; its own folders' times tell. Another store is not listed: a farm's root may
-hold twenty million objects, and a listing is paid for. Its manifest names the houses that were
-there when it was merged, the farm's ledger those that were finished since, and each has a manifest
-of its own. Only a root that has neither, of a run that still goes on, is listed, and seldom.
+In a folder, times of folders are fingerprints. Other stores are not listed, since a farm's root may
+have twenty million objects and a listing costs money. The root's manifest has the houses of the last
+merge, the farm's ledger those finished later, each with its own manifest. A root with neither, such
+as that of a running job, is listed every ten minutes.
 """
 
 from __future__ import annotations
@@ -23,20 +23,17 @@ from pbrs_farm.formats.manifest import sha256_by_key
 from pbrs_farm.store.folder import FolderStore
 from pbrs_farm.store.object_store import check_key
 
-_WATCHED: Final = ("done", "views", "house.json")  # what a house's step changes in a folder
-_LISTING_S: Final = 600.0  # between two listings of a store that has no manifest
-_MAX_MANIFEST: Final = 16 * 2**30  # bytes of a root's manifest that are read
-# In canonical JSON no text can hold this but the key itself: quotes within a text are escaped.
+_WATCHED: Final = ("done", "views", "house.json")  # parts of a house's folder that steps change
+_LISTING_S: Final = 600.0  # between listings of a store without a manifest
+_MAX_MANIFEST: Final = 16 * 2**30  # maximum size of a root's manifest, bytes
+# Unique in canonical JSON, since quotes within texts are escaped.
 _HOUSE_OF_ROW: Final = re.compile(rb'"key":"(?:houses|objects)/([^/"]+)/')
 
 FinishedHouses = Callable[[], Collection[str]]
 
 
 class StoredHouses:
-    """The houses of a root, asked again and again.
-
-    finished: the houses that a farm has finished, None without a farm.
-    """
+    """The houses of a root. finished: finished houses of its farm, None without a farm."""
 
     def __init__(
         self,
@@ -45,21 +42,21 @@ class StoredHouses:
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._reader, self._finished, self._clock = reader, finished, clock
-        self._manifest_bytes = -1  # of the root's manifest that was read last
+        self._manifest_bytes = -1  # size of the root's manifest at the last read
         self._in_manifest: dict[str, str] = {}
         self._of_farm: dict[str, str] = {}
         self._listed: dict[str, str] = {}
         self._listed_at: float | None = None
 
     def fingerprints(self) -> dict[str, str]:
-        """House id -> a text that changes when the house does.
+        """House id -> fingerprint of its content.
 
-        In a store that is no folder an object rewritten under the same name may go unnoticed.
+        In stores other than folders, an overwritten object may keep the fingerprint.
         """
         store = self._reader.store
         if isinstance(store, FolderStore):
             roots = (_folder_fingerprints(store.root / root) for root in keys.FOLDERS)
-            return {house: text for found in roots for house, text in found}
+            return {house: text for houses in roots for house, text in houses}
         self._read_manifest()
         self._ask_farm()
         if self._in_manifest or self._finished is not None:
@@ -67,7 +64,7 @@ class StoredHouses:
         return self._list_seldom()
 
     def _read_manifest(self) -> None:
-        """The root's manifest, when its size says that it is another one than before."""
+        """Read the root's manifest if its size changed."""
         try:
             n_bytes, pieces = self._reader.pieces(keys.MANIFEST, _MAX_MANIFEST)
         except ObjectMissing:
@@ -78,7 +75,7 @@ class StoredHouses:
         self._manifest_bytes = n_bytes
 
     def _ask_farm(self) -> None:
-        """The manifests of houses that the farm finished since the root's was merged."""
+        """Read the manifests of houses finished since the root's manifest."""
         for house in self._finished() if self._finished is not None else ():
             if house not in self._in_manifest and house not in self._of_farm:
                 data = self._reader.get_or_none(keys.house_key(house, keys.MANIFEST))
@@ -88,18 +85,14 @@ class StoredHouses:
     def _list_seldom(self) -> dict[str, str]:
         now = self._clock()
         if self._listed_at is None or now - self._listed_at >= _LISTING_S:
-            found = (self._reader.list(f"{root}/") for root in keys.FOLDERS)
-            self._listed = {house: text for part in found for house, text in _listed(part)}
+            listings = (self._reader.list(f"{root}/") for root in keys.FOLDERS)
+            self._listed = {house: text for part in listings for house, text in _listed(part)}
             self._listed_at = now
         return self._listed
 
 
 def view_keys(reader: RootReader, house: str) -> Iterable[str]:
-    """The keys below the views of a house: in a folder as they lie there, else by its manifest.
-
-    A remote store is not listed where the house's manifest can be read, since listing is slow and
-    costs money there; a manifest that is damaged is passed over.
-    """
+    """Keys below the views of a house: from its manifest in a remote store, else from a listing."""
     prefix = keys.house_key(house, "views/")
     if not isinstance(reader.store, FolderStore):
         data = reader.get_or_none(keys.house_key(house, keys.MANIFEST))
@@ -107,7 +100,7 @@ def view_keys(reader: RootReader, house: str) -> Iterable[str]:
             if data is not None:
                 return [key for key in sha256_by_key(data) if key.startswith(prefix)]
         except (ValueError, KeyError, TypeError, AttributeError):
-            pass  # damaged: what lies there is the truth
+            pass  # damaged
     return reader.list(prefix)
 
 
@@ -129,7 +122,7 @@ def _time(path: Path) -> str:
 
 
 def _lines(pieces: Iterable[bytes]) -> Iterator[bytes]:
-    """Lines with their ends, of bytes that come in pieces."""
+    """Lines of bytes in pieces, with line ends."""
     rest = b""
     for piece in pieces:
         *whole, rest = (rest + piece).split(b"\n")
@@ -139,15 +132,15 @@ def _lines(pieces: Iterable[bytes]) -> Iterator[bytes]:
 
 
 def _manifest_fingerprints(lines: Iterable[bytes]) -> dict[str, str]:
-    """House -> the digest of its lines, which are its own manifest."""
-    found: dict[str, str] = {}
+    """House -> digest of its lines, which are its own manifest."""
+    digests: dict[str, str] = {}
     for house, rows in groupby(lines, key=_house_of_row):
         digest = hashlib.sha256()
         for row in rows:
             digest.update(row)
         if _is_id(house):
-            found[house] = digest.hexdigest()
-    return found
+            digests[house] = digest.hexdigest()
+    return digests
 
 
 def _house_of_row(line: bytes) -> str:
@@ -155,8 +148,8 @@ def _house_of_row(line: bytes) -> str:
     return match[1].decode("ascii", "replace") if match else ""
 
 
-def _listed(found: Iterator[str]) -> Iterator[tuple[str, str]]:
-    parts = (key.split("/", 2) for key in found)
+def _listed(names: Iterator[str]) -> Iterator[tuple[str, str]]:
+    parts = (key.split("/", 2) for key in names)
     in_houses = (p for p in parts if len(p) == 3)
     for house, group in groupby(sorted(in_houses), key=lambda p: p[1]):
         digest = hashlib.sha256("\n".join(p[2] for p in group).encode()).hexdigest()
@@ -164,7 +157,7 @@ def _listed(found: Iterator[str]) -> Iterator[tuple[str, str]]:
 
 
 def _is_id(name: str) -> bool:
-    """Whether a name can be part of a key; what cannot was not written by us."""
+    """True for names that can be part of a key."""
     try:
         check_key(name)
     except StoreFailed:

@@ -1,7 +1,7 @@
 """The index of an output root: an SQLite file of houses and views. Effects: writes that file.
 
-It is a cache: a damaged or older file is thrown away and made anew. One writer, any readers: each
-thread has a connection of its own.
+It is a cache: a damaged or older file is deleted and rebuilt. One writer and many readers; each thread
+has its own connection.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ class ViewIndex:
         try:
             self._prepare()
         except sqlite3.DatabaseError:
-            # Not ours, or damaged: it can be made again.
+            # Rebuild a damaged file.
             for path in file.parent.glob(f"{file.name}*"):
                 path.unlink()
             self._local = threading.local()
@@ -56,39 +56,31 @@ class ViewIndex:
 
     @property
     def generation(self) -> int:
-        """Grows with every change, so that answers can be kept for as long as it stands."""
+        """Number of changes, for caches of answers."""
         return self._generation
 
     def rows(self, sql: str, values: Sequence[Any] = ()) -> list[sqlite3.Row]:
-        """What a SELECT finds.
-
-        Each thread has a connection of its own, so pages read while the refresher writes. Values go
-        in as parameters, never into the text of the statement.
-        """
+        """Rows of a SELECT with bound values."""
         return self._connection().execute(sql, values).fetchall()
 
     def fingerprints(self) -> dict[str, str]:
-        """House -> the fingerprint it was entered with."""
+        """Fingerprint of each house."""
         return {r["id"]: r["fingerprint"] for r in self.rows("SELECT id, fingerprint FROM house")}
 
     def fact(self, name: str) -> str:
-        """A text kept under a name, "" if none."""
-        found = self.rows("SELECT text FROM fact WHERE name = ?", (name,))
-        return str(found[0]["text"]) if found else ""
+        """A named text, or ""."""
+        rows = self.rows("SELECT text FROM fact WHERE name = ?", (name,))
+        return str(rows[0]["text"]) if rows else ""
 
     def enter(self, houses: Iterable[tuple[HouseRow, str]]) -> None:
-        """Put houses with their fingerprints in place of what was known of them.
-
-        One transaction: a reader sees all of the houses or none. Views of a house that are gone
-        leave with the old rows.
-        """
+        """Add or replace houses with their fingerprints in one transaction."""
         with self._writing, self._connection() as connection:
             for house, fingerprint in houses:
                 _enter_house(connection, house, fingerprint)
         self._generation += 1
 
     def remove(self, houses: Iterable[str]) -> None:
-        """Forget houses that are gone."""
+        """Remove houses."""
         with self._writing, self._connection() as connection:
             for house in houses:
                 connection.execute("DELETE FROM view WHERE house = ?", (house,))
@@ -96,11 +88,7 @@ class ViewIndex:
         self._generation += 1
 
     def set_verdicts(self, reasons: Mapping[tuple[str, str], str], fingerprint: str) -> None:
-        """Enter what a selection said of the views: "" kept, else why not.
-
-        Verdicts of an earlier selection go first, so a view that the new one does not name has
-        none. A view that the index does not have yet gets none before this is called again.
-        """
+        """Replace the verdicts of the views: "" for kept, else a reason."""
         with self._writing, self._connection() as connection:
             connection.execute("UPDATE view SET reason = NULL WHERE reason IS NOT NULL")
             connection.executemany(
@@ -121,7 +109,7 @@ class ViewIndex:
         if connection is None:
             connection = sqlite3.connect(self._file, timeout=30.0)
             connection.row_factory = sqlite3.Row
-            # A cache that is lost is made again: do not wait for the disk.
+            # A lost cache is rebuilt, so do not wait for the disk.
             connection.execute("PRAGMA synchronous = OFF")
             connection.execute("PRAGMA cache_size = -8000")
             self._local.connection = connection
@@ -129,7 +117,7 @@ class ViewIndex:
 
 
 def _enter_house(connection: sqlite3.Connection, house: HouseRow, fingerprint: str) -> None:
-    # Keep what the selection said: it changes by itself.
+    # Keep the verdicts, which change separately.
     reasons = dict(
         connection.execute(
             "SELECT id, reason FROM view WHERE house = ? AND reason IS NOT NULL", (house.id,)
@@ -152,7 +140,7 @@ def _enter_house(connection: sqlite3.Connection, house: HouseRow, fingerprint: s
 
 
 def _cover(house: HouseRow) -> str:
-    """The view that stands for the house: the first with most lighting modes and no warning."""
+    """The view on the house's card: most lighting modes, then no warning, then the first id."""
     modes = (1 << len(ALL_MODES)) - 1  # modes are the first layers
     ranked = sorted(
         house.views, key=lambda v: (-(v.layers & modes).bit_count(), bool(v.warnings), v.id)

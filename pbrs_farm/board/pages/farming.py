@@ -1,4 +1,4 @@
-"""Pages of a farm: its jobs and workers, live, and what may be done to them. Effects: steers it."""
+"""Pages of a farm: live jobs and workers, and actions on them. Effects: controls the farm."""
 
 from __future__ import annotations
 
@@ -23,26 +23,26 @@ from pbrs_farm.core.errors import PbrsError
 if TYPE_CHECKING:
     from workers.client.farm_client import Farm
 
-_EVERY_S: Final = 2.0  # between two reads of the farm for an event stream
-_BEAT_S: Final = 15.0  # between keep-alive comments, without which proxies close an idle stream
-_LIFE_S: Final = 3600.0  # an event stream is closed after this; browsers connect again
+_EVERY_S: Final = 2.0  # between reads of the farm for an event stream
+_BEAT_S: Final = 15.0  # between keep-alive comments for proxies
+_LIFE_S: Final = 3600.0  # maximum life of an event stream; browsers reconnect
 
-# What may be done -> whether it is done to a job or a worker, and the words of its question.
+# Actions on jobs and workers, with the text of the confirmation.
 _OF_JOBS: Final = {
-    "pause": "Start nothing more of this job. What runs, ends.",
-    "resume": "Go on with this job.",
-    "cancel": "Stop this job for good: what runs is killed, what is stored stays.",
-    "retry": "Give every failed task of this job fresh attempts.",
-    "priority": "Feed this job by another number: 0 goes first, 9 last.",
+    "pause": "Start no more tasks of this job. Running tasks finish.",
+    "resume": "Continue this job.",
+    "cancel": "Cancel this job: running tasks are killed, stored results remain.",
+    "retry": "Retry every failed task of this job.",
+    "priority": "Change the priority of this job: 0 is first, 9 last.",
 }
 _OF_WORKERS: Final = {
-    "drain": "Let this worker finish what it runs and take nothing more.",
+    "drain": "Let this worker finish its tasks and take no more.",
     "undrain": "Let this worker take tasks again.",
 }
 
 
 def live_farm(request: Request) -> LiveFarm:
-    """The board's farm; 404 on a board of a folder alone."""
+    """The board's farm; 404 without one."""
     farm = board_of(request).farm
     if farm is None:
         raise HTTPException(404, "This board shows no farm: start it with PBRS_REDIS_URL.")
@@ -58,8 +58,8 @@ def farm(request: Request) -> Response:
 
 def job(request: Request) -> Response:
     """GET /farm/jobs/JOB: one job."""
-    found = live_farm(request).job(request.path_params["job"])
-    return page(request, "job.html", found=found, job=found.row["job"], **_prices(request))
+    state = live_farm(request).job(request.path_params["job"])
+    return page(request, "job.html", found=state, job=state.row["job"], **_prices(request))
 
 
 def log(request: Request) -> Response:
@@ -75,15 +75,11 @@ def log(request: Request) -> Response:
 
 
 async def events(request: Request) -> Response:
-    """GET /farm/events: the parts of a page that changed, as server-sent events.
-
-    503 when so many pages listen already that no stream is left; the stream ends when the board
-    does.
-    """
+    """GET /farm/events: changed parts of a page as server-sent events; 503 for too many streams."""
     farm, board = live_farm(request), board_of(request)
     name = request.query_params.get("job", "")[:40]
     if not board.streams.acquire(blocking=False):
-        raise HTTPException(503, "Too many pages listen already.")
+        raise HTTPException(503, "Too many pages are open.")
     answer = StreamingResponse(
         _stream(partial(_farm_parts, request, farm, name), board.ending, board.streams.release),
         media_type="text/event-stream",
@@ -95,15 +91,15 @@ async def events(request: Request) -> Response:
 async def _stream(
     parts: Callable[[], dict[str, str]], ending: threading.Event, release: Callable[[], None]
 ) -> AsyncIterator[bytes]:
-    """An event whenever what parts() says has changed, a comment when long nothing has."""
-    said: dict[str, str] = {}
+    """An event for each change of parts(), and comments between them."""
+    sent: dict[str, str] = {}
     silent_s = lived_s = 0.0
     try:
         yield b"retry: 3000\n\n"
         while lived_s < _LIFE_S and not ending.is_set():
             now = await anyio.to_thread.run_sync(parts)
-            changed = {k: v for k, v in now.items() if said.get(k) != v}
-            said = now
+            changed = {k: v for k, v in now.items() if sent.get(k) != v}
+            sent = now
             if changed:
                 yield f"data: {json.dumps(changed)}\n\n".encode()
                 silent_s = 0.0
@@ -118,7 +114,7 @@ async def _stream(
 
 
 def _farm_parts(request: Request, farm: LiveFarm, job: str) -> dict[str, str]:
-    """Id of an element -> its HTML now."""
+    """Id of an element -> its present HTML."""
     templates, prices = board_of(request).templates, _prices(request)
     may = request.scope.get("may_change", False)
     if not job:
@@ -126,40 +122,35 @@ def _farm_parts(request: Request, farm: LiveFarm, job: str) -> dict[str, str]:
         render = templates.get_template("farm_part.html").render
         return {"farm": render(now=now, may_change=may, **prices)}
     try:
-        found = farm.job(job)
+        state = farm.job(job)
     except PbrsError as error:
         return {"job-fault": str(templates.from_string("{{ text }}").render(text=str(error)))}
     render = templates.get_template("job_part.html").render
-    return {"job": render(found=found, may_change=may, job=job, **prices), "job-fault": ""}
+    return {"job": render(found=state, may_change=may, job=job, **prices), "job-fault": ""}
 
 
 def confirm(request: Request) -> Response:
-    """GET /farm/confirm?what=pause&job=JOB: asks before anything is done.
+    """GET /farm/confirm?what=pause&job=JOB: confirmation of an action; 404 for an unknown one.
 
-    Every button leads here first, so that a link that somebody sends changes nothing. 404 for what
-    cannot be done, as for a priority without its value.
+    Every button leads here first, so that links change nothing.
     """
     live_farm(request)
     what, of = request.query_params.get("what", ""), request.query_params.get("of", "")[:200]
     text = (_OF_JOBS | _OF_WORKERS).get(what)
     to = request.query_params.get("to", "")[:40]
     if text is None or not of or (what == "priority") != bool(to):
-        raise HTTPException(404, "There is nothing to confirm.")
+        raise HTTPException(404, "There is no such action.")
     back = f"/farm/jobs/{of}" if what in _OF_JOBS and of.isalnum() else "/farm"
     return page(request, "confirm.html", what=what, of=of, to=to, text=text, back=back)
 
 
 async def steer(request: Request) -> Response:
-    """POST /farm/do: does it, writes the audit line, and goes back.
-
-    Carries the form's word of its session, which the guard checks before. A refusal of the farm is
-    a page with status 409 and is in the audit too.
-    """
+    """POST /farm/do: do an action and write an audit line; 409 if the farm refuses."""
     farm, board = live_farm(request), board_of(request)
     form = await form_of(request)
     what, of, to = form.get("what", ""), form.get("of", "")[:200], form.get("to", "")[:40]
     if what not in _OF_JOBS | _OF_WORKERS or not of:
-        raise HTTPException(404, "There is no such thing to do.")
+        raise HTTPException(404, "There is no such action.")
     address = request.client.host if request.client else ""
     user = request.scope.get("user", "")
     note = partial(board.audit.note, address=address, user=user, what=what, of=of)
@@ -176,7 +167,7 @@ async def steer(request: Request) -> Response:
 
 
 def _do(farm: Farm, what: str, of: str, to: str) -> str:
-    """Do it to a job or worker; what came of it, for the audit. to: the new priority of a job."""
+    """Do an action on a job or worker; its result for the audit. to: the new priority of a job."""
     from workers.ids import priority_from_text
 
     if what == "priority":

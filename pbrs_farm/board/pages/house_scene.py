@@ -1,4 +1,4 @@
-"""What the 3D page of a home loads: its scene, its cameras, the sampler's candidates. Effects: reads."""
+"""Files of the 3D page of a home: scene, cameras, the sampler's candidates. Effects: reads the store."""
 
 from __future__ import annotations
 
@@ -31,14 +31,12 @@ def house_glb(request: Request) -> Response:
 
 
 def scene(request: Request) -> Response:
-    """GET /homes/HOUSE/scene.json: rooms, cameras with their pictures, refusals counted.
+    """GET /homes/HOUSE/scene.json: rooms, cameras with pictures, numbers of refusals.
 
-    Stored files may come from anybody: rows of the wrong shape are left out, and a home without a
-    house.json has no rooms here.
+    Stored files are not trusted: damaged rows are omitted.
     """
     home = asked_home(request)
     board = board_of(request)
-    # Stored files may come from anybody: every field may be missing or of another type.
     house = board.reader.json_object(keys.house_key(home.id, "house.json"))
     cameras = board.reader.json_object(keys.house_key(home.id, "cameras.json"))
     stored = {view.id: view for view in board.queries.views_of(home.id)}
@@ -58,16 +56,14 @@ def scene(request: Request) -> Response:
 
 
 def candidates(request: Request) -> Response:
-    """GET /homes/HOUSE/candidates.json: every viewpoint that was tried (pages/tried_viewpoints.py).
+    """GET /homes/HOUSE/candidates.json: all tried viewpoints (pages/tried_viewpoints.py).
 
-    Seconds the first time, then kept until the home's files change. 422 with the reason where they
-    cannot be sampled again.
+    Cached until the home's files change. 422 with the reason if they cannot be sampled again.
     """
     home = asked_home(request)
     board = board_of(request)
     version = board.index.fingerprints().get(home.id, "")
 
-    # Sampling takes seconds: in a process of its own, kept by the home's fingerprint.
     def make() -> bytes:
         return candidates_in_process(board.reader.url, home.id)
 
@@ -87,7 +83,7 @@ def _room(row: dict[str, Any]) -> dict[str, str]:
 
 
 def _camera_row(stored: dict[str, ListedView]) -> Any:
-    """A row of cameras.json -> what the page draws of it, None where it is damaged."""
+    """Function from a row of cameras.json to the page's row, None for a damaged one."""
 
     def drawn(row: dict[str, Any]) -> dict[str, Any] | None:
         try:
@@ -96,7 +92,6 @@ def _camera_row(stored: dict[str, ListedView]) -> Any:
             size = [float(i[name]) for name in ("width_px", "height_px", "fx", "fy")]
         except (KeyError, TypeError, ValueError):
             return None
-        # What was stored is not trusted: a damaged row is left out of the page.
         if len(pose) != 16 or not all(x > 0 for x in size):
             return None
         view = stored.get(str(row.get("id", "")))

@@ -1,10 +1,9 @@
-"""A view's light as half floats that a browser sums and tones, in one packet. Effects: a process.
+"""Light layers of a view as half floats for the browser, in one packet. Effects: a process.
 
 "PBLT", length of the JSON, the JSON (padded with spaces to a multiple of four), then (H, W, 3)
-little-endian float16 of each plane that the JSON names: albedo, outdoor, and indoor or the
-lamps. Radiance is multiplied by `scale`, a power of two, so that half floats hold its range.
-The layers are made in a process of its own, since the denoiser keeps much memory: `python -m`
-this module reads the view's files from stdin and writes the packet to stdout.
+little-endian float16 of each plane in the JSON: albedo, outdoor, and indoor or the lamps. Radiance is
+multiplied by `scale`, a power of two, to fit the range of half floats. `python -m` this module reads
+the view's files from stdin and writes the packet to stdout, as the denoiser needs much memory.
 """
 
 from __future__ import annotations
@@ -12,7 +11,6 @@ from __future__ import annotations
 import json
 import math
 import struct
-import subprocess
 import sys
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
@@ -20,6 +18,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from pbrs_farm.board.module_process import output_of_module
 from pbrs_farm.core.errors import BadInput, PbrsError
 from pbrs_farm.core.recipe import recipe_from_json
 from pbrs_farm.core.recipe_fields import ToneFields
@@ -27,7 +26,7 @@ from pbrs_farm.core.shown_text import shown
 from pbrs_farm.formats.radiance_exr import radiance_from_exr
 
 MAGIC: Final = b"PBLT"
-_LARGEST: Final = 60_000.0  # of a half float, with some room
+_LARGEST: Final = 60_000.0  # below the maximum of a half float
 _TIMEOUT_S: Final = 180.0
 _HEAD: Final = struct.Struct("<III?")  # bytes of radiance.exr, view.json, recipe.json; denoise
 
@@ -35,35 +34,21 @@ _HEAD: Final = struct.Struct("<III?")  # bytes of radiance.exr, view.json, recip
 def light_packet_in_process(
     radiance: bytes, view_json: bytes, recipe: bytes, *, denoise: bool
 ) -> bytes:
-    """The packet of a view, made by a process of its own. Raises BadInput with what it said.
-
-    Kept out of the server: decoding light needs much memory, and a fault in a library then ends
-    that process alone. BadInput as well where it takes too long.
-    """
+    """The packet of a view from another process. Raises BadInput if that fails."""
     head = _HEAD.pack(len(radiance), len(view_json), len(recipe), denoise)
-    command = [sys.executable, "-m", "pbrs_farm.board.pages.light_packet"]
-    try:
-        done = subprocess.run(
-            command,
-            input=b"".join((head, radiance, view_json, recipe)),
-            capture_output=True,
-            timeout=_TIMEOUT_S,
-            check=False,
-        )
-    except subprocess.TimeoutExpired:
-        raise BadInput("relight", "", f"took more than {_TIMEOUT_S:.0f} s") from None
-    if done.returncode != 0 or done.stdout[:4] != MAGIC:
-        lines = done.stderr.decode("utf-8", "replace").strip().splitlines()
-        raise BadInput("relight", "", lines[-1] if lines else f"exit code {done.returncode}")
-    return done.stdout
+    files = b"".join((head, radiance, view_json, recipe))
+    module = "pbrs_farm.board.pages.light_packet"
+    data = output_of_module(module, [], subject="relight", timeout_s=_TIMEOUT_S, stdin=files)
+    if data[:4] != MAGIC:
+        raise BadInput("relight", "", "the process wrote no packet")
+    return data
 
 
 def light_packet(radiance: bytes, view_json: bytes, recipe: bytes, *, denoise: bool) -> bytes:
     """The packet of a view's light. Raises BadInput, and MachineFailed without a denoiser.
 
-    radiance is the bytes of radiance.exr, recipe those of recipe.json. One plane for outdoor light,
-    one for each lamp that is stored by itself, else one for all indoor light, and the albedo.
-    Planes of light are scaled by `scale_of` and have glare added already.
+    radiance, recipe: bytes of radiance.exr and recipe.json. Planes: outdoor light, each lamp with a
+    layer or else all indoor light, and the albedo. Light includes glare and is scaled by `scale_of`.
     """
     from pbrs_farm.run.relight import relight_layers
     from pbrs_farm.transport.develop.tone_mapping import add_glare, exposure_of
@@ -75,9 +60,9 @@ def light_packet(radiance: bytes, view_json: bytes, recipe: bytes, *, denoise: b
     light |= {f"lamp{n}": layer for n, layer in sorted(layers.lamps.items())}
     if not layers.lamps:
         light["indoor"] = layers.aovs.indoor
-    # Glare is linear: that of a sum is the sum of the layers', so that a browser need not know of it.
+    # Glare is linear, so it can be added to each layer.
     light = {name: add_glare(layer, tone.glare) for name, layer in light.items()}
-    # Bring the picture's typical radiance near the middle of a half float's range.
+    # Move typical radiance to the middle of the range of half floats.
     total = np.asarray(sum(light.values()), np.float32)
     scale = scale_of(exposure_of(total, tone), float(total.max(initial=0.0)))
     planes = {"albedo": layers.aovs.albedo} | {k: v * np.float32(scale) for k, v in light.items()}
@@ -86,11 +71,9 @@ def light_packet(radiance: bytes, view_json: bytes, recipe: bytes, *, denoise: b
 
 
 def packet(planes: Mapping[str, NDArray[np.float32]], facts: Mapping[str, Any]) -> bytes:
-    """The packet of (H, W, 3) planes, all of one size.
+    """The packet of (H, W, 3) float32 planes of one size, with facts in its JSON.
 
-    float32 planes, stored as little-endian half floats: negative values and NaN become 0, too large
-    ones the largest. In the head is a line of JSON with the size, the names in order, and the
-    facts.
+    Negative values and NaN become 0, larger values than a half float its largest.
     """
     height, width = next(iter(planes.values())).shape[:2]
     described = {"width": width, "height": height, "planes": list(planes), **facts}
@@ -106,8 +89,7 @@ def packet(planes: Mapping[str, NDArray[np.float32]], facts: Mapping[str, Any]) 
 def scale_of(exposure: float, largest: float) -> float:
     """The power of two nearest to the exposure that keeps the largest radiance a half float.
 
-    A power of two changes no digit of a float. exposure must be above 0; largest is the greatest
-    radiance of all planes together, 0 for a black picture.
+    exposure is positive; largest is the maximum of the sum of all planes, 0 for a black picture.
     """
     power = round(math.log2(exposure))
     if largest > 0:
@@ -116,11 +98,7 @@ def scale_of(exposure: float, largest: float) -> float:
 
 
 def lamp_rows(view_json: bytes) -> list[dict[str, Any]]:
-    """What the page shows of each lamp of view.json; [] where light was not stored by lamp.
-
-    Names are made printable, as stored files may come from anybody. One row of another form empties
-    the list.
-    """
+    """A row for each lamp of view.json, with printable names; [] without valid rows."""
     try:
         rows = json.loads(view_json)["modes"]["light"]["lamps"]
         return [
@@ -163,10 +141,10 @@ def _tone_facts(tone: ToneFields) -> dict[str, Any]:
 
 def _view_files(data: bytes) -> tuple[Sequence[bytes], bool]:
     n_radiance, n_view, n_recipe, denoise = _HEAD.unpack_from(data)
-    at, parts = _HEAD.size, []
+    start, parts = _HEAD.size, []
     for n in (n_radiance, n_view, n_recipe):
-        parts.append(data[at : at + n])
-        at += n
+        parts.append(data[start : start + n])
+        start += n
     return parts, denoise
 
 

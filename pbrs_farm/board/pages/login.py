@@ -1,4 +1,4 @@
-"""The page that asks for the token, and the board's own files. Effects: opens and ends sessions."""
+"""Login, logout and static files. Effects: opens and ends sessions."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def login(request: Request) -> Response:
 
 
 async def log_in(request: Request) -> Response:
-    """POST /login: a session for who shows the token."""
+    """POST /login: opens a session for a valid token."""
     board = board_of(request)
     form = await form_of(request)
     token = form.get("token", "").strip()
@@ -39,7 +39,7 @@ async def log_in(request: Request) -> Response:
 
 
 async def log_out(request: Request) -> Response:
-    """POST /logout: the end of the session."""
+    """POST /logout: ends the session."""
     board_of(request).sessions.close(request.scope.get("session", ""))
     answer = RedirectResponse("/", 303)
     answer.delete_cookie(COOKIE)
@@ -47,29 +47,26 @@ async def log_out(request: Request) -> Response:
 
 
 def asset(request: Request) -> Response:
-    """GET /static/NAME: a file of the package, by its name in a table.
+    """GET /static/NAME: a file of the package from a table; 304 if the browser has it.
 
-    Answers 304 to a browser that has these bytes; an address with the right version may be kept for
-    a year. Names are looked up in a table, so no path can leave the folder.
+    Addresses with the current version are cached for a year.
     """
-    found = board_of(request).assets.get(request.path_params["name"])
-    if found is None:
+    file = board_of(request).assets.get(request.path_params["name"])
+    if file is None:
         raise HTTPException(404, "There is no such file.")
-    # Answer 304 to a browser that has these bytes.
-    etag = f'"{found.version}"'
+    etag = f'"{file.version}"'
     if request.headers.get("if-none-match") == etag:
         return Response(status_code=304, headers={"ETag": etag})
     is_zipped = "gzip" in request.headers.get("accept-encoding", "")
-    # An address with the right version never changes.
-    is_version = request.query_params.get("v") == found.version
+    is_version = request.query_params.get("v") == file.version
     cache = "public, max-age=31536000, immutable" if is_version else "no-cache"
     headers = {"Cache-Control": cache, "Vary": "Accept-Encoding", "ETag": etag}
     if is_zipped:
         headers["Content-Encoding"] = "gzip"
-    data = found.zipped if is_zipped else found.data
-    return Response(data, media_type=found.content_type, headers=headers)
+    data = file.zipped if is_zipped else file.data
+    return Response(data, media_type=file.content_type, headers=headers)
 
 
 async def health(_request: Request) -> Response:
-    """GET /health: the board answers, even while every thread is busy."""
+    """GET /health: answered even if all threads are busy."""
     return PlainTextResponse("ok\n")

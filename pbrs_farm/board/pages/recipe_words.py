@@ -15,19 +15,17 @@ _MOST_BYTES: Final = 2**20
 
 @dataclass(frozen=True)
 class RecipeWords:
-    """What --recipe and --set would say: a preset and every field that differs, "light.spp=16"."""
+    """Values of --recipe and --set: a preset and every different field, "light.spp=16"."""
 
     preset: str
     settings: tuple[str, ...]
 
 
 def recipe_words(reader: RootReader) -> RecipeWords | None:
-    """The root's recipe from the preset that it is nearest to; None without one of this version.
+    """The root's recipe as a preset and settings; None without a recipe of this version.
 
-    The nearest preset is that with the fewest fields that differ; of equals the one that the recipe
-    is named after.
+    The preset with the fewest different fields, and of several the one with the recipe's name.
     """
-    # A root that is still empty, or of another version, has pages all the same.
     data = reader.get_or_none(keys.RECIPE, _MOST_BYTES)
     if data is None:
         return None
@@ -35,10 +33,9 @@ def recipe_words(reader: RootReader) -> RecipeWords | None:
         recipe = recipe_from_json(data, keys.RECIPE)
     except BadRecipe:
         return None
-    # The nearest preset has the fewest fields that differ; its own name decides between equals.
-    found = {name: differences(recipe_from_name(name), recipe) for name in RECIPE_NAMES}
-    preset = min(found, key=lambda name: (len(found[name]), name != recipe.name))
-    return RecipeWords(preset, tuple(_setting(line) for line in found[preset]))
+    changes = {name: differences(recipe_from_name(name), recipe) for name in RECIPE_NAMES}
+    preset = min(changes, key=lambda name: (len(changes[name]), name != recipe.name))
+    return RecipeWords(preset, tuple(_setting(line) for line in changes[preset]))
 
 
 def _setting(difference: str) -> str:

@@ -16,18 +16,17 @@ from pbrs_farm.board.static_files import Asset
 from pbrs_farm.core.shown_text import printable, shown
 from workers.client.text import duration_text, memory_text
 
-_MAX_PAGES_SHOWN: Final = 2  # before and after the one that is shown
+_MAX_PAGES_SHOWN: Final = 2  # linked pages before and after the present one
 
 
-def environment(found: Mapping[str, Asset]) -> Environment:
-    """The templates; only markupsafe.Markup is not escaped, an unknown name is an error.
+def environment(static: Mapping[str, Asset]) -> Environment:
+    """The templates with links to these assets.
 
-    found are the assets that templates may link. Text is escaped, and made printable unless it is
-    Markup: names in stored files may hold anything.
+    Text is escaped and made printable, except markupsafe.Markup; an unknown name is an error.
     """
 
     def asset_url(name: str) -> str:
-        return f"/static/{name}?v={found[name].version}"
+        return f"/static/{name}?v={static[name].version}"
 
     env = Environment(
         loader=PackageLoader("pbrs_farm.board", "templates"),
@@ -46,10 +45,7 @@ def environment(found: Mapping[str, Asset]) -> Environment:
 
 
 def page(request: Request, template: str, status: int = 200, **values: Any) -> HTMLResponse:
-    """The template filled with values and what every page shows (root, user, form word).
-
-    template: of board/templates; every value is escaped. status: of HTTP.
-    """
+    """A template of board/templates with values and those of every page (root, user, form word)."""
     board = request.app.state.board
     session = request.scope.get("session", "")
     common = {
@@ -67,50 +63,47 @@ def page(request: Request, template: str, status: int = 200, **values: Any) -> H
 
 
 def _root_name(url: str) -> str:
-    """What a root is called: a folder by its own name, as whoever looks needs no path of this machine."""
+    """Name of a root: of a folder its last part, without the path on this machine."""
     if url.startswith("file://"):
         return unquote(url.rstrip("/").rpartition("/")[2])
     return url
 
 
 def home_url(house: str, rest: str = "") -> str:
-    """The address of a home's page, or of what lies below it."""
+    """Address of a home's page, or of a file below it."""
     return f"/homes/{quote(house, safe='')}{rest}"
 
 
 def view_url(house: str, view: str, rest: str = "") -> str:
-    """The address of a view's page, or of what lies below it."""
+    """Address of a view's page, or of a file below it."""
     return f"{home_url(house)}/views/{quote(view, safe='')}{rest}"
 
 
 def thumb_url(view: ListedView, layer: str) -> str:
-    """The address of a view's thumbnail; it changes with the house's files, so it can be kept.
-
-    Use it for every link to a thumbnail: an address without the version may show an old picture.
-    """
+    """Address of a view's thumbnail, with the version of the house's files."""
     return view_url(view.house, view.id, f"/thumb/{layer}.jpg?v={quote(view.version, safe='')}")
 
 
 def confirm_url(what: str, of: str) -> str:
-    """The address of the question before something is done to a job or worker."""
+    """Address of the confirmation of an action on a job or worker."""
     return f"/farm/confirm?{urlencode({'what': what, 'of': of})}"
 
 
 def log_url(job: str, task: str) -> str:
-    """The address of a task's log."""
+    """Address of a task's log."""
     return f"/farm/jobs/{job}/log?{urlencode({'task': task})}"
 
 
 def page_numbers(number: int, n_pages: int) -> list[int]:
-    """The numbers of pages that a page links: first, last and those beside it; 0 = a gap.
+    """Numbers of the linked pages: the first, the last and near ones; 0 = a gap.
 
     >>> page_numbers(5, 9)
     [1, 0, 3, 4, 5, 6, 7, 0, 9]
     """
     near = range(number - _MAX_PAGES_SHOWN, number + _MAX_PAGES_SHOWN + 1)
-    wanted = sorted({1, n_pages, *near} & set(range(1, n_pages + 1)))
+    linked = sorted({1, n_pages, *near} & set(range(1, n_pages + 1)))
     numbers: list[int] = []
-    for k in wanted:
+    for k in linked:
         if numbers and k > numbers[-1] + 1:
             numbers.append(0)
         numbers.append(k)

@@ -1,45 +1,33 @@
-"""Every viewpoint that the sampler tried in a stored house, with its verdict. Effects: a process.
+"""All viewpoints that the sampler tried in a stored house, with verdicts. Effects: a process.
 
-The root keeps how many candidates each rule refused, not where they were: they are sampled again
-from the stored house, recipe and seed, which gives the same ones. In a process of its own, since
-the ray caster keeps much memory: `python -m` this module, STORE HOUSE, writes JSON to stdout.
+The root has only the number of refused candidates, so they are sampled again from the stored house,
+recipe and seed. `python -m` this module STORE HOUSE writes JSON to stdout.
 """
 
 from __future__ import annotations
 
 import json
-import subprocess
 import sys
 from typing import Any, Final
 
+from pbrs_farm.board.module_process import output_of_module
 from pbrs_farm.core.errors import BadInput, PbrsError
 from pbrs_farm.store.object_store import Store
 
-MAX_CANDIDATES: Final = 40_000  # that a browser is given
+MAX_CANDIDATES: Final = 40_000  # maximum number sent to a browser
 _TIMEOUT_S: Final = 300.0
 
 
 def candidates_in_process(store_url: str, house: str) -> bytes:
-    """The JSON of `candidates`, made by a process of its own. Raises BadInput with what it said.
-
-    Sampling loads ray casters and takes seconds; a process of its own keeps the server small.
-    BadInput as well where it takes too long.
-    """
-    command = [sys.executable, "-m", "pbrs_farm.board.pages.tried_viewpoints", store_url, house]
-    try:
-        done = subprocess.run(command, capture_output=True, timeout=_TIMEOUT_S, check=False)
-    except subprocess.TimeoutExpired:
-        raise BadInput(house, "", f"took more than {_TIMEOUT_S:.0f} s") from None
-    if done.returncode != 0:
-        lines = done.stderr.decode("utf-8", "replace").strip().splitlines()
-        raise BadInput(house, "", lines[-1] if lines else f"exit code {done.returncode}")
-    return done.stdout
+    """The JSON of `candidates` from another process. Raises BadInput if that fails."""
+    module = "pbrs_farm.board.pages.tried_viewpoints"
+    return output_of_module(module, [store_url, house], subject=house, timeout_s=_TIMEOUT_S)
 
 
 def candidates(store: Store, house_id: str) -> dict[str, Any]:
-    """Verdicts by number, rooms, and a row per candidate: x, y, z, verdict, room's place.
+    """Verdicts by number, rooms, and a row per candidate: x, y, z, verdict, index of its room.
 
-    Raises PbrsError where the house, its recipe or what the sampler needs is missing.
+    Raises PbrsError if the house, its recipe or an input of the sampler is missing.
     """
     from pbrs_farm.core import keys
     from pbrs_farm.core.recipe import recipe_from_json
@@ -61,7 +49,7 @@ def candidates(store: Store, house_id: str) -> dict[str, Any]:
         for k, trace in enumerate(sampling.traces)
         for eye, verdict in zip(trace.candidates.eye, trace.verdict, strict=True)
     ]
-    # Too many for a browser: every n-th of them.
+    # Send at most MAX_CANDIDATES, evenly spaced.
     step = -(-len(rows) // MAX_CANDIDATES) or 1
     return {
         "verdicts": [v.label for v in Verdict],
@@ -78,11 +66,11 @@ def main(words: list[str]) -> int:
 
     url, house = words
     try:
-        found = candidates(store_from_url(url, settings_from_environment().store), house)
+        answer = candidates(store_from_url(url, settings_from_environment().store), house)
     except PbrsError as error:
         sys.stderr.write(f"{error}\n")
         return 1
-    sys.stdout.write(json.dumps(found, separators=(",", ":")))
+    sys.stdout.write(json.dumps(answer, separators=(",", ":")))
     return 0
 
 

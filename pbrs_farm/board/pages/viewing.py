@@ -1,7 +1,7 @@
-"""A view's page and the files it loads. Effects: reads the index and the store, makes pictures.
+"""A view's page and its files. Effects: reads the index and the store, makes pictures.
 
-Every file is found by the view's ids in the index and by a layer's name in core/layers.py: no part
-of an address becomes a part of a path otherwise.
+Files are looked up by ids in the index and names in core/layers.py; no other part of an address
+becomes part of a path.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 import gzip
 import json
 import math
+from collections.abc import Callable
 from typing import Any, Final
 
 import numpy as np
@@ -30,34 +31,34 @@ from pbrs_farm.formats.layer_file import layer_from_bytes
 from pbrs_farm.gallery.label_colours import instance_colours
 from pbrs_farm.store.object_store import content_type
 
-FOREVER: Final = "private, max-age=31536000, immutable"  # of an address that holds a version
+FOREVER: Final = "private, max-age=31536000, immutable"  # for addresses with a version
 _STEPS: Final = ("truth", "opengl_dl", "opengl_il", "light", "develop", "view")
 
 
 def view(request: Request) -> Response:
     """GET /homes/HOUSE/views/VIEW: a view with all its layers."""
-    found = asked_view(request)
+    entry = asked_view(request)
     board = board_of(request)
-    facts = board.reader.json_object(keys.view_key(found.house, found.id, "view.json"))
-    # Light is no picture: it is shown by relighting.
+    facts = board.reader.json_object(keys.view_key(entry.house, entry.id, "view.json"))
+    # Light is shown on the page Relight only.
     layers = [
         {"name": x.name, "title": x.shown_title, "label": x.is_label, "unit": x.unit}
         for x in LAYERS
-        if found.has(x.name) and x.shown_as
+        if entry.has(x.name) and x.shown_as
     ]
-    before, after = board.queries.neighbours(found.house, found.id)
+    before, after = board.queries.neighbours(entry.house, entry.id)
     return page(
         request,
         "view.html",
-        view=found,
-        home=board.queries.home(found.house),
+        view=entry,
+        home=board.queries.home(entry.house),
         layers=layers,
-        first=found.shown_layer() or "",
+        first=entry.shown_layer() or "",
         instances=_instances(facts),
         facts=_camera_facts(facts),
         recipe=recipe_words(board.reader),
-        seconds=_seconds(board.reader, found),
-        files=_stored_file_rows(board.reader, found),
+        seconds=_seconds(board.reader, entry),
+        files=_stored_file_rows(board.reader, entry),
         before=before,
         after=after,
         words=_words(facts),
@@ -66,94 +67,70 @@ def view(request: Request) -> Response:
 
 
 def thumb(request: Request) -> Response:
-    """GET .../thumb/LAYER.jpg: a layer small, made once.
-
-    404 for a layer that the view does not have. May be kept for ever, as the address has the
-    version of the house's files.
-    """
-    found, layer = asked_view(request), _asked_layer(request)
-
-    def make() -> bytes:
-        return thumbnail_jpeg(layer, *_stored(board_of(request).reader, found, layer))
-
-    return _picture_response(request, found, ("thumb", layer), "jpg", make)
+    """GET .../thumb/LAYER.jpg: thumbnail of a layer, cached; 404 without the layer."""
+    return _picture_response(request, "thumb", "jpg", thumbnail_jpeg)
 
 
 def shown(request: Request) -> Response:
-    """GET .../shown/LAYER.png: a layer at its full size, labels as colours.
-
-    A photograph is sent as it is stored; labels become colours once and are kept. 404 for a layer
-    that the view does not have.
-    """
-    found, layer = asked_view(request), _asked_layer(request)
-
-    def make() -> bytes:
-        return shown_png(layer, *_stored(board_of(request).reader, found, layer))
-
-    # A photograph is its own file.
+    """GET .../shown/LAYER.png: a layer at full size, labels as colours; 404 without the layer."""
+    layer = _asked_layer(request)
     if LAYER[layer].is_photo:
-        data, _key = _stored(board_of(request).reader, found, layer)
+        data, _key = _stored(board_of(request).reader, asked_view(request), layer)
         return Response(data, media_type="image/png", headers={"Cache-Control": FOREVER})
-    return _picture_response(request, found, ("shown", layer), "png", make)
+    return _picture_response(request, "shown", "png", shown_png)
 
 
 def file(request: Request) -> Response:
-    """GET .../file/LAYER: the stored file of a layer, to be saved.
-
-    Sent piece by piece, so a large file needs no memory; 404 above the board's limit for files.
-    """
-    found, layer = asked_view(request), _asked_layer(request)
+    """GET .../file/LAYER: download of the file of a layer; 404 above the board's limit."""
+    entry, layer = asked_view(request), _asked_layer(request)
     board = board_of(request)
-    key = keys.view_key(found.house, found.id, LAYER[layer].file)
+    key = keys.view_key(entry.house, entry.id, LAYER[layer].file)
     try:
         n_bytes, pieces = board.reader.pieces(key, board.options.limits.file_bytes)
     except PbrsError:
         raise HTTPException(404, "This file is not in the root any more.") from None
-    name = f"{found.house}-{found.id}-{LAYER[layer].file.replace('/', '-')}"
+    name = f"{entry.house}-{entry.id}-{LAYER[layer].file.replace('/', '-')}"
     headers = {**_saved_as(name), "Content-Length": str(n_bytes)}
     return StreamingResponse(pieces, media_type=content_type(name), headers=headers)
 
 
 def view_json(request: Request) -> Response:
-    """GET .../view.json: the view's own description, to be saved."""
-    found = asked_view(request)
-    key = keys.view_key(found.house, found.id, "view.json")
+    """GET .../view.json: download of the view's description."""
+    entry = asked_view(request)
+    key = keys.view_key(entry.house, entry.id, "view.json")
     data = board_of(request).reader.get_or_none(key)
     if data is None:
         raise HTTPException(404, "This view has no view.json yet.")
-    return download(data, f"{found.house}-{found.id}-view.json")
+    return download(data, f"{entry.house}-{entry.id}-view.json")
 
 
 def pixels(request: Request) -> Response:
-    """GET .../pixels: the labels of every pixel (board/pictures.py).
-
-    A layer that is damaged is left out, and the page then says nothing of it. Packed with gzip.
-    """
-    found = asked_view(request)
+    """GET .../pixels: the labels of every pixel (board/pictures.py), without damaged layers."""
+    entry = asked_view(request)
     arrays: dict[str, Any] = {}
     for layer, *_ in PLANES:
-        if found.has(layer):
+        if entry.has(layer):
             try:
-                data, key = _stored(board_of(request).reader, found, layer)
+                data, key = _stored(board_of(request).reader, entry, layer)
                 arrays[layer] = layer_from_bytes(layer, data, key)
             except (PbrsError, HTTPException):
-                continue  # damaged: the probe says nothing of it
+                continue
     return gzip_response(packet(arrays))
 
 
 def gzip_response(data: bytes, cache: str = FOREVER) -> Response:
-    """Bytes that a script reads, packed on the way."""
+    """Bytes for a script, compressed."""
     headers = {"Content-Encoding": "gzip", "Cache-Control": cache}
     return Response(gzip.compress(data, 1, mtime=0), headers=headers)
 
 
 def download(data: bytes, name: str) -> Response:
-    """Bytes that a browser saves under a name and never shows."""
+    """A download with a file name."""
     return Response(data, media_type=content_type(name), headers=_saved_as(name))
 
 
 def _saved_as(name: str) -> dict[str, str]:
-    # A key's segments hold no quote and no line end; what is not ASCII is not ours.
+    # Segments of keys have neither quotes nor line ends.
     ascii_name = name.encode("ascii", "replace").decode().replace('"', "_")
     return {"Content-Disposition": f'attachment; filename="{ascii_name}"'}
 
@@ -165,9 +142,9 @@ def _asked_layer(request: Request) -> str:
     return layer
 
 
-def _stored(reader: RootReader, found: ListedView, layer: str) -> tuple[bytes, str]:
-    """A layer's bytes and their key; 404 where the view has none."""
-    key = keys.view_key(found.house, found.id, LAYER[layer].file)
+def _stored(reader: RootReader, entry: ListedView, layer: str) -> tuple[bytes, str]:
+    """Bytes of a layer and their key; 404 without the layer."""
+    key = keys.view_key(entry.house, entry.id, LAYER[layer].file)
     data = reader.get_or_none(key, MAX_PICTURE_BYTES)
     if data is None:
         raise HTTPException(404, "This view has no such layer.")
@@ -175,23 +152,26 @@ def _stored(reader: RootReader, found: ListedView, layer: str) -> tuple[bytes, s
 
 
 def _picture_response(
-    request: Request, found: ListedView, what: tuple[str, ...], ending: str, make: Any
+    request: Request, kind: str, ending: str, draw: Callable[[str, bytes, str], bytes]
 ) -> Response:
-    words = (*what, found.house, found.id, found.version)
+    """A cached picture of the requested layer; draw: layer, bytes and key -> picture."""
+    entry, layer = asked_view(request), _asked_layer(request)
+    board, words = board_of(request), (kind, layer, entry.house, entry.id, entry.version)
     try:
-        data = board_of(request).pictures.get(words, ending, make)
+        data = board.pictures.get(
+            words, ending, lambda: draw(layer, *_stored(board.reader, entry, layer))
+        )
     except (BadInput, ValueError, IndexError):
         raise HTTPException(422, "This layer cannot be read.") from None
-    kind = "image/jpeg" if ending == "jpg" else "image/png"
-    return Response(data, media_type=kind, headers={"Cache-Control": FOREVER})
+    media_type = "image/jpeg" if ending == "jpg" else "image/png"
+    return Response(data, media_type=media_type, headers={"Cache-Control": FOREVER})
 
 
 def _instances(facts: dict[str, Any]) -> list[dict[str, Any]]:
-    """The rows of a view.json's instances that have what the page shows, the largest first."""
-    # A stranger's view.json may hold anything: rows without id or box are left out.
+    """Instances of a view.json, largest first, without damaged rows."""
     rows = facts.get("instances")
-    good = [r for r in rows if isinstance(r, dict)] if isinstance(rows, list) else []
-    kept = [r for r in good if isinstance(r.get("id"), int) and _is_box(r.get("box2d"))]
+    dicts = [r for r in rows if isinstance(r, dict)] if isinstance(rows, list) else []
+    valid = [r for r in dicts if isinstance(r.get("id"), int) and _is_box(r.get("box2d"))]
     return sorted(
         (
             {
@@ -203,17 +183,17 @@ def _instances(facts: dict[str, Any]) -> list[dict[str, Any]]:
                 "truncated": bool(r.get("truncated")),
                 "box": r["box2d"],
             }
-            for r in kept
+            for r in valid
         ),
         key=lambda r: -r["share"],
     )
 
 
 def _packed_instances(facts: dict[str, Any]) -> list[list[Any]]:
-    """Of each instance what the page's script needs: id, name, class, box, colour."""
+    """Id, name, class, box and colour of each instance, for the page's script."""
     rows = _instances(facts)
     ids = np.array([[r["id"] for r in rows]], np.int64) if rows else np.zeros((1, 0), np.int64)
-    # Ids of a stranger's view.json may be any number: only those of an instance layer have colours.
+    # Ids outside of the range of an instance layer have no colour.
     ids = np.where((ids < 0) | (ids > 65535), 0, ids)
     colours = instance_colours(ids)[0].tolist() if rows else []
     return [
@@ -231,30 +211,29 @@ def _number(value: Any) -> float:
 
 
 def _camera_facts(facts: dict[str, Any]) -> list[tuple[str, str]]:
-    """What is worth reading of a view.json, as name and text."""
+    """(name, text) of the facts in a view.json for the page."""
     rows = [(name, facts.get(name)) for name in ("room", "sector", "origin", "score")]
-    # What light was made with stands below its mode; views of OpenGL alone have none.
     size = f"{facts.get('width_px')} x {facts.get('height_px')} px"
     light = _object(_object(facts, "modes"), "light")
     lux, noise = _object(light, "floor_lux"), _object(light, "noise")
     rows += [
         ("size", size if "width_px" in facts else None),
         ("integrator", light.get("integrator")),
-        ("samples a pixel", light.get("spp")),
+        ("samples per pixel", light.get("spp")),
         ("noise", _rounded(noise.get("sum"))),
         ("floor, lamps", _with_unit(lux.get("indoor"), "lx")),
         ("floor, daylight", _with_unit(lux.get("outdoor"), "lx")),
         ("seed", light.get("seed")),
-        ("recipe's digest", facts.get("recipe")),
+        ("recipe digest", facts.get("recipe")),
     ]
     return [(name, str(value)) for name, value in rows if value not in (None, "")]
 
 
 def _words(facts: dict[str, Any]) -> list[tuple[str, str]]:
-    """What the words of a view's page mean, of those that it shows."""
+    """Glossary of a view's page."""
     named = {name for name, _text in _camera_facts(facts)}
     if _instances(facts):
-        named |= {"share", "visible", "cut"}
+        named |= {"share", "visible", "cropped"}
     return listed(named, OF_A_VIEW)
 
 
@@ -271,22 +250,21 @@ def _with_unit(value: Any, unit: str) -> str | None:
     return f"{_number(value):.0f} {unit}" if value is not None else None
 
 
-def _seconds(reader: RootReader, found: ListedView) -> list[tuple[str, float, str]]:
-    """(step, seconds, worker) of the view's steps that are done."""
-    # A step that is not done, or whose marker is damaged, has no row.
+def _seconds(reader: RootReader, entry: ListedView) -> list[tuple[str, float, str]]:
+    """(step, seconds, worker) of the view's finished steps."""
     rows = []
     for step in _STEPS:
-        marker = reader.json_object(keys.marker_key(found.house, step, found.id))
+        marker = reader.json_object(keys.marker_key(entry.house, step, entry.id))
         if marker:
             rows.append((step, _number(marker.get("seconds")), str(marker.get("worker", ""))))
     return rows
 
 
-def _stored_file_rows(reader: RootReader, found: ListedView) -> list[tuple[str, str, int]]:
-    """(layer, file, bytes) of what can be saved."""
+def _stored_file_rows(reader: RootReader, entry: ListedView) -> list[tuple[str, str, int]]:
+    """(layer, file, bytes) of the downloads."""
     sizes = (
-        (x.name, x.file, reader.size(keys.view_key(found.house, found.id, x.file)))
+        (x.name, x.file, reader.size(keys.view_key(entry.house, entry.id, x.file)))
         for x in LAYERS
-        if found.has(x.name)
+        if entry.has(x.name)
     )
     return [(name, file, n) for name, file, n in sizes if n is not None]

@@ -6,7 +6,7 @@ if (live) listen();
 function listen() {
   const source = new EventSource(live.dataset.events);
   source.addEventListener("open", () => (live.textContent = "live"));
-  source.addEventListener("error", () => (live.textContent = "not connected, trying again"));
+  source.addEventListener("error", () => (live.textContent = "not connected, retrying"));
   source.addEventListener("message", (event) => {
     for (const [id, html] of Object.entries(JSON.parse(event.data))) {
       const element = document.getElementById(id);

@@ -151,7 +151,7 @@ class HousePage {
         this.rooms.get(id).visible = isOn;
         this.draw();
       })),
-      switchOf("Walls and the rest", true, "", (isOn) => {
+      switchOf("Walls and other objects", true, "", (isOn) => {
         const group = this.rooms.get(null);
         if (group) group.visible = isOn;
         this.draw();
@@ -177,11 +177,11 @@ class HousePage {
 
   async #showCandidates() {
     by("candidates").disabled = true;
-    by("candidates-status").textContent = "The sampler tries every viewpoint again…";
+    by("candidates-status").textContent = "Sampling all viewpoints again…";
     try {
       const found = await got("candidates.json").then((answer) => answer.json());
       this.#drawCandidates(found);
-      by("candidates-status").textContent = `${found.n.toLocaleString()} viewpoints were tried.`;
+      by("candidates-status").textContent = `${found.n.toLocaleString()} viewpoints tried.`;
       by("candidates").hidden = true;
     } catch (error) {
       by("candidates-status").textContent = error.message;

@@ -209,7 +209,7 @@ function controlsOf(light, said, onChange) {
   const rows = [{ name: "outdoor", flag: "--outdoor ", title: "Daylight", note: "sky and sun" }];
   rows.push({ name: "indoor", flag: "--indoor ", title: "All lamps", note: "" });
   for (const lamp of light.lamps) {
-    const note = lamp.layer ? `${(100 * lamp.share).toFixed(0)} % of lamp light` : "lights nothing here";
+    const note = lamp.layer ? `${(100 * lamp.share).toFixed(0)} % of lamp light` : "no light here";
     rows.push({ name: `lamp${lamp.number}`, flag: `--lamp ${lamp.number}=`, title: `${lamp.number} ${lamp.name}`, note, isDark: !lamp.layer });
   }
   return rows.map((row) => controlOf(row, said.get(row.name), onChange));
