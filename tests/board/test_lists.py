@@ -46,7 +46,7 @@ def test_the_first_page_lists_homes_with_their_credit(client: httpx.Client) -> N
     assert "Home a-1" in page
     assert "3 views, 2 rooms" in page
     assert page.count("by A. Person") == 1
-    assert "No home has that name" in client.get("/?words=zzz").text
+    assert "No home matches" in client.get("/?words=zzz").text
 
 
 @pytest.mark.parametrize(

@@ -55,7 +55,7 @@ def read_views(place: str, size: Size, *, mode: str = "", most: int = 0) -> Pict
     Raises BadInput for a place with fewer than two readable views.
     """
     frames = evenly_spaced(_frames(place), most)
-    pictures, left_out = _read(
+    pictures, left_out = _readable_pictures(
         place, [partial(_facts_of_frame, frame, size, mode) for frame in frames]
     )
     homes = {frame.ref.house for frame in frames}
@@ -115,7 +115,7 @@ def read_photographs(place: Path, size: Size, *, most: int = 0) -> PictureSet:
         chosen = evenly_spaced(files, most)
         readers = [partial(_facts_of_photograph, path, place, size) for path in chosen]
         note = "The photographs have no depth: appearance alone is compared."
-    pictures, left_out = _read(str(place), readers)
+    pictures, left_out = _readable_pictures(str(place), readers)
     has_normals = any("normals" in picture.histograms for picture in pictures)
     return PictureSet(str(place), pictures, left_out, notes=() if has_normals else (note,))
 
@@ -140,7 +140,7 @@ def _group_of(name: str) -> str:
     return name.rpartition("/")[0] or name
 
 
-def _read(
+def _readable_pictures(
     place: str, readers: Sequence[Callable[[], PictureFacts]]
 ) -> tuple[tuple[PictureFacts, ...], tuple[str, ...]]:
     """Statistics of the readable pictures, and a line for each other one; BadInput for too few."""

@@ -154,26 +154,26 @@ def _medians(a: Sequence[PictureFacts], b: Sequence[PictureFacts]) -> list[dict[
     """Median of each number that both sets have."""
     rows = []
     for name, title, _, _ in NUMBERS:
-        ours, photographs = _numbers(a, name), _numbers(b, name)
+        ours, photographs = _values_of(a, name), _values_of(b, name)
         if len(ours) and len(photographs):
-            rows.append({"title": title} | _pair(np.median(ours), np.median(photographs)))
+            rows.append({"title": title} | _both_sets(np.median(ours), np.median(photographs)))
     return rows
 
 
-def _numbers(pictures: Sequence[PictureFacts], name: str) -> F64:
+def _values_of(pictures: Sequence[PictureFacts], name: str) -> F64:
     return np.array([picture.numbers[name] for picture in pictures if name in picture.numbers])
 
 
-def _pair(ours: Any, photographs: Any) -> dict[str, float]:
+def _both_sets(ours: Any, photographs: Any) -> dict[str, float]:
     return {"views": float(ours), "photographs": float(photographs)}
 
 
 def _kinds(a: Sequence[PictureFacts], b: Sequence[PictureFacts]) -> list[dict[str, Any]]:
     """Mean share of each kind of surface; [] if a set has no normals."""
-    if not all(len(_numbers(pictures, KINDS[0])) for pictures in (a, b)):
+    if not all(len(_values_of(pictures, KINDS[0])) for pictures in (a, b)):
         return []
-    means = ((kind, *(_numbers(pictures, kind).mean() for pictures in (a, b))) for kind in KINDS)
-    return [{"name": kind} | _pair(*pair) for kind, *pair in means]
+    means = ((kind, *(_values_of(pictures, kind).mean() for pictures in (a, b))) for kind in KINDS)
+    return [{"name": kind} | _both_sets(*pair) for kind, *pair in means]
 
 
 def mean_histogram(pictures: Sequence[PictureFacts], name: str) -> F64 | None:
@@ -189,7 +189,7 @@ def _classes(a: Sequence[PictureFacts], b: Sequence[PictureFacts]) -> list[dict[
         return []
     order = np.argsort(-np.abs(ours - photographs), kind="stable")
     return [
-        {"name": NYU40_NAMES[k]} | _pair(ours[k], photographs[k])
+        {"name": NYU40_NAMES[k]} | _both_sets(ours[k], photographs[k])
         for k in order.tolist()
         if k and (ours[k] or photographs[k])
     ]
@@ -213,7 +213,7 @@ def _reasons(view: PictureFacts, photographs: Sequence[PictureFacts]) -> tuple[s
     """The view's numbers outside those of nearly all photographs, largest difference first."""
     reasons: list[tuple[float, str]] = []
     for name, _, less, more in NUMBERS:
-        values = _numbers(photographs, name)
+        values = _values_of(photographs, name)
         if name not in view.numbers or len(values) < 2:
             continue
         value = view.numbers[name]

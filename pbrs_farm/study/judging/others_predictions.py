@@ -66,7 +66,7 @@ def predictions_in(
             text = f"no prediction of {id}: {_prediction_names(id, kind)[0]} and the like"
             raise BadInput(others.folder, "", text, hint="all pictures of a place, or none")
     return (
-        _fitted(_read_prediction(file, task), size)
+        _cropped_to_size(_read_prediction(file, task), size)
         for file, size in zip(files, views.sizes, strict=True)
         if file is not None
     )
@@ -127,7 +127,7 @@ def _checked(array: NDArray[Any], path: Path, task: StudyTask) -> NDArray[Any]:
     return values
 
 
-def _fitted(prediction: NDArray[Any], size: tuple[int, int]) -> NDArray[Any]:
+def _cropped_to_size(prediction: NDArray[Any], size: tuple[int, int]) -> NDArray[Any]:
     """The middle of a prediction at (height, width)."""
     height, width = size
     rows, columns = middle_of_form(prediction.shape[0], prediction.shape[1], width, height)

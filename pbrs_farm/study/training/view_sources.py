@@ -217,10 +217,10 @@ def _real_views(folders: Sequence[Photographs], plan: TrainingPlan) -> ViewArray
 
 def missing_of(source: TrainingSource) -> list[str]:
     """The names in hold_out without a home."""
-    return _missing(source, [open_views(place) for place in source.places])
+    return _unknown_homes(source, [open_views(place) for place in source.places])
 
 
-def _missing(source: TrainingSource, sets: Sequence[Views]) -> list[str]:
+def _unknown_homes(source: TrainingSource, sets: Sequence[Views]) -> list[str]:
     houses = {ref.house for views in sets for ref in views.refs}
     return sorted((source.hold_out or frozenset()) - houses - {home_of(house) for house in houses})
 
@@ -236,7 +236,7 @@ def _pictures(
     source: TrainingSource, plan: TrainingPlan, *, held_out: bool, most: int
 ) -> tuple[Picture, ...]:
     sets = [_finished(open_views(place), source, plan) for place in source.places]
-    unknown = _missing(source, sets)
+    unknown = _unknown_homes(source, sets)
     if unknown and source.all_there:
         raise BadInput("--hold-out", unknown[0], f"no such home in {source.name}")
     frames = [view for views in sets for view in views if is_held_out(view, source) == held_out]
