@@ -12,12 +12,13 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
-from pydantic import BaseModel, ValidationError
+from pydantic import ValidationError
 
 from pbrs_farm.core.camera import View
 from pbrs_farm.core.checked_json import place_in, sentence
 from pbrs_farm.core.house import House
 from pbrs_farm.core.recipe import CAMERA_SOURCES, CameraFields
+from pbrs_farm.core.record import Record
 from pbrs_farm.sample.camera_report import CameraReport
 
 if TYPE_CHECKING:
@@ -94,7 +95,8 @@ class CameraSource:
 
     name: with `_` for dashes, the name of its module. views: pure: equal requests give equal views.
     help: a phrase for the documentation. use: how users select it; "" = `--cameras NAME`.
-    options: a model of its own options, given as `--cameras orbit,turns=2`. parse: of a source that
+    options: a Record with a field for each of its options (core/options.py), given as
+    `--cameras orbit,turns=2`. parse: of a source that
     needs a user's file (`--cameras NAME,file=PATH`): the text of the file and the fields -> content;
     raises BadInput for a damaged file. is_sequence: views are the frames of a film, in order; None if
     they may be. is_ranked: views are chosen by rules, so that those of dark rooms are left out.
@@ -105,7 +107,7 @@ class CameraSource:
     views: Callable[[CameraRequest], Sampling]
     help: str
     use: str = ""
-    options: type[BaseModel] | None = None
+    options: type[Record] | None = None
     parse: Callable[[str, CameraFields], Any] | None = None
     is_sequence: bool | None = False
     is_ranked: bool = False
@@ -116,7 +118,7 @@ class CameraSource:
         """True if it needs a user's file."""
         return self.parse is not None
 
-    def options_of(self, word: str) -> BaseModel | None:
+    def options_of(self, word: str) -> Record | None:
         """The options of a word `NAME,key=value,...`; ValueError naming the one that does not fit."""
         pairs = [part.partition("=") for part in word.split(",")[1:]]
         if self.options is None:
@@ -141,7 +143,9 @@ def sources_table() -> str:
     rows = ["| `cameras.source` | viewpoints | use |", "|---|---|---|"]
     for name in CAMERA_SOURCES.own_names():
         entry = CAMERA_SOURCES.entry(name)
-        rows.append(f"| `{name}` | {entry.help} | {entry.use or f'`--cameras {name}`'} |")
+        fields = {} if entry.options is None else entry.options.model_fields
+        options = "".join(f"; `{key}`: {field.description}" for key, field in fields.items())
+        rows.append(f"| `{name}` | {entry.help}{options} | {entry.use or f'`--cameras {name}`'} |")
     return "\n".join(rows)
 
 

@@ -54,14 +54,14 @@ def test_an_unknown_source_or_option_is_named(path: str, value: str, text: str) 
 
 
 MINE = """
-from pydantic import BaseModel, Field
-
 from pbrs_farm.core.camera import Camera, Intrinsics, View
+from pbrs_farm.core.options import option
+from pbrs_farm.core.record import Record
 from pbrs_farm.sample.camera_source import CameraSource, Sampling
 
 
-class Options(BaseModel, extra="forbid"):
-    turns: int = Field(1, ge=1)
+class Options(Record):
+    turns: int = option(1, "times round the room", ge=1)
 
 
 def views(request):
@@ -98,7 +98,8 @@ def test_a_file_is_all_that_a_new_source_takes(
     check_layers(Wanted(tracks=True), recipe)
     rows = [("frame_00000", "a", 1.0), ("frame_00001", "a", 2.0)]
     assert chosen_views(rows, 1, recipe) == ["frame_00000"]
-    assert "| `orbit` | a circle in the first room | `--cameras orbit` |" in sources_table()
+    text = "a circle in the first room; `turns`: times round the room"
+    assert f"| `orbit` | {text} | `--cameras orbit` |" in sources_table()
     p = argparse.ArgumentParser("run")
     p.add_argument("--cameras")
     assert "orbit" in completion_script("bash", {"run": p})

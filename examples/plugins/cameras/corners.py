@@ -8,23 +8,24 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from pydantic import BaseModel, Field
 
 from pbrs_farm.plugin import (
     Camera,
     CameraRequest,
     CameraSource,
     Intrinsics,
+    Record,
     Sampling,
     View,
+    option,
     view_id,
 )
 
 
-class Options(BaseModel, extra="forbid"):
+class Options(Record):
     """Options of `--cameras corners,...`."""
 
-    height_m: float = Field(1.5, gt=0, le=3)  # of the eye above the floor
+    height_m: float = option(1.5, "height of the eye above the floor", ge=0.1, le=3)
 
 
 def corners(request: CameraRequest) -> Sampling:
