@@ -16,11 +16,11 @@ from pbrs_farm.core.house import House
 from pbrs_farm.core.recipe import CameraFields, LensFields, RigFields
 from pbrs_farm.core.shot import Shot, view_id
 from pbrs_farm.core.table import Table
+from pbrs_farm.gallery.notebook_html import MOST_SHOWN, figure_html
 from pbrs_farm.run.chosen_cameras import with_lens
 from pbrs_farm.sample.camera_report import CameraReport
 from pbrs_farm.sample.house_sampler import add_rig_views
 from pbrs_farm.sample.stored_cameras import OUTSIDE, room_of, sector_of
-from pbrs_farm.views.views import MOST_SHOWN, figure_html
 
 if TYPE_CHECKING:
     from pbrs_farm.scene.home import Home

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import base64
-import html
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import Any, Final, Protocol, overload
+from typing import Any, Protocol, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,11 +21,6 @@ from pbrs_farm.core.table import Table
 from pbrs_farm.formats.class_map import ClassMap, class_map
 from pbrs_farm.views.stored_layers import ViewFacts
 from pbrs_farm.views.view_sample import MODES, Sample, SampleRequest
-
-_PICTURE_PX: Final = 320  # of a picture in a notebook
-_THUMB_PX: Final = 160  # of one among many
-MOST_SHOWN: Final = 24
-"""Pictures of a sheet in a notebook."""
 
 
 @dataclass(frozen=True, slots=True, order=True)
@@ -367,9 +360,9 @@ class Frame:
         return f"<Frame {self.id} {width}x{height}: {', '.join(self.layers)}>"
 
     def _repr_html_(self) -> str:
-        """The picture of each mode, for a notebook."""
-        cells = "".join(figure_html(m, self.picture(m), _PICTURE_PX) for m in self.modes)
-        return f"<div><code>{html.escape(self.id)}</code><br>{cells}</div>"
+        from pbrs_farm.gallery.notebook_html import frame_html
+
+        return frame_html(self)
 
     @checked_call
     def sample(self, request: SampleRequest | None = None) -> Sample:
@@ -470,11 +463,9 @@ class Views(Sequence[Frame]):
         return f"<{len(self)} frames of {len(self.homes)} homes in {self.source.url}>"
 
     def _repr_html_(self) -> str:
-        """Small pictures of at most MOST_SHOWN frames, spread over all, for a notebook."""
-        numbers = np.unique(np.linspace(0, len(self) - 1, min(len(self), MOST_SHOWN)).round())
-        cells = "".join(_small(self[int(k)]) for k in numbers)
-        part = f", {len(numbers)} of them shown" if len(numbers) < len(self) else ""
-        return f"<div><code>{html.escape(repr(self))}</code>{part}<br>{cells}</div>"
+        from pbrs_farm.gallery.notebook_html import views_html
+
+        return views_html(self)
 
     @property
     def homes(self) -> tuple[str, ...]:
@@ -554,27 +545,3 @@ def _nothing_left(split: str | None, n_found: int, left_out: dict[str, str]) -> 
         return f"no view{where}"
     at, why = next(iter(left_out.items()))
     return f"none of {n_found} views{where} has what was asked for: {at}: {why}"
-
-
-def _small(frame: Frame) -> str:
-    try:
-        return figure_html(frame.id, frame.colour, _THUMB_PX)
-    except BadInput as error:
-        # One that is damaged, or has labels alone, leaves the others to be seen.
-        return f"<p>{html.escape(str(error))}</p>"
-
-
-def figure_html(title: str, rgb: NDArray[np.uint8], width_px: int) -> str:
-    """A picture (H, W, 3) sRGB of that width with its title below, the bytes within the text.
-
-    For notebooks: a JPEG at twice the width, so not for reading pixel values. The title is escaped.
-    """
-    from pbrs_farm.images import jpeg_from_array, thumbnail
-
-    small = thumbnail(rgb, max_edge_px=2 * width_px)  # dense screens show two pixels as one
-    data = base64.b64encode(jpeg_from_array(small)).decode()
-    return (
-        f'<figure style="display:inline-block;margin:4px"><img width="{width_px}"'
-        f' src="data:image/jpeg;base64,{data}"><figcaption style="max-width:{width_px}px;'
-        f'overflow-wrap:anywhere">{html.escape(title)}</figcaption></figure>'
-    )
