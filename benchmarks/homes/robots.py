@@ -123,7 +123,7 @@ def measured(house: House) -> dict[str, Any]:
     parts_s = time.monotonic() - started
     row: dict[str, Any] = {"hull_mm": short, "over": over, "loads": 0, "pushed": 0, "jammed": []}
     row |= {"settle_mm": np.inf, "deepest_mm": np.inf, "fixed": 0}
-    row |= {"joints": sum(len(p.links) - 1 for p in home.pieces), "unlike": []}
+    row |= {"joints": sum(len(p.bodies) - 1 for p in home.pieces), "unlike": []}
     with tempfile.TemporaryDirectory() as scratch:
         folders = {form: Path(scratch) / form for form in ("mjcf", "urdf", "usd")}
         for form, folder in folders.items():
@@ -164,7 +164,7 @@ def pushed(model: Any, home: ExportedHome) -> tuple[int, list[str]]:
     scene = SceneTriangles(home.house.items)
     ways: dict[str, F64] = {}
     for k, piece in enumerate(home.pieces):
-        for link in piece.links[1:]:
+        for link in piece.bodies[1:]:
             joint = next(j for j in piece.item.joints if j.part == link.part)
             if free_value(scene, k, link.part, joint.upper)[1] == "":
                 ways[body_name(piece, link.part)] = _way(piece.item, joint)
@@ -221,7 +221,7 @@ def unlike(home: ExportedHome, folders: Mapping[str, Path]) -> list[str]:
     }
     found = []
     for piece in home.pieces:
-        for k, link in enumerate(piece.links[1:], 1):
+        for k, link in enumerate(piece.bodies[1:], 1):
             joint = next(j for j in piece.item.joints if j.part == link.part)
             for form, rows in read.items():
                 name = f"{piece.name}/{k}" if form == "usd" else body_name(piece, link.part)
@@ -291,7 +291,7 @@ def hull_distances(home: ExportedHome) -> tuple[float, list[float]]:
     """
     short, over = 0.0, []
     for piece in home.things:
-        for link in piece.links:
+        for link in piece.bodies:
             if not len(link.triangles):
                 continue
             points = surface_points(link.triangles, 0.02)

@@ -17,8 +17,8 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import F64, I64
 from pbrs_farm.core.house import corners_of_surfaces
 from pbrs_farm.core.mesh import lengths, unit_normals
+from pbrs_farm.export.home_files import z_up_points
 from pbrs_farm.export.home_pieces import ExportedHome, Piece
-from pbrs_farm.export.obj_files import z_up_points
 from pbrs_farm.geometry.surface_points import spread_points
 
 GRASPS: Final = "grasps.json"

@@ -35,8 +35,8 @@ def glb_of_pieces(
 ) -> bytes:
     """A GLB of some of the pieces with their materials alone.
 
-    with_lamps: as KHR_lights_punctual, candela. in_place False: one piece in its own frame, so that
-    equal things have equal bytes: the node does not say which item it is.
+    with_lamps: as KHR_lights_punctual, candela. in_place False: one piece in its own frame, without the
+    item's name, so that equal things have equal bytes.
     """
     writer = GlbWriter()
     # Number the materials and textures that are used.
@@ -70,11 +70,11 @@ def glb_of_pieces(
         roots.append(len(nodes))
         nodes.append(node)
         if with_lamps and piece.lamps:
-            inside = np.asarray(np.linalg.inv(piece.world_from_local), np.float64)
             children = range(len(nodes), len(nodes) + len(piece.lamps))
             node["children"] = list(children)
             nodes += [
-                _lamp_node(lamp, inside, len(lights) + k) for k, lamp in enumerate(piece.lamps)
+                _lamp_node(lamp, piece.local_from_world, len(lights) + k)
+                for k, lamp in enumerate(piece.lamps)
             ]
             lights += [_punctual_light(lamp) for lamp in piece.lamps]
     scene: dict[str, Any] = {"name": house.name} | ({"nodes": roots} if roots else {})
@@ -93,13 +93,13 @@ def glb_of_pieces(
 
 
 def _placement(world_from_local: F64) -> dict[str, Any]:
-    """Translation and rotation of a node; nothing where it stands as it is."""
-    found: dict[str, Any] = {}
+    """Translation and rotation of a node, without those that are the identity."""
+    placement: dict[str, Any] = {}
     if world_from_local[:3, 3].any():
-        found["translation"] = world_from_local[:3, 3].tolist()
+        placement["translation"] = world_from_local[:3, 3].tolist()
     if not np.array_equal(world_from_local[:3, :3], np.eye(3)):
-        found["rotation"] = Rotation.from_matrix(world_from_local[:3, :3]).as_quat().tolist()
-    return found
+        placement["rotation"] = Rotation.from_matrix(world_from_local[:3, :3]).as_quat().tolist()
+    return placement
 
 
 def _punctual_light(lamp: Lamp) -> dict[str, Any]:
@@ -115,14 +115,11 @@ def _punctual_light(lamp: Lamp) -> dict[str, Any]:
 
 
 def _lamp_node(lamp: Lamp, local_from_world: F64, light: int) -> dict[str, Any]:
-    place = local_from_world[:3, :3] @ lamp.position + local_from_world[:3, 3]
+    place, turn = lamp.placed(local_from_world)
     node: dict[str, Any] = {
         "name": f"light {light}", "translation": place.tolist(),
         "extensions": {_LIGHTS: {"light": light}},
     }  # fmt: skip
-    if lamp.spot:
-        # A light looks along its node's -z.
-        looks = local_from_world[:3, :3] @ np.array(lamp.spot[0])
-        turn, _ = Rotation.align_vectors([looks], [[0.0, 0.0, -1.0]])
+    if turn is not None:
         node["rotation"] = turn.as_quat().tolist()
     return node

@@ -14,13 +14,14 @@ from typing import Any, Final
 
 import numpy as np
 import shapely
+from scipy.spatial.transform import Rotation
 
-from pbrs_farm.core import classes, keys
+from pbrs_farm.core import classes
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.frames import transform_points
 from pbrs_farm.core.house import House, Item, ItemKind, LightPart, Material, Room, Surface
 from pbrs_farm.core.lighting import LightForm, flux_lm
-from pbrs_farm.export.home_links import Link, links_of
+from pbrs_farm.export.home_bodies import Body, bodies_of, box_inertia
 from pbrs_farm.geometry.heights import highest_below
 from pbrs_farm.geometry.scene_triangles import SceneTriangles
 from pbrs_farm.geometry.surface_points import surface_points
@@ -62,6 +63,14 @@ class Lamp:
     is_coloured: bool  # the source gives a colour, even if it is white
     spot: tuple[tuple[float, float, float], float] | None  # direction in the world, half angle rad
 
+    def placed(self, frame: F64) -> tuple[F64, Rotation | None]:
+        """Its position (3,) in a frame, and the turn of -z to a spot's direction; frame: (4, 4) from the world."""
+        place = frame[:3, :3] @ self.position + frame[:3, 3]
+        if self.spot is None:
+            return place, None
+        looks = frame[:3, :3] @ np.array(self.spot[0])
+        return place, Rotation.align_vectors([looks], [[0.0, 0.0, -1.0]])[0]
+
     @property
     def candela(self) -> float:
         """The intensity of a point, or within the cone of a spot.
@@ -101,31 +110,39 @@ class Piece:
         return classes.NYU40_NAMES[self.item.nyu40]
 
     @cached_property
-    def links(self) -> tuple[Link, ...]:
+    def local_from_world(self) -> F64:
+        """(4, 4) rigid."""
+        return np.asarray(np.linalg.inv(self.world_from_local), np.float64)
+
+    @cached_property
+    def bodies(self) -> tuple[Body, ...]:
         """Its body, and each part that a joint moves."""
-        local_from_world = np.asarray(np.linalg.inv(self.world_from_local), np.float64)
-        return links_of(self.surfaces, self.item, self.materials, local_from_world)
+        return bodies_of(self.name, self.surfaces, self.item, self.materials, self.local_from_world)
+
+    @property
+    def opens(self) -> bool:
+        """True if it has a part that a joint moves."""
+        return len(self.bodies) > 1
 
     @cached_property
     def colliders(self) -> tuple[F64, ...]:
-        """Convex parts (V, 3) of all its links, local; () of the building and of what has no surface.
+        """Convex parts (V, 3) of all its bodies, local; () of the building and of items without surfaces.
 
-        No part reaches more than 5 mm beyond the mesh, where 32 parts are enough; none is left out.
+        No part reaches more than 5 mm beyond the mesh, as long as 32 parts are enough; all are included.
         """
         if self.is_building:
             return ()
-        return tuple(part for link in self.links for part in link.colliders)
+        return tuple(part for body in self.bodies for part in body.colliders)
 
     @cached_property
     def mass_kg(self) -> float:
-        """Of all its links, no more than 150 kg."""
-        return min(sum(link.mass_kg for link in self.links), _MOST_KG)
+        """Of all its bodies, no more than 150 kg."""
+        return min(sum(body.mass_kg for body in self.bodies), _MOST_KG)
 
     @property
     def inertia(self) -> F64:
         """(3,) kg m2 about the middle of its box: a solid box's."""
-        x, y, z = np.maximum(self.size, 0.01) ** 2
-        return np.asarray(self.mass_kg / 12 * np.array([y + z, x + z, x + y]))
+        return box_inertia(self.mass_kg, self.size)
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,6 +161,11 @@ class ExportedHome:
     def things(self) -> tuple[Piece, ...]:
         """Everything else that has a surface or a lamp."""
         return tuple(p for p in self.pieces if not p.is_building and (p.surfaces or p.lamps))
+
+    @cached_property
+    def materials(self) -> tuple[int, ...]:
+        """The used materials, by their number in the house."""
+        return tuple(sorted({s.material for piece in self.pieces for s in piece.surfaces}))
 
     @cached_property
     def navigable(self) -> dict[str, list[F64]]:
@@ -296,11 +318,3 @@ def rooms_json(house: House) -> list[dict[str, Any]]:
         }
         for room in house.rooms
     ]  # fmt: skip
-
-
-def digest_name(data: bytes) -> str:
-    """A name for a file by its content, so that equal things are written once.
-
-    16 hex digits: enough for the pieces of one export, no proof of equality.
-    """
-    return keys.sha256(data)[:16]

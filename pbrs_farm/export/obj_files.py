@@ -1,4 +1,4 @@
-"""Surfaces as Wavefront OBJ with z up, and their textures as PNG: what MuJoCo, PyBullet and ROS read; no effects."""
+"""Surfaces as Wavefront OBJ with z up and their textures as PNG, for MuJoCo, PyBullet and ROS; no effects."""
 
 from __future__ import annotations
 
@@ -12,23 +12,18 @@ from numpy.typing import NDArray
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import House, Material, MaterialKind, Surface
 from pbrs_farm.core.mesh import triangle_corners, unit_normals
-from pbrs_farm.export.home_pieces import digest_name
+from pbrs_farm.export.home_files import digest_name, z_up_points
 from pbrs_farm.images import decode_texture, png_from_array
 
-_CLEAR: Final = 0.3  # opacity of glass of which nobody tells it
+_CLEAR: Final = 0.3  # opacity of glass whose source gives none
 _GLASSY: Final = (MaterialKind.GLASS, MaterialKind.PANE)
-
-
-def z_up_points(points: NDArray[np.floating]) -> F64:
-    """(N, 3) with y up -> (N, 3) with z up: (x, -z, y)."""
-    return np.stack([points[:, 0], -points[:, 2], points[:, 1]], -1).astype(np.float64)
 
 
 def obj_of_surfaces(surfaces: Sequence[Surface], material: str = "", library: str = "") -> bytes:
     """Surfaces of one material as an OBJ, with texture coordinates and normals, z up.
 
-    material, library: its name, and the MTL file that has it; "" for neither. A surface without
-    normals is flat: its triangles share no corner.
+    material, library: its name and its MTL file; "" for neither. A surface without normals is flat:
+    its triangles share no corner.
     """
     points: list[F64] = []
     uvs: list[NDArray[np.floating]] = []
@@ -56,12 +51,14 @@ def obj_of_surfaces(surfaces: Sequence[Surface], material: str = "", library: st
         rows += [f"v {x:.7g} {y:.7g} {z:.7g}" for x, y, z in z_up_points(p)]
         rows += [f"vn {x:.5g} {y:.5g} {z:.5g}" for x, y, z in z_up_points(n)]
     rows += [f"vt {u:.6g} {v:.6g}" for uv in uvs for u, v in uv]
-    rows += [f"f {a}/{a}/{a} {b}/{b}/{b} {c}/{c}/{c}" for one in faces for a, b, c in one.tolist()]
+    rows += [
+        f"f {a}/{a}/{a} {b}/{b}/{b} {c}/{c}/{c}" for rows_ in faces for a, b, c in rows_.tolist()
+    ]
     return ("\n".join(rows) + "\n").encode()
 
 
 def _in_three(surface: Surface) -> Surface:
-    """A surface of one triangle, parted about its middle: MuJoCo takes no mesh of three corners."""
+    """Split a surface of one triangle at its middle, since MuJoCo rejects meshes of three corners."""
     corners = surface.faces[0]
 
     def with_middle(values: NDArray[np.float32] | None) -> NDArray[np.float32] | None:
@@ -88,11 +85,11 @@ def rgba_of(material: Material) -> tuple[float, float, float, float]:
 def png_textures(house: House, used: Sequence[int]) -> dict[str, tuple[str, bytes]]:
     """Texture id -> file name and PNG of the colour pictures of some materials."""
     names = {house.materials[k].texture_id for k in used}
-    found = {}
+    textures = {}
     for key in sorted(name for name in names if name and name in house.textures):
         texture = house.textures[key]
         data = texture.data
         if texture.media_type != "image/png":
             data = png_from_array(decode_texture(data, texture.name, texture.media_type))
-        found[key] = (f"{digest_name(data)}.png", data)
-    return found
+        textures[key] = (f"{digest_name(data)}.png", data)
+    return textures

@@ -1,7 +1,7 @@
-"""Which bodies of a home pass through each other: a door and its frame, a drawer and its neighbours' fronts; no effects.
+"""Pairs of bodies that do not collide: a door and its frame, a drawer and its neighbours' fronts; no effects.
 
-Fronts stand millimetres apart, and convex parts keep to their things within 5 mm: what a part
-touches along its way, without being stopped by it, must not stop it in a simulation.
+Fronts are millimetres apart, and convex parts reach up to 5 mm beyond their items. A contact along a
+part's way that does not stop the part must not stop it in a simulation either.
 """
 
 from __future__ import annotations
@@ -15,15 +15,17 @@ from scipy.spatial import cKDTree
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.frames import transform_points
 from pbrs_farm.core.joints import Joint
-from pbrs_farm.export.home_links import BODY
+from pbrs_farm.export.home_bodies import BODY
 from pbrs_farm.export.home_pieces import ExportedHome
 from pbrs_farm.geometry.opened import free_value, part_triangles
 from pbrs_farm.geometry.scene_triangles import SceneTriangles
 from pbrs_farm.geometry.surface_points import surface_points
 
-_TOUCHES_M: Final = 0.015  # between points on both: convex parts reach 5 mm beyond their things
+_TOUCHES_M: Final = (
+    0.015  # maximum distance of touching points; convex parts reach 5 mm beyond their items
+)
 _SPACING_M: Final = 0.012
-_STEPS: Final = 8  # of a way
+_STEPS: Final = 8  # samples of a part's way
 
 End: TypeAlias = tuple[int, str]  # of a pair: the piece's number and its part
 
@@ -31,18 +33,18 @@ End: TypeAlias = tuple[int, str]  # of a pair: the piece's number and its part
 def passing_pairs(home: ExportedHome) -> tuple[tuple[End, End], ...]:
     """Pairs of bodies, one of them a part, that pass through each other; each pair once.
 
-    A part and its body always; parts of one thing, and what stands still, where the part touches
-    them as it stands, or along its way and `geometry.opened.free_value` lets it pass.
+    A part and its body always. A part and another part of its item, or a fixed body, if the part touches
+    it in its pose, or along its way as far as `geometry.opened.free_value` is free.
     """
     scene = SceneTriangles(home.house.items)
-    found: dict[tuple[End, End], None] = {}
+    pairs: dict[tuple[End, End], None] = {}
     for number, piece in enumerate(home.pieces):
-        for link in piece.links[1:]:
-            found[((number, BODY), (number, link.part))] = None
-            for other in _touched(home, scene, number, link.part):
-                pair = sorted([(number, link.part), other])
-                found[(pair[0], pair[1])] = None
-    return tuple(found)
+        for body in piece.bodies[1:]:
+            pairs[((number, BODY), (number, body.part))] = None
+            for end in _touched(home, scene, number, body.part):
+                first, second = sorted([(number, body.part), end])
+                pairs[(first, second)] = None
+    return tuple(pairs)
 
 
 def _touched(home: ExportedHome, scene: SceneTriangles, number: int, part: str) -> Iterator[End]:
@@ -50,22 +52,22 @@ def _touched(home: ExportedHome, scene: SceneTriangles, number: int, part: str) 
     joint = next(j for j in item.joints if j.part == part)
     corners = part_triangles(item, part)
     free, stopped_by = free_value(scene, number, part, joint.upper)
-    standing = surface_points(corners, _SPACING_M)
-    points = _on_way(joint, standing, free)
-    # What stops it counts where it touches the part as it stands.
-    trees = {False: cKDTree(points), True: cKDTree(standing)}
+    points_now = surface_points(corners, _SPACING_M)
+    points = _on_way(joint, points_now, free)
+    # An obstacle that stops the part counts only if it touches the part's current pose.
+    trees = {False: cKDTree(points), True: cKDTree(points_now)}
     tree = trees[False]
     low, high = points.min(0) - _TOUCHES_M, points.max(0) + _TOUCHES_M
     box = np.array([low, high])
     for k in scene.items_in(low, high):
-        other = home.pieces[k]
+        piece = home.pieces[k]
         if k == number:
-            for sibling in other.links[1:]:
-                own = part_triangles(item, sibling.part)
-                if sibling.part != part and _meets(tree, own, box):
+            for sibling in piece.bodies[1:]:
+                sibling_corners = part_triangles(item, sibling.part)
+                if sibling.part != part and _meets(tree, sibling_corners, box):
                     yield (k, sibling.part)
-        elif other.is_fixed and _meets(trees[other.item.id == stopped_by], scene.of_item(k), box):
-            yield from ((k, link.part) for link in other.links)
+        elif piece.is_fixed and _meets(trees[piece.item.id == stopped_by], scene.of_item(k), box):
+            yield from ((k, body.part) for body in piece.bodies)
 
 
 def _on_way(joint: Joint, points: F64, free: float) -> F64:

@@ -17,7 +17,6 @@ from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.frames import transform_points
 from pbrs_farm.core.house import House
 from pbrs_farm.export.home_pieces import ExportedHome, Piece, exported_home
-from pbrs_farm.geometry.convex_parts import slabs
 from pbrs_farm.scene.physics import STEP_S, mujoco_module, world_xml
 
 KEYS_A_SECOND: Final = 60
@@ -129,8 +128,8 @@ def _simulated(
 
 def _world_parts(piece: Piece) -> Iterator[F64]:
     """Convex parts (V, 3) of a thing, in the world."""
-    for link in piece.links:
-        for part in link.colliders:
+    for body in piece.bodies:
+        for part in body.colliders:
             yield transform_points(piece.world_from_local, part)
 
 
@@ -147,11 +146,9 @@ def _static_parts(
         a, b = piece.item.bounds
         if piece.instance in moving or not piece.surfaces or not ((a <= high) & (b >= low)).all():
             continue
-        if piece.item.kind.is_structure:
-            found = [part for link in piece.links for part in slabs(link.triangles)]
-        else:
-            found = list(_world_parts(piece))
-        near = [p for p in found if ((p.min(0) <= high) & (p.max(0) >= low)).all()]
+        solids = (part for body in piece.bodies for part in body.solids)
+        in_world = [transform_points(piece.world_from_local, part) for part in solids]
+        near = [p for p in in_world if ((p.min(0) <= high) & (p.max(0) >= low)).all()]
         names += [f"{piece.item.name} ({piece.item.id})"] * len(near)
         parts += near
     return names, parts

@@ -1,7 +1,7 @@
 """A home as a Habitat data set of one scene: stage, objects, regions. Effects: writes files.
 
-The building is the stage; each thing an object with collision parts of its own, and what opens an
-articulated object. `pbrs-farm run` reads the scene back.
+The building is the stage; each item is an object with its own collision parts, or an articulated
+object if it opens. `pbrs-farm run` reads the scene back.
 """
 
 from __future__ import annotations
@@ -17,15 +17,14 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from pbrs_farm.core.arrays import F64
-from pbrs_farm.core.frames import transform_points
 from pbrs_farm.export.form import HomeForm
+from pbrs_farm.export.home_files import digest_name, write_files, xml_bytes
 from pbrs_farm.export.home_glb import glb_of_pieces
-from pbrs_farm.export.home_pieces import COLLIDES, COLLISION, ExportedHome, Piece, digest_name
+from pbrs_farm.export.home_pieces import COLLIDES, COLLISION, ExportedHome, Piece
 from pbrs_farm.export.urdf_links import add_inertial, add_mesh, add_moving_joint
 from pbrs_farm.formats.glb import GlbWriter
 from pbrs_farm.formats.house_glb import item_extras
 from pbrs_farm.geometry.convex_parts import hull_faces
-from pbrs_farm.geometry.opened import moved_surface
 
 _BODY: Final = "body"
 
@@ -33,13 +32,13 @@ _BODY: Final = "body"
 def write_habitat(home: ExportedHome, folder: Path) -> None:
     """Write the data set below folder."""
     house, files = home.house, {}
-    opening = [piece for piece in home.pieces if len(piece.links) > 1]
-    still = [piece for piece in home.building if len(piece.links) == 1]
+    opening = [piece for piece in home.pieces if piece.opens]
+    still = [piece for piece in home.building if not piece.opens]
     files[f"stages/{house.id}.glb"] = glb_of_pieces(house, still, with_lamps=False)
     files[f"stages/{house.id}.stage_config.json"] = _json({"render_asset": f"{house.id}.glb"})
     instances = []
     for piece in home.things:
-        if len(piece.links) > 1:
+        if piece.opens:
             continue
         data = glb_of_pieces(house, [piece], with_lamps=True, in_place=False)
         name = f"{piece.class_name.replace(' ', '_')}_{digest_name(data)}"
@@ -58,9 +57,9 @@ def write_habitat(home: ExportedHome, folder: Path) -> None:
         instances.append(_instance(home, piece, name))
     articulated = []
     for piece in opening:
-        name, own = _articulated(home, piece)
-        files |= {f"urdf/{name}/{file}": data for file, data in own.items()}
-        pose = [link.joint.value for link in piece.links if link.joint is not None]
+        name, piece_files = _articulated(home, piece)
+        files |= {f"urdf/{name}/{file}": data for file, data in piece_files.items()}
+        pose = [body.joint.value for body in piece.bodies if body.joint is not None]
         base = {"fixed_base": piece.is_fixed, "base_type": "fixed" if piece.is_fixed else "free"}
         row = _instance(home, piece, name) | base | {"initial_joint_pose": pose}
         articulated.append(row)
@@ -83,9 +82,7 @@ def write_habitat(home: ExportedHome, folder: Path) -> None:
         "scene_instances": {"paths": {".json": ["scenes"]}},
         "semantic_scene_descriptor_instances": {"paths": {".json": ["semantics"]}},
     })  # fmt: skip
-    for name, data in files.items():
-        (folder / name).parent.mkdir(exist_ok=True, parents=True)
-        (folder / name).write_bytes(data)
+    write_files(folder, files)
 
 
 def _json(value: Any) -> bytes:
@@ -106,34 +103,31 @@ def _instance(home: ExportedHome, piece: Piece, name: str) -> dict[str, Any]:
 def _articulated(home: ExportedHome, piece: Piece) -> tuple[str, dict[str, bytes]]:
     """The name of a piece that opens, and its files: URDF, config, a GLB a link and a convex part.
 
-    Axes are the piece's, y up, as those of all Habitat's models are.
+    Axes are the piece's, y up, as of all Habitat's models.
     """
     root = ET.Element("robot", name=piece.class_name.replace(" ", "_"))
     files: dict[str, bytes] = {}
 
-    def kept(data: bytes, name: str) -> str:
+    def file_of(data: bytes, name: str) -> str:
         file = f"{name}_{digest_name(data)}.glb"
         files[file] = data
         return file
 
-    for link in piece.links:
-        name = re.sub(r"[^A-Za-z0-9]+", "_", link.part) or _BODY
+    for body in piece.bodies:
+        name = re.sub(r"[^A-Za-z0-9]+", "_", body.part) or _BODY
         element = ET.SubElement(root, "link", name=name)
-        matrix = np.eye(4)
-        if link.joint is not None:
-            matrix = add_moving_joint(root, name, _BODY, link.joint, np.eye(3))
-        add_inertial(element, link, matrix, np.eye(3))
+        frame = np.eye(4)
+        if body.joint is not None:
+            frame = add_moving_joint(root, name, _BODY, body.joint, np.eye(3))
+        shape = body.shape(frame)
+        add_inertial(element, body.mass_kg, shape, np.eye(3))
         # Lamps and the frame of the piece stay with its body.
-        own = tuple(moved_surface(s, matrix) for s in link.surfaces)
-        shown = replace(piece, surfaces=own, lamps=() if link.joint else piece.lamps)
-        data = glb_of_pieces(home.house, [shown], with_lamps=True, in_place=False)
-        add_mesh(element, "visual", kept(data, name))
-        for part in link.colliders:
-            add_mesh(
-                element, "collision", kept(_collision((transform_points(matrix, part),)), "part")
-            )
-    ET.indent(root)
-    text = ET.tostring(root, encoding="utf-8", xml_declaration=True) + b"\n"
+        visual = replace(piece, surfaces=shape.surfaces, lamps=() if body.joint else piece.lamps)
+        data = glb_of_pieces(home.house, [visual], with_lamps=True, in_place=False)
+        add_mesh(element, "visual", file_of(data, name))
+        for part in shape.colliders:
+            add_mesh(element, "collision", file_of(_collision((part,)), "part"))
+    text = xml_bytes(root)
     named = f"{root.get('name')}_{digest_name(text)}"
     config = {"urdf_filepath": f"{named}.urdf", "semantic_id": piece.item.nyu40}
     return named, files | {f"{named}.urdf": text, f"{named}.ao_config.json": _json(config)}

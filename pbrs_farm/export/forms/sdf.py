@@ -1,8 +1,8 @@
 """A home as a world of Gazebo, SDF 1.9. Effects: writes files.
 
 Metres, z up, gravity; a static model for the building, a model a thing with visual, convex collision
-parts, mass and lamps. Meshes stay y up, as glTF asks and Gazebo reads them: their poses turn them.
-What opens has a link and a joint for each part, and stands shut: a world tells joints no state.
+parts, mass and lamps. Meshes are y up, as glTF asks and Gazebo reads them; their poses turn them.
+Pieces that open have a link and a joint for each part, and are closed: a world has no state of joints.
 """
 
 from __future__ import annotations
@@ -18,24 +18,28 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from pbrs_farm.core.arrays import F64
-from pbrs_farm.core.frames import transform_points
 from pbrs_farm.core.house import Surface
 from pbrs_farm.core.joints import Joint, JointKind
 from pbrs_farm.export.form import HomeForm
+from pbrs_farm.export.home_bodies import BODY, effort_of
+from pbrs_farm.export.home_files import (
+    Z_UP,
+    convex_obj,
+    digest_name,
+    numbers,
+    write_files,
+    xml_bytes,
+)
 from pbrs_farm.export.home_glb import glb_of_pieces
-from pbrs_farm.export.home_links import BODY, effort_of
-from pbrs_farm.export.home_pieces import COLLIDES, ExportedHome, Lamp, Piece, digest_name
-from pbrs_farm.geometry.convex_parts import hull_faces
-from pbrs_farm.geometry.opened import moved_surface
+from pbrs_farm.export.home_pieces import COLLIDES, ExportedHome, Lamp, Piece
 
-# (x, y, z) with y up -> (x, -z, y) with z up.
-_Z_UP: Final = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
+_Z_UP: Final = np.block([[Z_UP, np.zeros((3, 1))], [np.zeros((1, 3)), np.ones((1, 1))]])
 _GRAVITY: Final = (0.0, 0.0, -9.81)
-_BRIGHT_CD: Final = 100.0  # is intensity 1: Gazebo's pictures have no exposure
-_FAINT: Final = 0.01  # a light ends where this is left of intensity 1 at a metre
+_BRIGHT_CD: Final = 100.0  # candela of intensity 1, since Gazebo's pictures have no exposure
+_FAINT: Final = 0.01  # share of intensity 1 at a metre at which a light ends
 _LEAST_RANGE_M: Final = 1.0
 _BUILDING: Final = "building"
-# What stands still meets all but the parts that open: these meet loose things alone.
+# bits of collisions: fixed bodies meet all but opening parts, which meet loose things alone
 _STILL, _MOVING = 1, 2
 _RESERVED: Final = (_BUILDING, "world")
 
@@ -43,11 +47,7 @@ _RESERVED: Final = (_BUILDING, "world")
 def write_sdf(home: ExportedHome, folder: Path) -> None:
     """<house id>.sdf and meshes/."""
     world = _World(home)
-    (folder / "meshes").mkdir(exist_ok=True)
-    for name, data in world.meshes.items():
-        (folder / name).write_bytes(data)
-    text = ET.tostring(world.document, encoding="utf-8", xml_declaration=True)
-    (folder / f"{home.house.id}.sdf").write_bytes(text + b"\n")
+    write_files(folder, world.meshes | {f"{home.house.id}.sdf": xml_bytes(world.document)})
 
 
 class _World:
@@ -60,17 +60,15 @@ class _World:
         world = ET.SubElement(self.document, "world", name=home.house.id)
         _put(world, "gravity", *_GRAVITY)
         self._building(world)
-        doors = tuple(piece for piece in home.building if len(piece.links) > 1)
-        pieces = (*doors, *home.things)
+        pieces = (*(piece for piece in home.building if piece.opens), *home.things)
         for piece, name in zip(pieces, _model_names(pieces), strict=True):
-            if len(piece.links) > 1:
+            if piece.opens:
                 self._opening(world, piece, name)
             else:
                 self._thing(world, piece, name)
-        ET.indent(self.document)
 
     def _building(self, world: ET.Element) -> None:
-        pieces = [piece for piece in self._home.building if len(piece.links) == 1]
+        pieces = [piece for piece in self._home.building if not piece.opens]
         model = ET.SubElement(world, "model", name=_BUILDING)
         ET.SubElement(model, "static").text = "true"
         link = ET.SubElement(model, "link", name="link")
@@ -92,21 +90,18 @@ class _World:
         _lights(link, name, piece.lamps, np.asarray(np.linalg.inv(world_from_model), np.float64))
 
     def _opening(self, world: ET.Element, piece: Piece, name: str) -> None:
-        """A model whose body stands still, where the piece does, by a joint to the world."""
+        """Add a model with a link for each body; a fixed piece has a joint with the world."""
         model, world_from_model = _model(world, piece, name)
         ET.SubElement(model, "static").text = "false"
-        for part in piece.links:
-            link = ET.SubElement(model, "link", name=link_name(part.part))
-            shut = np.eye(4) if part.joint is None else part.joint.motion(0.0)
-            tensor = shut[:3, :3] @ np.diag(part.inertia) @ shut[:3, :3].T
-            _inertial(link, transform_points(shut, part.middle[None])[0], part.mass_kg, tensor)
-            mask = None if not piece.is_fixed else _STILL if part.joint is None else _MOVING
-            surfaces = tuple(moved_surface(s, shut) for s in part.surfaces)
-            colliders = tuple(transform_points(shut, c) for c in part.colliders)
-            self._shapes(link, piece, surfaces, colliders, mask)
-            if part.joint is not None:
+        for body in piece.bodies:
+            link = ET.SubElement(model, "link", name=link_name(body.part))
+            shape = body.shape(body.shut)
+            _inertial(link, shape.middle, body.mass_kg, shape.inertia)
+            mask = None if not piece.is_fixed else _STILL if body.joint is None else _MOVING
+            self._shapes(link, piece, shape.surfaces, shape.colliders, mask)
+            if body.joint is not None:
                 ET.SubElement(link, "gravity").text = "false"  # counterbalanced
-                _joint(model, link_name(part.part), part.joint)
+                _joint(model, link_name(body.part), body.joint)
                 continue
             inverse = np.asarray(np.linalg.inv(world_from_model), np.float64)
             _lights(link, name, piece.lamps, inverse)
@@ -121,11 +116,11 @@ class _World:
     ) -> None:  # fmt: skip
         word = piece.class_name.replace(" ", "_")
         if surfaces:
-            own = replace(piece, surfaces=surfaces)
-            data = glb_of_pieces(self._home.house, [own], with_lamps=False, in_place=False)
+            visual = replace(piece, surfaces=surfaces)
+            data = glb_of_pieces(self._home.house, [visual], with_lamps=False, in_place=False)
             _shape(link, "visual", "visual", self._mesh(word, ".glb", data))
         for k, part in enumerate(colliders):
-            uri = self._mesh(f"{word}_part", ".obj", _obj(part))
+            uri = self._mesh(f"{word}_part", ".obj", convex_obj(part))
             _shape(link, "collision", f"collision_{k}", uri, mask)
 
     def _mesh(self, word: str, suffix: str, data: bytes) -> str:
@@ -136,20 +131,20 @@ class _World:
 
 
 def _model_names(pieces: Iterable[Piece]) -> list[str]:
-    """The pieces' names, but none that SDF or the building has."""
-    taken, found = set(_RESERVED), []
+    """The pieces' names, made different from those of SDF and the building."""
+    taken, names = set(_RESERVED), []
     for piece in pieces:
         name = piece.name
         while name in taken:
             name += "_thing"
         taken.add(name)
-        found.append(name)
-    return found
+        names.append(name)
+    return names
 
 
-def _put(parent: ET.Element, tag: str, *numbers: float) -> ET.Element:
+def _put(parent: ET.Element, tag: str, *values: float) -> ET.Element:
     child = ET.SubElement(parent, tag)
-    child.text = " ".join(f"{float(x):.9g}" for x in numbers)
+    child.text = numbers(values)
     return child
 
 
@@ -165,7 +160,7 @@ def link_name(part: str) -> str:
 
 
 def _model(world: ET.Element, piece: Piece, name: str) -> tuple[ET.Element, F64]:
-    """A model at its place, and (4, 4) the world from it."""
+    """Add a model in its pose; returns it and (4, 4) the world from it."""
     model = ET.SubElement(world, "model", name=name)
     world_from_model = _Z_UP @ piece.world_from_local @ _Z_UP.T
     _put_pose(model, world_from_model)
@@ -173,15 +168,15 @@ def _model(world: ET.Element, piece: Piece, name: str) -> tuple[ET.Element, F64]
 
 
 def _joint(model: ET.Element, name: str, joint: Joint) -> None:
-    """The joint of a part's link, in the piece's frame."""
+    """Add the joint of a part's link, in the piece's frame."""
     kind = "prismatic" if joint.kind is JointKind.PRISMATIC else "revolute"
     row = ET.SubElement(model, "joint", name=f"{name}_joint", type=kind)
-    pose = _put(row, "pose", *(_Z_UP[:3, :3] @ joint.point), 0, 0, 0)
+    pose = _put(row, "pose", *(Z_UP @ joint.point), 0, 0, 0)
     pose.set("relative_to", "__model__")
     ET.SubElement(row, "parent").text = link_name(BODY)
     ET.SubElement(row, "child").text = name
     axis = ET.SubElement(row, "axis")
-    _put(axis, "xyz", *(_Z_UP[:3, :3] @ joint.axis))
+    _put(axis, "xyz", *(Z_UP @ joint.axis))
     limit = ET.SubElement(axis, "limit")
     _put(limit, "lower", joint.lower)
     _put(limit, "upper", joint.upper)
@@ -191,7 +186,7 @@ def _joint(model: ET.Element, name: str, joint: Joint) -> None:
 
 
 def _shape(link: ET.Element, tag: str, name: str, uri: str, mask: int | None = None) -> None:
-    """A visual or a collision: a mesh with y up, turned to z up; mask: what it meets."""
+    """Add a visual or a collision: a mesh with y up, turned to z up; mask: of its collisions."""
     shape = ET.SubElement(link, tag, name=name)
     _put_pose(shape, _Z_UP)
     mesh = ET.SubElement(ET.SubElement(shape, "geometry"), "mesh")
@@ -202,19 +197,19 @@ def _shape(link: ET.Element, tag: str, name: str, uri: str, mask: int | None = N
 
 
 def _inertial(link: ET.Element, middle: F64, mass_kg: float, tensor: F64) -> None:
-    """Mass in the middle (3,), and (3, 3) kg m2 about it; both of y up."""
+    """Add a mass in the middle (3,), and (3, 3) kg m2 about it; both y up."""
     inertial = ET.SubElement(link, "inertial")
-    _put(inertial, "pose", *(_Z_UP[:3, :3] @ middle), 0, 0, 0)
+    _put(inertial, "pose", *(Z_UP @ middle), 0, 0, 0)
     _put(inertial, "mass", mass_kg)
     inertia = ET.SubElement(inertial, "inertia")
-    turned = _Z_UP[:3, :3] @ tensor @ _Z_UP[:3, :3].T
+    turned = Z_UP @ tensor @ Z_UP.T
     for a in range(3):
         for b in range(a, 3):
             _put(inertia, f"i{'xyz'[a]}{'xyz'[b]}", turned[a, b])
 
 
 def _lights(link: ET.Element, name: str, lamps: Sequence[Lamp], link_from_world: F64) -> None:
-    """Lamps in their link, so that they move with it. They cast no shadow: a bulb would hide them."""
+    """Add lamps to their link, so that they move with it. They cast no shadow, since a bulb would hide them."""
     link_from_home = link_from_world @ _Z_UP
     for k, lamp in enumerate(lamps):
         kind = "spot" if lamp.spot else "point"
@@ -235,17 +230,10 @@ def _lights(link: ET.Element, name: str, lamps: Sequence[Lamp], link_from_world:
             direction, half_angle = lamp.spot
             _put(light, "direction", *(link_from_home[:3, :3] @ direction))
             spot = ET.SubElement(light, "spot")
-            # Gazebo has a cone's whole angle, and cones end at a half space.
+            # Gazebo has the whole angle of a cone, at most a half space.
             for tag, value in (("inner_angle", 0.0), ("outer_angle", min(2 * half_angle, np.pi))):
                 _put(spot, tag, value)
             _put(spot, "falloff", 1)
-
-
-def _obj(part: F64) -> bytes:
-    """A convex part as a Wavefront OBJ."""
-    rows = [f"v {x:.7g} {y:.7g} {z:.7g}" for x, y, z in part]
-    rows += [f"f {a} {b} {c}" for a, b, c in hull_faces(part) + 1]
-    return ("\n".join(rows) + "\n").encode()
 
 
 FORM = HomeForm(

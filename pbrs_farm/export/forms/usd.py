@@ -15,21 +15,19 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from pbrs_farm.core.arrays import F64
-from pbrs_farm.core.frames import transform_points
 from pbrs_farm.core.house import USUAL_CUTOFF, House, ItemKind, MaterialKind, Surface
 from pbrs_farm.core.joints import Joint, JointKind
 from pbrs_farm.export.form import HomeForm
-from pbrs_farm.export.home_links import BODY, effort_of
+from pbrs_farm.export.home_bodies import effort_of
+from pbrs_farm.export.home_files import Z_UP
 from pbrs_farm.export.home_pieces import COLLIDES, ExportedHome, Lamp, Piece, rooms_json
 from pbrs_farm.export.passing import End, passing_pairs
 from pbrs_farm.formats.house_glb import GLTF_IMAGES, gltf_material, item_extras
 from pbrs_farm.geometry.convex_parts import hull_faces
-from pbrs_farm.geometry.opened import moved_surface
 from pbrs_farm.installation import need
 
 _SUFFIXES: Final = {"image/png": ".png", "image/jpeg": ".jpg"}
-# (x, y, z) with y up -> (x, -z, y) with z up, as rows of USD's matrices.
-_Z_UP: Final = ((1, 0, 0, 0), (0, 0, 1, 0), (0, -1, 0, 0), (0, 0, 0, 1))
+_Z_UP: Final = np.block([[Z_UP, np.zeros((3, 1))], [np.zeros((1, 3)), np.ones((1, 1))]])
 _LEAST_RADIUS_M: Final = 0.005
 
 
@@ -72,7 +70,7 @@ class _Stage:
         if home.credit:
             self._stage.GetRootLayer().customLayerData = {"copyright": home.credit}
         root = UsdGeom.Xform.Define(self._stage, "/Home")
-        root.AddTransformOp().Set(_matrix(np.array(_Z_UP, np.float64).T))
+        root.AddTransformOp().Set(_matrix(_Z_UP))
         Usd.ModelAPI(root).SetKind(Kind.Tokens.assembly)
         self._stage.SetDefaultPrim(root.GetPrim())
         attribute = root.GetPrim().CreateAttribute("pbrs:rooms", Sdf.ValueTypeNames.String)
@@ -85,8 +83,7 @@ class _Stage:
 
     def save(self) -> None:
         """Write every material, item and room, then the file."""
-        used = {s.material for piece in self._home.pieces for s in piece.surfaces}
-        looks = {k: self._material(k) for k in sorted(used)}
+        looks = {k: self._material(k) for k in self._home.materials}
         for number, piece in enumerate(self._home.pieces):
             self._item(piece, number + 1, looks)
         for pair in passing_pairs(self._home):
@@ -94,8 +91,6 @@ class _Stage:
         for k, room in enumerate(self._home.house.rooms):
             self._room(k, room)
         self._stage.GetRootLayer().Save()
-
-    # Items
 
     def _item(self, piece: Piece, number: int, looks: dict[int, Any]) -> None:
         from pxr import Kind, Sdf, Usd, UsdGeom, UsdPhysics
@@ -111,57 +106,51 @@ class _Stage:
         if self._home.house.is_repaired and piece.item.kind is ItemKind.WALL:
             extras["solid"] = True  # cut by repair: not to be parted by its planes
         if not piece.item.kind.is_structure:
-            extras["has_frame"] = True  # its box lies along its own axes
+            extras["has_frame"] = True  # its box is along its axes
         attribute = prim.CreateAttribute("pbrs:item", Sdf.ValueTypeNames.String)
         attribute.Set(json.dumps(extras, allow_nan=False))
-        if len(piece.links) > 1:
+        if piece.opens:
             self._articulation(piece, path, looks)
-        for k, surface in enumerate(piece.surfaces if len(piece.links) == 1 else ()):
+        for k, surface in enumerate(() if piece.opens else piece.surfaces):
             mesh = self._mesh(f"{path}/Mesh_{k}", surface, looks[surface.material])
             if piece.is_building:
-                # The building is met as it is, and stands still.
+                # The building is static and collides with its render mesh.
                 UsdPhysics.CollisionAPI.Apply(mesh)
                 UsdPhysics.MeshCollisionAPI.Apply(mesh).CreateApproximationAttr("none")
-        if not piece.is_building and piece.surfaces and len(piece.links) == 1:
+        if not piece.is_building and piece.surfaces and not piece.opens:
             self._colliders(piece.colliders, path)
             if not piece.is_fixed:
                 UsdPhysics.RigidBodyAPI.Apply(prim)
                 UsdPhysics.MassAPI.Apply(prim).CreateMassAttr(piece.mass_kg)
-        local_from_world = np.asarray(np.linalg.inv(piece.world_from_local), np.float64)
         for k, lamp in enumerate(piece.lamps):
-            self._lamp(f"{path}/Light_{k}", lamp, local_from_world)
-
-    # What opens
+            self._lamp(f"{path}/Light_{k}", lamp, piece.local_from_world)
 
     def _articulation(self, piece: Piece, path: str, looks: dict[int, Any]) -> None:
-        """A rigid body for the piece's body and for each part, and the joints between them.
+        """Add a rigid body for each body of the piece, and the joints between them.
 
-        The articulation's root is the fixed joint of what stands still, else the body, as Isaac asks.
-        A part's frame is its place when shut: the joint's value is 0 there.
+        The articulation's root is the fixed joint of a fixed piece, else the body, as Isaac asks. A part's
+        frame is its closed pose, where the joint's value is 0.
         """
         from pxr import Gf, UsdGeom, UsdPhysics
 
-        bodies = {}
-        for k, link in enumerate(piece.links):
-            bodies[link.part] = f"{path}/Body" if link.joint is None else f"{path}/Part_{k}"
-            xform = UsdGeom.Xform.Define(self._stage, bodies[link.part])
-            shut = np.eye(4) if link.joint is None else link.joint.motion(0.0)
-            xform.AddTransformOp().Set(_matrix(np.asarray(np.linalg.inv(shut), np.float64)))
-            for n, surface in enumerate(link.surfaces):
-                mesh = f"{bodies[link.part]}/Mesh_{n}"
-                self._mesh(mesh, moved_surface(surface, shut), looks[surface.material])
-            parts = tuple(transform_points(shut, part) for part in link.colliders)
-            self._colliders(parts, bodies[link.part])
+        for k, body in enumerate(piece.bodies):
+            body_path = self._body_path(piece, k)
+            xform = UsdGeom.Xform.Define(self._stage, body_path)
+            xform.AddTransformOp().Set(_matrix(np.asarray(np.linalg.inv(body.shut), np.float64)))
+            shape = body.shape(body.shut)
+            for n, surface in enumerate(shape.surfaces):
+                self._mesh(f"{body_path}/Mesh_{n}", surface, looks[surface.material])
+            self._colliders(shape.colliders, body_path)
             UsdPhysics.RigidBodyAPI.Apply(xform.GetPrim())
-            UsdPhysics.MassAPI.Apply(xform.GetPrim()).CreateMassAttr(link.mass_kg)
-            if link.joint is not None:
-                xform.GetPrim().SetDisplayName(link.part[:200])
-                self._joint(f"{path}/Joint_{k}", bodies[BODY], bodies[link.part], link.joint)
-        root = self._stage.GetPrimAtPath(bodies[BODY])
+            UsdPhysics.MassAPI.Apply(xform.GetPrim()).CreateMassAttr(body.mass_kg)
+            if body.joint is not None:
+                xform.GetPrim().SetDisplayName(body.part[:200])
+                self._joint(f"{path}/Joint_{k}", f"{path}/Body", body_path, body.joint)
+        root = self._stage.GetPrimAtPath(f"{path}/Body")
         if piece.is_fixed:
             fixed = UsdPhysics.FixedJoint.Define(self._stage, f"{path}/Joint_0")
-            fixed.CreateBody1Rel().SetTargets([bodies[BODY]])
-            z_up = np.array(_Z_UP, np.float64).T @ piece.world_from_local
+            fixed.CreateBody1Rel().SetTargets([f"{path}/Body"])
+            z_up = _Z_UP @ piece.world_from_local
             fixed.CreateLocalPos0Attr(Gf.Vec3f(*map(float, z_up[:3, 3])))
             fixed.CreateLocalRot0Attr(_quaternion(Rotation.from_matrix(z_up[:3, :3])))
             fixed.CreateLocalPos1Attr(Gf.Vec3f(0, 0, 0))
@@ -169,18 +158,22 @@ class _Stage:
             root = fixed.GetPrim()
         UsdPhysics.ArticulationRootAPI.Apply(root)
 
-    def _let_pass(self, end: End, other: End) -> None:
-        """Two bodies do not meet: a part, and what it touches without being stopped."""
+    def _body_path(self, piece: Piece, k: int) -> str:
+        """The prim of a piece's k-th body."""
+        path = f"/Home/Items/{piece.name}"
+        if not piece.opens:
+            return path
+        return f"{path}/Part_{k}" if k else f"{path}/Body"
+
+    def _let_pass(self, *ends: End) -> None:
+        """Exclude two bodies from collision: a part, and a body that it touches without being stopped."""
         from pxr import UsdPhysics
 
         paths = []
-        for number, part in (end, other):
+        for number, part in ends:
             piece = self._home.pieces[number]
-            path = f"/Home/Items/{piece.name}"
-            k = next(k for k, link in enumerate(piece.links) if link.part == part)
-            paths.append(
-                path if len(piece.links) == 1 else f"{path}/Part_{k}" if k else f"{path}/Body"
-            )
+            k = next(k for k, body in enumerate(piece.bodies) if body.part == part)
+            paths.append(self._body_path(piece, k))
         prim = self._stage.GetPrimAtPath(paths[0])
         pairs = UsdPhysics.FilteredPairsAPI.Apply(prim).CreateFilteredPairsRel()
         pairs.AddTarget(paths[1])
@@ -274,16 +267,12 @@ class _Stage:
         attribute = light.GetPrim().CreateAttribute("pbrs:lumen", Sdf.ValueTypeNames.Float)
         attribute.Set(float(lamp.flux_lm))
         frame = np.eye(4)
-        frame[:3, 3] = local_from_world[:3, :3] @ lamp.position + local_from_world[:3, 3]
-        if lamp.spot:
-            looks = local_from_world[:3, :3] @ np.array(lamp.spot[0])
-            turn, _ = Rotation.align_vectors([looks], [[0.0, 0.0, -1.0]])
+        frame[:3, 3], turn = lamp.placed(local_from_world)
+        if lamp.spot and turn is not None:
             frame[:3, :3] = turn.as_matrix()
             shaping = UsdLux.ShapingAPI.Apply(light.GetPrim())
             shaping.CreateShapingConeAngleAttr(float(np.degrees(lamp.spot[1])))
         light.AddTransformOp().Set(_matrix(frame))
-
-    # Rooms and materials
 
     def _room(self, number: int, room: Any) -> None:
         from pxr import UsdGeom, Vt
