@@ -97,6 +97,7 @@ if TYPE_CHECKING:
     from pbrs_farm.truth.optional_layers import LabelInputs as LabelInputs
 
 # Module -> the names of it that a plugin may use.
+# fmt: off
 _MODULES: Final = {
     "core.arrays": ("HitRecord",),
     "core.camera": ("Camera", "Intrinsics", "View"),
@@ -135,7 +136,8 @@ _MODULES: Final = {
     "scene.home": ("Home",),
     "transport.develop.mode_pictures": ("LinearAovs", "develop"),
     "truth.optional_layers": ("LabelInputs",),
-}  # fmt: skip
+}
+# fmt: on
 _PLACES: Final = {name: f"pbrs_farm.{m}:{name}" for m, names in _MODULES.items() for name in names}
 
 __all__ = [*_PLACES]

@@ -199,15 +199,25 @@ def _train(args: argparse.Namespace) -> int:
     trained_on = frozenset(views.homes) | digests_of(photographs)
     held_out_homes = frozenset(held_out.homes) if held_out else None
     judged_on = open_judged_places(
-        args.on, plan, mode=source.modes[0], trained_on=trained_on,
-        known_held_out=held_out_homes, most=plan.final_views,
-    )  # fmt: skip
+        args.on,
+        plan,
+        mode=source.modes[0],
+        trained_on=trained_on,
+        known_held_out=held_out_homes,
+        most=plan.final_views,
+    )
     credits = (*credits_of(source, views.homes), *credits_of_init(init))
     stop_on = _stop_on(args.stop_on, [on.name for on in judged_on], plan)
     job = Job(
-        plan, args.out, args.seed, source.light, source.name, init, stop_on=stop_on,
+        plan,
+        args.out,
+        args.seed,
+        source.light,
+        source.name,
+        init,
+        stop_on=stop_on,
         facts={"credits": list(dict.fromkeys(credits)), **facts_of(photographs, plan)},
-    )  # fmt: skip
+    )
     # Print about twenty of the logged steps.
     every = max(plan.steps // 20 // plan.log_every, 1) * plan.log_every
 
@@ -287,9 +297,13 @@ def _evaluate(args: argparse.Namespace) -> int:
     light = record["mode"].split("+")[0]
     mode = "mlt_il_ol" if light in (NYU_LIGHT, PHOTO_LIGHT) else light
     places = open_judged_places(
-        args.on, run.plan, mode=mode, trained_on=trained_on, most=args.views,
+        args.on,
+        run.plan,
+        mode=mode,
+        trained_on=trained_on,
+        most=args.views,
         known_held_out=frozenset(record["homes"]["held_out"]) or None,
-    )  # fmt: skip
+    )
     evaluations = [evaluate(run, place) for place in places]
     for predictions in others:
         evaluations = _with_column(run, evaluations, predictions)

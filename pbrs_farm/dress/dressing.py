@@ -88,9 +88,12 @@ class Dressed(NamedTuple):
 
 
 def dressed_house(
-    house: House, catalogue: Catalogue, fields: DressFields, seed: int,
+    house: House,
+    catalogue: Catalogue,
+    fields: DressFields,
+    seed: int,
     on_progress: Callable[[float], None] = lambda _share: None,
-) -> Dressed:  # fmt: skip
+) -> Dressed:
     """Like dress, with the data for refit_after_repair. on_progress: called with the finished share of the passes."""
     bank = PaintedBank(catalogue.painted_folder)
     with closing(MutableHouse(house, seed, fields.mess, bank, fields.own_share)) as mutable:
@@ -201,12 +204,16 @@ def _credits_of_house(house: House, catalogue: Catalogue) -> tuple[Credit, ...]:
     # A picture is known by its texture, however many surfaces show it.
     found += [
         Credit(
-            id=p.texture.id, name=p.texture.name, library="", creator=p.creator,
-            licence=p.licence, n=1,
+            id=p.texture.id,
+            name=p.texture.name,
+            library="",
+            creator=p.creator,
+            licence=p.licence,
+            n=1,
         )
         for p in catalogue.pictures
         if p.texture.id in house.textures
-    ]  # fmt: skip
+    ]
     return tuple(sorted(found, key=lambda c: c.id))
 
 

@@ -129,9 +129,15 @@ def _may_be_board(surface: Surface, material: Material, item: Item, group: str) 
 
 
 def _finish_surface(
-    house: MutableHouse, catalogue: Catalogue, style: Style, share: float, item: Item, group: str,
-    surface: Surface, kind: PartKind,
-) -> Surface:  # fmt: skip
+    house: MutableHouse,
+    catalogue: Catalogue,
+    style: Style,
+    share: float,
+    item: Item,
+    group: str,
+    surface: Surface,
+    kind: PartKind,
+) -> Surface:
     material = house.materials[surface.material]
     if kind is PartKind.OTHER:
         return surface
@@ -157,9 +163,13 @@ def _finish_surface(
 
 
 def _finish_wood(
-    house: MutableHouse, catalogue: Catalogue, style: Style, item: Item, material: Material,
+    house: MutableHouse,
+    catalogue: Catalogue,
+    style: Style,
+    item: Item,
+    material: Material,
     rng: np.random.Generator,
-) -> LaidMaterial | None:  # fmt: skip
+) -> LaidMaterial | None:
     own, stays = material.diffuse, rng.random()
     # Paint may stay paint; so may grey.
     is_other = not (is_brown(own) or is_dark(own) or is_vivid(own))
@@ -187,9 +197,13 @@ def grain_pattern(house: MutableHouse, wood: Wood) -> Pattern:
 
 
 def _finish_soft(
-    house: MutableHouse, catalogue: Catalogue, style: Style, item: Item, material: Material,
+    house: MutableHouse,
+    catalogue: Catalogue,
+    style: Style,
+    item: Item,
+    material: Material,
     rng: np.random.Generator,
-) -> LaidMaterial | None:  # fmt: skip
+) -> LaidMaterial | None:
     colours: Mapping[bool, tuple[Rgb, ...]] = {False: style.textiles, True: style.textiles[:3]}
     wanted = linear_from_srgb(
         np.array(colours[is_bed(item)][int(rng.integers(len(colours[is_bed(item)])))])
@@ -211,9 +225,13 @@ def _finish_soft(
 
 
 def _finish_lacquer(
-    house: MutableHouse, catalogue: Catalogue, style: Style, item: Item, material: Material,
+    house: MutableHouse,
+    catalogue: Catalogue,
+    style: Style,
+    item: Item,
+    material: Material,
     rng: np.random.Generator,
-) -> LaidMaterial | None:  # fmt: skip
+) -> LaidMaterial | None:
     has_sheen = material.specular != (0.0, 0.0, 0.0) and material.shininess > 1
     own = material.diffuse
     # Screen colours are mixed down to those that paint has.
@@ -226,25 +244,35 @@ def _finish_lacquer(
     r, g, b = (round(float(c), 4) for c in srgb_from_linear(linear))
     roughness = round(float(rng.uniform(0.25, 0.5)), 2)
     painted = replace(
-        material, diffuse=(r, g, b), specular=_SHEEN, roughness=roughness,
+        material,
+        diffuse=(r, g, b),
+        specular=_SHEEN,
+        roughness=roughness,
         shininess=round(2 / roughness**4 - 2, 1),
-    )  # fmt: skip
+    )
     return LaidMaterial(house.material(painted))
 
 
 def _finish_metal(
-    house: MutableHouse, catalogue: Catalogue, style: Style, item: Item, material: Material,
+    house: MutableHouse,
+    catalogue: Catalogue,
+    style: Style,
+    item: Item,
+    material: Material,
     rng: np.random.Generator,
-) -> LaidMaterial | None:  # fmt: skip
+) -> LaidMaterial | None:
     if is_dark(material.diffuse) or (is_vivid(material.diffuse) and not is_brown(material.diffuse)):
         return None
     metal = metal_of(material.name.lower(), METALS["chrome"] if has_taps(item) else style.metal)
     # Nearly all light is in the highlight: a metal has no colour beneath it.
     r, g, b = (0.4 * c for c in metal.colour)
     polished = replace(
-        material, diffuse=(r, g, b), specular=metal.colour, roughness=metal.roughness,
+        material,
+        diffuse=(r, g, b),
+        specular=metal.colour,
+        roughness=metal.roughness,
         shininess=round(2 / max(metal.roughness, 0.1) ** 4 - 2, 1),
-    )  # fmt: skip
+    )
     return LaidMaterial(house.material(polished))
 
 

@@ -68,9 +68,15 @@ def _fill(house: MutableHouse, air: FreeAir, room: Room, share: float) -> None:
             continue
         n_failed = 0
         item = house.placed(
-            piece, shape, np.zeros(3), 0.0, item_id=f"float-{room.id}-{n}", room_id=room.id,
-            level_id=room.level_id, tags=(FLOATING,),
-        )  # fmt: skip
+            piece,
+            shape,
+            np.zeros(3),
+            0.0,
+            item_id=f"float-{room.id}-{n}",
+            room_id=room.id,
+            level_id=room.level_id,
+            tags=(FLOATING,),
+        )
         item = moved_item(item, matrix)
         house.add(item, "float", piece)
         n += 1

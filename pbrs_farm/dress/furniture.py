@@ -99,9 +99,12 @@ def add_furniture(house: MutableHouse, catalogue: Catalogue, style: Style, share
 
 
 def _draw_wanted(
-    house: MutableHouse, room: RoomSpace, wanted: Sequence[tuple[str, float]], rng: np.random.Generator,
+    house: MutableHouse,
+    room: RoomSpace,
+    wanted: Sequence[tuple[str, float]],
+    rng: np.random.Generator,
     share: float,
-) -> list[str]:  # fmt: skip
+) -> list[str]:
     has = {house.items[n].nyu40 for n in room.items}
     found = []
     for name, chance in wanted:
@@ -115,9 +118,13 @@ def _draw_wanted(
 
 
 def _stand_at_wall(
-    house: MutableHouse, catalogue: Catalogue, floor: RoomFloor, name: str, look: BoardLook,
+    house: MutableHouse,
+    catalogue: Catalogue,
+    floor: RoomFloor,
+    name: str,
+    look: BoardLook,
     rng: np.random.Generator,
-) -> None:  # fmt: skip
+) -> None:
     """Add a piece of that kind where it fits, trying narrower ones too."""
     kind = KINDS[name]
     width, height, depth = (

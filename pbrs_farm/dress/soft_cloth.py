@@ -68,9 +68,15 @@ def weave_soft_things(
 
 
 def _woven(
-    house: MutableHouse, catalogue: Catalogue, style: Style, share: float, item: Item,
-    surface: Surface, *, is_seat: bool,
-) -> Surface:  # fmt: skip
+    house: MutableHouse,
+    catalogue: Catalogue,
+    style: Style,
+    share: float,
+    item: Item,
+    surface: Surface,
+    *,
+    is_seat: bool,
+) -> Surface:
     material = house.materials[surface.material]
     name = _plain_name(material)
     cloth = _CLOTHS.get(name)

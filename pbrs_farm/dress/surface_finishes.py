@@ -108,15 +108,21 @@ def _paint_material(name: str, colour: Rgb, roughness: float) -> Material:
     r, g, b = (round(c, 4) for c in colour)
     code = "".join(f"{round(255 * c):02x}" for c in (r, g, b))
     return Material(
-        f"{FINISHED} {name} {code} {roughness:.2f}", diffuse=(r, g, b), specular=_SHEEN,
-        shininess=round(2.0 / roughness**4 - 2.0, 1), roughness=roughness,
-    )  # fmt: skip
+        f"{FINISHED} {name} {code} {roughness:.2f}",
+        diffuse=(r, g, b),
+        specular=_SHEEN,
+        shininess=round(2.0 / roughness**4 - 2.0, 1),
+        roughness=roughness,
+    )
 
 
 def _metal_material(metal: Metal) -> Material:
     # Nearly all light is in the highlight, as the metals of furniture have it.
     r, g, b = (round(0.4 * c, 4) for c in metal.colour)
     return Material(
-        f"{FINISHED} {metal.name}", diffuse=(r, g, b), specular=metal.colour,
-        roughness=metal.roughness, shininess=round(2 / max(metal.roughness, 0.1) ** 4 - 2, 1),
-    )  # fmt: skip
+        f"{FINISHED} {metal.name}",
+        diffuse=(r, g, b),
+        specular=metal.colour,
+        roughness=metal.roughness,
+        shininess=round(2 / max(metal.roughness, 0.1) ** 4 - 2, 1),
+    )

@@ -154,9 +154,13 @@ def _walls_near(house: MutableHouse, item: Item) -> list[F64]:
 
 
 def _swap_set(
-    house: MutableHouse, catalogue: Catalogue, group: str, members: list[_Member],
-    around: Neighbours, rng: np.random.Generator,
-) -> None:  # fmt: skip
+    house: MutableHouse,
+    catalogue: Catalogue,
+    group: str,
+    members: list[_Member],
+    around: Neighbours,
+    rng: np.random.Generator,
+) -> None:
     places, items = [m.place for m in members], [m.item for m in members]
     old = plain_id(items[0].source_class)
     is_childs = _is_childs(f"{items[0].source_class} {items[0].name}")
@@ -221,18 +225,26 @@ def _item_at_old_place(
     held = HeldBy.BACK if member.held_by is Place.WALL else held
     low, high = shape.bounds * np.array(scale)
     # Align the fixed point with that of the old piece.
-    own = np.array([
-        (low[0] + high[0]) / 2,
-        high[1] if held is HeldBy.TOP else low[1],
-        low[2] if held is HeldBy.BACK else (low[2] + high[2]) / 2,
-    ])  # fmt: skip
+    own = np.array(
+        [
+            (low[0] + high[0]) / 2,
+            high[1] if held is HeldBy.TOP else low[1],
+            low[2] if held is HeldBy.BACK else (low[2] + high[2]) / 2,
+        ]
+    )
     at = place.turn @ (place.held_at(held) - own)
     if held is not HeldBy.TOP:
         at[1] -= _above_floor_m(house, item, float(place.low[1]))
     new = house.placed(
-        piece, shape, at, place.turn_rad, item_id=item.id, room_id=item.room_id,
-        level_id=item.level_id, scale=np.array(scale),
-    )  # fmt: skip
+        piece,
+        shape,
+        at,
+        place.turn_rad,
+        item_id=item.id,
+        room_id=item.room_id,
+        level_id=item.level_id,
+        scale=np.array(scale),
+    )
     new = replace(new, nyu40=item.nyu40 or piece.nyu40, kind=item.kind)
     return replace(new, lights=_lights_like(item.lights, new.lights))
 
@@ -252,11 +264,14 @@ def _lights_like(old: tuple[LightPart, ...], new: tuple[LightPart, ...]) -> tupl
     first = old[0]
     return tuple(
         replace(
-            light, power=first.power, unit=first.unit, share=light.share / total * whole,
+            light,
+            power=first.power,
+            unit=first.unit,
+            share=light.share / total * whole,
             rgb_linear=first.rgb_linear,
         )
         for light in new
-    )  # fmt: skip
+    )
 
 
 def _fits_between_neighbours(around: Neighbours, members: list[_Member], new: list[Item]) -> bool:
@@ -283,9 +298,13 @@ def _lifts(around: Neighbours, members: list[_Member], new: list[Item]) -> dict[
 
 
 def _put_set(
-    house: MutableHouse, group: str, piece: Piece, members: list[_Member], new: list[Item],
+    house: MutableHouse,
+    group: str,
+    piece: Piece,
+    members: list[_Member],
+    new: list[Item],
     lifts: dict[int, float],
-) -> None:  # fmt: skip
+) -> None:
     for member, item in zip(members, new, strict=True):
         house.change(member.index, item, PASS)
         house.done[f"{PASS}: {group}"] += 1

@@ -64,7 +64,9 @@ def add_wear(house: MutableHouse, _catalogue: Catalogue, _style: Style, share: f
 def smudge_map(rng: np.random.Generator) -> F32:
     """(H, W) roughness, 0..1: wiped streaks, fingers, drops that have dried, dust."""
     clouds = smoothstep(0.2, 2.2, noise(rng, _SHAPE, slope=2.4, band=(1.0, 40.0)))
-    wipes = smoothstep(0.6, 2.4, noise(rng, _SHAPE, slope=1.2, stretch=(9.0, 1.0), band=(2.0, 160.0)))  # fmt: skip
+    wipes = smoothstep(
+        0.6, 2.4, noise(rng, _SHAPE, slope=1.2, stretch=(9.0, 1.0), band=(2.0, 160.0))
+    )
     dust = smoothstep(2.3, 3.2, noise(rng, _SHAPE, slope=0.3))
     rough = _CLEAN + 0.16 * clouds + 0.1 * wipes + 0.25 * dust
     touched = np.zeros(_SHAPE, np.float32)
@@ -118,14 +120,20 @@ def _smudged(material: Material, smudges: Texture) -> Material:
 def _grained(material: Material, normal: Texture, rough: Texture) -> Material:
     factor = min(1.0, (material.roughness or 0.0) / 0.72)
     return replace(
-        material, roughness=round(factor, 4), roughness_texture_id=rough.id,
+        material,
+        roughness=round(factor, 4),
+        roughness_texture_id=rough.id,
         normal_texture_id=normal.id,
-    )  # fmt: skip
+    )
 
 
 def _is_handled(item: Item) -> bool:
     low, high = item.bounds
-    return item.kind is ItemKind.OBJECT and bool(item.n_faces) and float((high - low).max()) >= _LEAST_M  # fmt: skip
+    return (
+        item.kind is ItemKind.OBJECT
+        and bool(item.n_faces)
+        and float((high - low).max()) >= _LEAST_M
+    )
 
 
 def _is_smooth(material: Material) -> bool:

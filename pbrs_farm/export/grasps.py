@@ -123,8 +123,6 @@ def _row(piece: Piece, up: str) -> dict[str, Any]:
             "normals": turned(normals).round(4).tolist(),
             "width_m": round(float(width), 5),
         }
-        for points, normals, width in zip(
-            found.points, found.normals, found.widths_m, strict=True
-        )
-    ]  # fmt: skip
+        for points, normals, width in zip(found.points, found.normals, found.widths_m, strict=True)
+    ]
     return {"class": piece.class_name, "grasps": rows}

@@ -81,12 +81,16 @@ def glb_of_pieces(
     if rooms is not None:
         scene["extras"] = {"rooms": rooms}
     document: dict[str, Any] = {
-        "asset": gltf_asset(house), "scene": 0, "scenes": [scene], "nodes": nodes, "meshes": meshes,
+        "asset": gltf_asset(house),
+        "scene": 0,
+        "scenes": [scene],
+        "nodes": nodes,
+        "meshes": meshes,
         "materials": [gltf_material(m, images) for m in materials],
         "images": [image for image in kept if "name" in image],
         "samplers": [{"wrapS": _REPEAT, "wrapT": _REPEAT}] if images else [],
         "textures": [{"source": i, "sampler": 0} for i in range(len(images))],
-    }  # fmt: skip
+    }
     if lights:
         document |= {"extensions": {_LIGHTS: {"lights": lights}}, "extensionsUsed": [_LIGHTS]}
     return writer.glb(document)
@@ -117,9 +121,10 @@ def _punctual_light(lamp: Lamp) -> dict[str, Any]:
 def _lamp_node(lamp: Lamp, local_from_world: F64, light: int) -> dict[str, Any]:
     place, turn = lamp.placed(local_from_world)
     node: dict[str, Any] = {
-        "name": f"light {light}", "translation": place.tolist(),
+        "name": f"light {light}",
+        "translation": place.tolist(),
         "extensions": {_LIGHTS: {"light": light}},
-    }  # fmt: skip
+    }
     if turn is not None:
         node["rotation"] = turn.as_quat().tolist()
     return node

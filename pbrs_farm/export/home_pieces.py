@@ -39,17 +39,24 @@ _BORNE: Final = 0.25  # of its feet, of what stands on something
 
 # Kinds that are the building: they stand still and are met as they are.
 BUILDING: Final = (
-    ItemKind.WALL, ItemKind.FLOOR, ItemKind.CEILING, ItemKind.GROUND, ItemKind.DOOR, ItemKind.WINDOW,
+    ItemKind.WALL,
+    ItemKind.FLOOR,
+    ItemKind.CEILING,
+    ItemKind.GROUND,
+    ItemKind.DOOR,
+    ItemKind.WINDOW,
     ItemKind.STAIRS,
-)  # fmt: skip
+)
 # Classes that are screwed to the building.
+# fmt: off
 _FIXED: Final = frozenset({
     classes.NYU40_NAMES.index(name)
     for name in ("cabinet", "counter", "sink", "toilet", "bathtub", "blinds", "curtain",
                  "mirror", "shower curtain", "otherstructure", "whiteboard", "bookshelf", "dresser",
                  "refrigerator", "floor mat", "wall", "floor", "ceiling", "door", "window")
     if name in classes.NYU40_NAMES
-})  # fmt: skip
+})
+# fmt: on
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -238,9 +245,16 @@ def _piece(
     is_fixed |= item.is_floating
     is_fixed |= bool(item.joints) and float(size.max()) > _LARGE_M
     return Piece(
-        item, instance, name, frame, surfaces, size, is_fixed, tuple(map(_lamp, item.lights)),
+        item,
+        instance,
+        name,
+        frame,
+        surfaces,
+        size,
+        is_fixed,
+        tuple(map(_lamp, item.lights)),
         materials,
-    )  # fmt: skip
+    )
 
 
 def _surface_in_frame(surface: Surface, b_from_a: F64) -> Surface:
@@ -313,8 +327,11 @@ def rooms_json(house: House) -> list[dict[str, Any]]:
     """The rooms as the room file of a glTF scene has them."""
     return [
         {
-            "name": room.name, "types": list(room.types), "floor_y": float(room.floor_y),
-            "ceiling_y": float(room.ceiling_y), "polygon": np.asarray(room.polygon).tolist(),
+            "name": room.name,
+            "types": list(room.types),
+            "floor_y": float(room.floor_y),
+            "ceiling_y": float(room.ceiling_y),
+            "polygon": np.asarray(room.polygon).tolist(),
         }
         for room in house.rooms
-    ]  # fmt: skip
+    ]

@@ -239,9 +239,12 @@ def _dress(work: Preparation) -> Preparation:
     bare, _removed = without_persons_and_plants(work.house, fields)
     bare = with_rooms_closed(bare, fields)
     dressed = dressed_house(
-        bare, catalogue_of(work.recipe.dress), work.recipe.dress,
-        dress_seed(work.source, work.recipe), lambda share: work.tell_share(_DRESS_SHARE * share),
-    )  # fmt: skip
+        bare,
+        catalogue_of(work.recipe.dress),
+        work.recipe.dress,
+        dress_seed(work.source, work.recipe),
+        lambda share: work.tell_share(_DRESS_SHARE * share),
+    )
     return replace(work, current=dressed.house, dressed=dressed)
 
 
@@ -315,11 +318,13 @@ PASSES: Final = (
     Pass("open", 1, _leave_open, _stands_open, _open_depends),
     Pass("float", 1, _float, _has_floating_things, _float_depends),
     Pass(
-        "surroundings", 2, _surround,
+        "surroundings",
+        2,
+        _surround,
         lambda source, recipe: _is_home(source, recipe) and recipe.surroundings.kind != "none",
     ),
     Pass("edits", 3, _edit, lambda source, _recipe: bool(source.edits)),
-)  # fmt: skip
+)
 
 PASS: Final = {p.name: p for p in PASSES}
 

@@ -62,17 +62,22 @@ def recorded_falls(
     times = tuple(round(from_s + k / KEYS_A_SECOND, 6) for k in range(len(rows)))
     return tuple(
         BodyMotion(
-            item=piece.item.id, times_s=times, pivot=tuple(pivots[k].tolist()),
+            item=piece.item.id,
+            times_s=times,
+            pivot=tuple(pivots[k].tolist()),
             values=tuple(tuple(float(v) for v in row) for row in rows[:, k]),
         )
         for k, piece in enumerate(movers)
-    )  # fmt: skip
+    )
 
 
 def _simulated(
-    mujoco: Any, home: ExportedHome, movers: Sequence[Piece], reach_m: float,
+    mujoco: Any,
+    home: ExportedHome,
+    movers: Sequence[Piece],
+    reach_m: float,
     how: tuple[float, F64 | None, F64 | None],
-) -> tuple[F64, F64]:  # fmt: skip
+) -> tuple[F64, F64]:
     """(K, N, 7) of each key and mover: its middle, and its turn as a quaternion; (N, 3) middles at rest."""
     seconds, push, spin = how
     pivots = np.array([piece.item.bounds.mean(0) for piece in movers])

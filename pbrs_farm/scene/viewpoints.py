@@ -102,11 +102,14 @@ class Viewpoints(Sequence[Viewpoint]):
         """
         rows: list[dict[str, Any]] = [
             {
-                "id": one.id, "room": one.room, "eye": [round(float(v), 2) for v in one.camera.eye],
-                "score": one.view.score, "objects": len(one.view.objects),
+                "id": one.id,
+                "room": one.room,
+                "eye": [round(float(v), 2) for v in one.camera.eye],
+                "score": one.view.score,
+                "objects": len(one.view.objects),
             }
             for one in self
-        ]  # fmt: skip
+        ]
         return Table(("id", "room", "eye", "score", "objects"), rows)
 
     def __repr__(self) -> str:
@@ -153,12 +156,18 @@ def film_viewpoints(
     return [
         Viewpoint(
             replace(
-                one.view, id=Shot.of_frame(k).id, origin="given", score=0.0, objects={}, frame=k,
-                time_s=from_s + k / fps, rig=None,
+                one.view,
+                id=Shot.of_frame(k).id,
+                origin="given",
+                score=0.0,
+                objects={},
+                frame=k,
+                time_s=from_s + k / fps,
+                rig=None,
             )
         )
         for k, one in enumerate(cameras)
-    ]  # fmt: skip
+    ]
 
 
 def rig_viewpoints(frames: Sequence[Viewpoint], rig: RigFields | None) -> list[Viewpoint]:

@@ -64,9 +64,12 @@ def normals_of_depth(
     ray = np.stack(np.broadcast_arrays(u / K[0, 0], v / K[1, 1], 1.0), -1)
     cosine = -(normal * ray).sum(-1) / np.linalg.norm(ray, axis=-1)
     is_reliable = (
-        is_solved & (depth > 0) & (count >= fit.least_share * n_samples)
-        & (residual * depth <= fit.most_residual) & (cosine >= fit.least_cosine)
-    )  # fmt: skip
+        is_solved
+        & (depth > 0)
+        & (count >= fit.least_share * n_samples)
+        & (residual * depth <= fit.most_residual)
+        & (cosine >= fit.least_cosine)
+    )
     return np.asarray(np.where(is_reliable[..., None], normal, 0), np.float32), is_reliable
 
 

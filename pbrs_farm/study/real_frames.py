@@ -35,11 +35,14 @@ from pbrs_farm.study.tasks.study_task import Arrays
 from pbrs_farm.study.training_plan import TrainingPlan
 
 _FILES: Final = (
-    "intrinsics.json", "intrinsics.txt",
+    "intrinsics.json",
+    "intrinsics.txt",
     # ScanNet's 25,000 frames, and the output of its reader.
-    "intrinsics_depth.txt", "intrinsic_depth.txt", "intrinsic/intrinsic_depth.txt",
+    "intrinsics_depth.txt",
+    "intrinsic_depth.txt",
+    "intrinsic/intrinsic_depth.txt",
     "intrinsics/intrinsic_depth.txt",
-)  # fmt: skip
+)
 _LABELS: Final = "label"  # ScanNet's folder of classes, beside the pictures
 _OF_SUN_RGBD: Final = ("extrinsics", "depth_bfx", "seg.mat")  # beside image/ and intrinsics.txt
 

@@ -109,11 +109,13 @@ class TrainingPlan:
 # Fields without effect on weights and figures: a resumed run may have others.
 _FREE: Final = ("workers", "memory_gb", "log_every", "judge_every", "judge_views")
 
+# fmt: off
 _LEAST: Final = {
     "batch": 1, "steps": 1, "enlarge": 1, "accumulate": 1, "width_px": 32, "height_px": 32, "zoom": 1,
     "checkpoint_every": 1, "log_every": 1, "rate_every": 1, "workers": 0, "judge_every": 0,
     "judge_views": 1, "final_views": 1, "memory_gb": 0,
-}  # fmt: skip
+}
+# fmt: on
 
 _CHOICES: Final = {
     "task": TASKS,
@@ -130,49 +132,75 @@ _PLAIN: Final[dict[str, Any]] = {"gain": 0.0, "gamma": 0.0, "tint": 0.0, "noise"
 _EDGE_JUDGING: Final[dict[str, Any]] = {"judge_views": 8, "final_views": 60}
 _QVGA: Final[dict[str, Any]] = {"width_px": 320, "height_px": 240}
 # Section 4.1: RMSprop from 1e-3, halved every 300 k steps; batch and length from the code.
+# fmt: off
 _PAPER_NORMALS = TrainingPlan(
     "paper", "normals", "paper", **_QVGA, **_PLAIN, batch=10, steps=1_137_000,
     optimiser="rmsprop", rate=1e-3, weight_decay=0.0, clip_norm=0.0, schedule="steps",
     loss_over="all", flip=False, checkpoint_every=2000, log_every=100, judge_every=20_000,
     final_views=2000,
-)  # fmt: skip
+)
+# fmt: on
 # Section 4.2: SGD at 1e-5; the front end of Yu and Koltun with batch 14, momentum .9.
+# fmt: off
 _PAPER_CLASSES = TrainingPlan(
     "paper", "segmentation", "dilated", **_QVGA, **_PLAIN, batch=14, steps=60_000,
     optimiser="sgd", rate=1e-5, weight_decay=5e-4, clip_norm=0.0, schedule="constant",
     encoding="caffe", checkpoint_every=1000, log_every=50, judge_every=2000, final_views=2000,
-)  # fmt: skip
+)
+# fmt: on
 # Section 4.3 with HED's released solver: batch 1 x 10, decay 2e-4, rates by layer.
+# fmt: off
 _PAPER_EDGES = TrainingPlan(
     "paper", "boundaries", "hed", **_QVGA, **_PLAIN, batch=1, accumulate=10, steps=300_000,
     optimiser="sgd", rate=1e-6, weight_decay=2e-4, clip_norm=0.0, schedule="steps",
     rate_factor=0.1, released_rates=True, edge_sum=True, encoding="caffe",
     checkpoint_every=2000, log_every=100, judge_every=20_000, **_EDGE_JUDGING,
-)  # fmt: skip
+)
+# fmt: on
 _H200: Final[dict[str, Any]] = {
-    "name": "h200", "device": "cuda", "bf16": True, "checkpoint_every": 1000, "log_every": 100,
-    "judge_every": 1000, "memory_gb": 32.0, "workers": 8,
-}  # fmt: skip
+    "name": "h200",
+    "device": "cuda",
+    "bf16": True,
+    "checkpoint_every": 1000,
+    "log_every": 100,
+    "judge_every": 1000,
+    "memory_gb": 32.0,
+    "workers": 8,
+}
 # The best of sixteen trials on held-out homes, with more steps (docs/lab/study.md).
+# fmt: off
 _TINY_NORMALS = TrainingPlan(
     "tiny", "normals", "residual", steps=4000, rate=1.5e-3, weight_decay=0.1, gain=0.3, gamma=0.3, turn_deg=6.0,
     tint=0.1, hue=1.0, judge_every=400,
-)  # fmt: skip
+)
+# fmt: on
 _TINY_CLASSES = TrainingPlan(
-    "tiny", "segmentation", "residual", steps=1500, rate=2e-3, weight_decay=0.1, hue=0.3,
+    "tiny",
+    "segmentation",
+    "residual",
+    steps=1500,
+    rate=2e-3,
+    weight_decay=0.1,
+    hue=0.3,
     judge_every=150,
-)  # fmt: skip
+)
+# fmt: off
 _TINY_EDGES = TrainingPlan(
     "tiny", "boundaries", "hed_tiny", steps=800, rate=2e-3, encoding="caffe", noise=0.01,
     judge_every=200, **_EDGE_JUDGING,
-)  # fmt: skip
+)
+# fmt: on
 _TINY_DEPTH = replace(_TINY_NORMALS, task="depth", steps=2000, turn_deg=0.0, judge_every=200)
 
 # As `tiny`, with an encoder for --init imagenet.
 _LITE: Final[dict[str, Any]] = {
-    "name": "lite", "network": "efficient", "encoding": "lite", "rate": 1e-3,
-}  # fmt: skip
+    "name": "lite",
+    "network": "efficient",
+    "encoding": "lite",
+    "rate": 1e-3,
+}
 
+# fmt: off
 PLANS: Final[dict[tuple[str, str], TrainingPlan]] = {
     (plan.name, plan.task): plan
     for plan in (
@@ -193,7 +221,8 @@ PLANS: Final[dict[tuple[str, str], TrainingPlan]] = {
             _TINY_EDGES, **_H200, **_QVGA, network="hed", batch=16, steps=10_000, rate=1e-4
         ),
     )
-}  # fmt: skip
+}
+# fmt: on
 PLAN_NAMES: Final = tuple(dict.fromkeys(name for name, _ in PLANS))
 
 

@@ -441,9 +441,16 @@ class Views(Sequence[Frame]):
         from pbrs_farm.export.export_views import export_frames
 
         return export_frames(
-            self, Path(out), to, layers=layers, modes=modes, size=size, classes=classes,
-            shares=shares, **options,
-        )  # fmt: skip
+            self,
+            Path(out),
+            to,
+            layers=layers,
+            modes=modes,
+            size=size,
+            classes=classes,
+            shares=shares,
+            **options,
+        )
 
     def questions(self) -> list[dict[str, Any]]:
         """Questions about space: a dict with question_type, question, ground_truth, options, instances.

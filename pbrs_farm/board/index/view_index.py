@@ -133,9 +133,15 @@ def _enter_house(connection: sqlite3.Connection, house: HouseRow, fingerprint: s
     )
     n_warned = sum(bool(view.warnings) for view in house.views)
     row = (
-        house.id, house.name, house.credit, house.n_rooms, len(house.views), n_warned,
-        _cover(house), fingerprint,
-    )  # fmt: skip
+        house.id,
+        house.name,
+        house.credit,
+        house.n_rooms,
+        len(house.views),
+        n_warned,
+        _cover(house),
+        fingerprint,
+    )
     connection.execute("REPLACE INTO house VALUES (?, ?, ?, ?, ?, ?, ?, ?)", row)
 
 

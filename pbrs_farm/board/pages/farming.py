@@ -178,8 +178,10 @@ def _do(farm: Farm, what: str, of: str, to: str) -> str:
         return f"{len(farm.retry(of))} tasks get fresh attempts"
     if what in _OF_JOBS:
         act: dict[str, Callable[[str], str]] = {
-            "pause": farm.pause, "resume": farm.resume, "cancel": farm.cancel,
-        }  # fmt: skip
+            "pause": farm.pause,
+            "resume": farm.resume,
+            "cancel": farm.cancel,
+        }
         return act[what](of)
     farm.drain(of, undo=what == "undrain")
     return "asked"

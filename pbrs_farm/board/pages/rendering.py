@@ -37,10 +37,17 @@ def environment(static: Mapping[str, Asset]) -> Environment:
         finalize=lambda value: printable(value) if type(value) is str else value,
     )
     env.globals |= {
-        "asset_url": asset_url, "home_url": home_url, "view_url": view_url, "thumb_url": thumb_url,
-        "page_numbers": page_numbers, "title_of": title_of, "duration": duration_text,
-        "memory": memory_text, "confirm_url": confirm_url, "log_url": log_url,
-    }  # fmt: skip
+        "asset_url": asset_url,
+        "home_url": home_url,
+        "view_url": view_url,
+        "thumb_url": thumb_url,
+        "page_numbers": page_numbers,
+        "title_of": title_of,
+        "duration": duration_text,
+        "memory": memory_text,
+        "confirm_url": confirm_url,
+        "log_url": log_url,
+    }
     return env
 
 

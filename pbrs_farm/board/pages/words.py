@@ -30,18 +30,24 @@ OF_A_CANDIDATE: Final = {
     "winner": "the chosen camera",
 }
 OF_A_SELECTION: Final = {
-    "black": "the picture is black", "one-plane": "one plane fills the picture",
+    "black": "the picture is black",
+    "one-plane": "one plane fills the picture",
     "cut-things": "the edge of the picture crops nearly all objects",
     "twin": "a kept view of the room is almost the same",
-    "failed": "the view was not rendered", "unscored": "the view has no score",
-    "too-dark": "darker than photographs", "blown": "too much of the picture is white",
-    "one-surface": "one surface fills the picture", "inside-object": "the camera is inside an object",
-    "too-few-objects": "too few objects are visible", "too-noisy": "the light is too noisy",
+    "failed": "the view was not rendered",
+    "unscored": "the view has no score",
+    "too-dark": "darker than photographs",
+    "blown": "too much of the picture is white",
+    "one-surface": "one surface fills the picture",
+    "inside-object": "the camera is inside an object",
+    "too-few-objects": "too few objects are visible",
+    "too-noisy": "the light is too noisy",
     "missing-textures": "texture files are missing",
     "unlike-colour": "its colours differ from those of the reference photographs",
     "unlike-depth": "its depths differ from those of the reference photographs",
-    "room-cap": "the room has enough views", "class-balance": "the set has enough of its classes",
-}  # fmt: skip
+    "room-cap": "the room has enough views",
+    "class-balance": "the set has enough of its classes",
+}
 """Reason of a selection -> its meaning."""
 
 

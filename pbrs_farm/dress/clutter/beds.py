@@ -149,8 +149,12 @@ def lying_place(scene: SceneTriangles, index: int, room: Room) -> Lying | None:
     if not len(rows) or not len(columns) or room.ceiling_y - level < LEAST_AIR_M:
         return None
     return Lying(
-        grid, tops, level, (int(rows[0]), int(rows[-1]) + 1), (int(columns[0]), int(columns[-1]) + 1)
-    )  # fmt: skip
+        grid,
+        tops,
+        level,
+        (int(rows[0]), int(rows[-1]) + 1),
+        (int(columns[0]), int(columns[-1]) + 1),
+    )
 
 
 def _usual(heights: F64) -> float:
@@ -194,9 +198,14 @@ def _place_on_bed(bed: Lying, across: float, from_head_m: float, made: Model) ->
 
 
 def lay_down(
-    placing: Placing, scene: SceneTriangles, index: int, made: Model, plan: F64, turn_rad: float,
+    placing: Placing,
+    scene: SceneTriangles,
+    index: int,
+    made: Model,
+    plan: F64,
+    turn_rad: float,
     level: float,
-) -> bool:  # fmt: skip
+) -> bool:
     """Lay a soft item at a plan position (2,) on items[index]; False if the place is occupied.
 
     Its underside is flattened: no point is below the support.

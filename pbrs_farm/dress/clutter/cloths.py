@@ -39,9 +39,14 @@ _THREADS_M: Final = {"duvet": 0.065, "throw": 0.05, "clothes": 0.04}
 
 
 def lay_duvet(
-    placing: Placing, scene: SceneTriangles, index: int, grid: PlanGrid, sides: tuple[float, float],
-    rows: tuple[float, float], level: float,
-) -> F64 | None:  # fmt: skip
+    placing: Placing,
+    scene: SceneTriangles,
+    index: int,
+    grid: PlanGrid,
+    sides: tuple[float, float],
+    rows: tuple[float, float],
+    level: float,
+) -> F64 | None:
     """Lay a duvet over a mattress between its sides and rows; its triangles (F, 3, 3), None: left out.
 
     grid: the bed's, whose rows run from its head; sides, rows: metres in it. level: the mattress's.
@@ -166,9 +171,15 @@ def _local(ground: Ground, at: F64) -> tuple[float, float]:
 
 
 def _ground_under_cloth(
-    placing: Placing, scene: SceneTriangles, grid: PlanGrid, sides: tuple[float, float],
-    rows: tuple[float, float], level: float, thread_m: float, more: F64 | None = None,
-) -> tuple[Ground, tuple[float, float]]:  # fmt: skip
+    placing: Placing,
+    scene: SceneTriangles,
+    grid: PlanGrid,
+    sides: tuple[float, float],
+    rows: tuple[float, float],
+    level: float,
+    thread_m: float,
+    more: F64 | None = None,
+) -> tuple[Ground, tuple[float, float]]:
     """Ground below cloth between sides and rows of a grid, and the shift of its frame."""
     reach = _AROUND_M
     corner = grid.plan_of((sides[0] - reach) / grid.cell_m, (rows[0] - reach) / grid.cell_m)
@@ -187,9 +198,13 @@ def _ground_under_cloth(
 
 
 def _is_free_beside_bed(
-    ground: Ground, shift: tuple[float, float], side: float, rows: tuple[float, float], sign: int,
+    ground: Ground,
+    shift: tuple[float, float],
+    side: float,
+    rows: tuple[float, float],
+    sign: int,
     placing: Placing,
-) -> bool:  # fmt: skip
+) -> bool:
     """True if the space beside the mattress, where a duvet would hang, is free."""
     x = side + shift[0] + sign * np.arange(0.12, 0.3, CELL_M)
     z = np.arange(rows[0], rows[1], CELL_M) + shift[1]
@@ -227,9 +242,14 @@ def _laid_flat(
 
 
 def _put_cloth(
-    placing: Placing, family: str, made: Net, ground: Ground, thick_m: float, material: Material,
+    placing: Placing,
+    family: str,
+    made: Net,
+    ground: Ground,
+    thick_m: float,
+    material: Material,
     nyu40: int,
-) -> F64:  # fmt: skip
+) -> F64:
     """Add dropped cloth to the house; returns its triangles (F, 3, 3)."""
     surface = sheet_of(family, made, ground, thick_m)
     thing = standing_piece(family, [(surface, material)], group="blanket", nyu40=nyu40)

@@ -60,12 +60,14 @@ class Net:
         down, across = self.thread_m
         slant = float(np.hypot(down, across))
         pairs = (
-            (at[:, :-1], at[:, 1:], down), (at[:, :, :-1], at[:, :, 1:], across),
-            (at[:, :-1, :-1], at[:, 1:, 1:], slant), (at[:, 1:, :-1], at[:, :-1, 1:], slant),
-        )  # fmt: skip
-        return np.concatenate([
-            (np.sqrt(((b - a) ** 2).sum(0)) / length).ravel() for a, b, length in pairs
-        ])  # fmt: skip
+            (at[:, :-1], at[:, 1:], down),
+            (at[:, :, :-1], at[:, :, 1:], across),
+            (at[:, :-1, :-1], at[:, 1:, 1:], slant),
+            (at[:, 1:, :-1], at[:, :-1, 1:], slant),
+        )
+        return np.concatenate(
+            [(np.sqrt(((b - a) ** 2).sum(0)) / length).ravel() for a, b, length in pairs]
+        )
 
     def deepest_m(self, ground: Ground) -> float:
         """Maximum penetration of vertices and thread centres into the ground; metres."""

@@ -148,9 +148,10 @@ def _put_on_floor(placing: Placing, floor: _Floor, made: Model, *, at_wall: bool
         x, z = floor.grid.plan_of(columns[k] + 0.5, rows[k] + 0.5)
         turn = _turn_from_wall(to_wall, int(rows[k]), int(columns[k]))
         placing.put(
-            made, np.array([x, placing.room.floor_y + LIFT_M, z]),
+            made,
+            np.array([x, placing.room.floor_y + LIFT_M, z]),
             turn + float(placing.rng.normal(0, 0.2)),
-        )  # fmt: skip
+        )
         floor.free &= ~disc
         floor.walkable &= ~disc
         floor.bitmap.occupied[disc] = True

@@ -95,18 +95,21 @@ class Placing:
         base = np.array([(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])
         number = sum(self.house.done.values())
         item = self.house.placed(
-            piece, shape, at - rotation_y(turn_rad) @ base, turn_rad,
+            piece,
+            shape,
+            at - rotation_y(turn_rad) @ base,
+            turn_rad,
             item_id=f"dress-{PASS}-{len(self.house.items)}-{number}",
-            room_id=self.room.id, level_id=self.room.level_id,
-        )  # fmt: skip
+            room_id=self.room.id,
+            level_id=self.room.level_id,
+        )
         self.house.add(item, PASS, piece)
 
     def laid_near(self, low: F64, high: F64) -> list[F64]:
         """The triangles of cloth in the room that may meet the box low..high (3,)."""
         return [
-            c for c in self.laid
-            if (c.min((0, 1)) <= high).all() and (c.max((0, 1)) >= low).all()
-        ]  # fmt: skip
+            c for c in self.laid if (c.min((0, 1)) <= high).all() and (c.max((0, 1)) >= low).all()
+        ]
 
     def refuse(self, reason: str) -> None:
         """Count an item that was not placed."""

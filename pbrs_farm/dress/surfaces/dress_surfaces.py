@@ -105,9 +105,13 @@ def dress_surfaces(house: MutableHouse, catalogue: Catalogue, style: Style, shar
 
 
 def _room_finish(
-    house: MutableHouse, catalogue: Catalogue, style: Style, home: HomeFinish, room: RoomSpace,
+    house: MutableHouse,
+    catalogue: Catalogue,
+    style: Style,
+    home: HomeFinish,
+    room: RoomSpace,
     share: float,
-) -> _RoomFinish:  # fmt: skip
+) -> _RoomFinish:
     # Separate streams: draws of one room do not affect another.
     rng = house.rng(PASS, room.room.id)
     taste = room_style(style, rng)

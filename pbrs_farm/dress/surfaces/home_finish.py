@@ -130,7 +130,9 @@ def walls_of(
         return WallFinish(paint)
     # Paint most rooms; paper, brick and rough plaster by the style.
     draw = rng.random()
-    paper_share = 0.38 if style.walls[0] == "wallpaper" else 0.25 if "wallpaper" in style.walls else 0.05  # fmt: skip
+    paper_share = (
+        0.38 if style.walls[0] == "wallpaper" else 0.25 if "wallpaper" in style.walls else 0.05
+    )
     if draw < paper_share:
         paper = _wallpaper(rng, style, paint.tints[0])
         if rng.random() < 0.4:
@@ -223,12 +225,17 @@ def _wallpaper(rng: np.random.Generator, style: Style, ground: Rgb) -> Pattern:
 
 def _wall_tiles(rng: np.random.Generator, style: Style, height_m: float) -> tuple[Pattern, float]:
     """Wall tiles, and the height near height_m that is a whole number of them."""
-    laid, tile_m = _pick(rng, (("20", 0.2), ("20x40", 0.2), ("30x60", 0.3), ("15", 0.15), ("10", 0.1), ("subway", 0.075)))  # fmt: skip
+    laid, tile_m = _pick(
+        rng,
+        (("20", 0.2), ("20x40", 0.2), ("30x60", 0.3), ("15", 0.15), ("10", 0.1), ("subway", 0.075)),
+    )
     tint = _pick(rng, COLOURS["wall_tiles"])
     if rng.random() < 0.12:
         tint = mix(style.palette[2], (0.95, 0.95, 0.94), 0.3)
     grout = mix(tint, _DIRT, 0.55)
-    return Pattern("tiles", _seed(rng), (tint, grout), variant=laid), round(height_m / tile_m) * tile_m  # fmt: skip
+    return Pattern("tiles", _seed(rng), (tint, grout), variant=laid), round(
+        height_m / tile_m
+    ) * tile_m
 
 
 def _bathroom_walls(rng: np.random.Generator, style: Style) -> WallFinish:
@@ -285,11 +292,18 @@ def _tile_floor(rng: np.random.Generator, style: Style) -> Floor:
     if draw < 0.25:
         dark = _pick(rng, COLOURS["checkers"])
         tints = (rgb("e6e3db"), dark, mix(dark, _DIRT, 0.5))
-        return Floor(Pattern("tiles", _seed(rng), tints, variant=_pick(rng, ("15", "20", "30")) + "-checker"), turn)  # fmt: skip
+        return Floor(
+            Pattern(
+                "tiles", _seed(rng), tints, variant=_pick(rng, ("15", "20", "30")) + "-checker"
+            ),
+            turn,
+        )
     body = _pick(rng, COLOURS["floor_tiles"])
     stone = "-stone" if rng.random() < 0.55 else ""
     laid = _pick(rng, ("30", "30", "45", "60", "30x60"))
-    return Floor(Pattern("tiles", _seed(rng), (body, mix(body, _DIRT, 0.6)), variant=laid + stone), turn)  # fmt: skip
+    return Floor(
+        Pattern("tiles", _seed(rng), (body, mix(body, _DIRT, 0.6)), variant=laid + stone), turn
+    )
 
 
 def _outdoor_floor(rng: np.random.Generator) -> Floor:

@@ -65,7 +65,11 @@ def painted_wall(item: Item, wall: SidedWall, looks: LooksOf, rest: RestOfWall) 
         left &= ~part.members
         for n in np.unique(surface[part.members]).tolist():
             mine = rows[part.members & (surface == n)]
-            found.append(_surface_of_rows(item.surfaces[n].name, part.material.number, _in_metres(mine, part)))  # fmt: skip
+            found.append(
+                _surface_of_rows(
+                    item.surfaces[n].name, part.material.number, _in_metres(mine, part)
+                )
+            )
     # Horizontal faces get plaster; the others are unchanged.
     height = unit_normals(rows[..., :3])[:, 1]
     for mine, name, material in (

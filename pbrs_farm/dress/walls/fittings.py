@@ -108,16 +108,28 @@ def _dial(rng: np.random.Generator, ground: Rgb) -> Srgb8Image:
     hour = float(rng.uniform(0, 12))
     for turn, length, width in ((hour / 12, 78, 9), (hour % 1.0, 118, 6)):
         a = 2 * np.pi * turn
-        pen.line([(160 - 20 * np.sin(a), 160 + 20 * np.cos(a)),
-                  (160 + length * np.sin(a), 160 - length * np.cos(a))], fill=ink, width=width)  # fmt: skip
+        pen.line(
+            [
+                (160 - 20 * np.sin(a), 160 + 20 * np.cos(a)),
+                (160 + length * np.sin(a), 160 - length * np.cos(a)),
+            ],
+            fill=ink,
+            width=width,
+        )
     pen.ellipse((151, 151, 169, 169), fill=ink)
     return np.asarray(image, np.uint8)
 
 
 def hang_anywhere(
-    hanging: Hanging, made: Model, low_m: float, depth_m: float, rng: np.random.Generator, *,
-    above_m: float = 0.05, tags: tuple[str, ...] = (),
-) -> bool:  # fmt: skip
+    hanging: Hanging,
+    made: Model,
+    low_m: float,
+    depth_m: float,
+    rng: np.random.Generator,
+    *,
+    above_m: float = 0.05,
+    tags: tuple[str, ...] = (),
+) -> bool:
     """Hang the item at a height, at a random place with depth_m free in front.
 
     above_m: free height above it. False, with the reason counted, if there is no place.

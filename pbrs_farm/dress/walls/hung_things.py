@@ -61,9 +61,13 @@ def faced_slab(name: str, low: F64, high: F64, z: tuple[float, float]) -> tuple[
 
 
 def framed(
-    rng: np.random.Generator, style: Style, width: float, height: float, print_: Texture,
+    rng: np.random.Generator,
+    style: Style,
+    width: float,
+    height: float,
+    print_: Texture,
     frame: Material,
-) -> Model:  # fmt: skip
+) -> Model:
     """A print behind a moulding, with or without a mat; outer size in metres."""
     frame_m, depth = _moulding(rng, min(width, height))
     low, high = np.array([-width / 2, 0.0]), np.array([width / 2, height])

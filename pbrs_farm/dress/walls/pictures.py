@@ -31,9 +31,15 @@ _APART_M = 0.25  # least distance between groups of pictures
 
 # Over what pictures hang, and how much it is liked.
 _BENEATH = {
-    BED: 1.0, SOFA: 1.0, DRESSER: 0.8, DESK: 0.6, TABLE: 0.5, CABINET: 0.5, OTHERFURNITURE: 0.4,
+    BED: 1.0,
+    SOFA: 1.0,
+    DRESSER: 0.8,
+    DESK: 0.6,
+    TABLE: 0.5,
+    CABINET: 0.5,
+    OTHERFURNITURE: 0.4,
     CHAIR: 0.3,
-}  # fmt: skip
+}
 _LOWEST_M, _TALLEST_BENEATH_M = 0.35, 1.25
 _LOW_M: Final = 1.2
 
@@ -231,9 +237,14 @@ def _draw_group(rng: np.random.Generator, width: float, left: int) -> PictureGro
 
 
 def _hang_group(
-    rng: np.random.Generator, hanging: Hanging, spot: PictureSpot, group: tuple[PictureGroup, float, float],
-    gallery: Gallery, style: Style, frame: Material,
-) -> None:  # fmt: skip
+    rng: np.random.Generator,
+    hanging: Hanging,
+    spot: PictureSpot,
+    group: tuple[PictureGroup, float, float],
+    gallery: Gallery,
+    style: Style,
+    frame: Material,
+) -> None:
     pictures, left, bottom = group
     # A group of pictures has the same kind of frame.
     kind = str(rng.choice(["framed", "canvas", "poster"], p=[0.68, 0.22, 0.1]))
@@ -254,9 +265,13 @@ def _hang_group(
 
 
 def _framed_picture(
-    rng: np.random.Generator, kind: str, size: tuple[float, float], shown: Print, style: Style,
+    rng: np.random.Generator,
+    kind: str,
+    size: tuple[float, float],
+    shown: Print,
+    style: Style,
     frame: Material,
-) -> Model:  # fmt: skip
+) -> Model:
     width, height = size
     if kind == "canvas":
         return canvas(width, height, shown.texture, shown.mean)

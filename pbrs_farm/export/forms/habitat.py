@@ -63,25 +63,31 @@ def write_habitat(home: ExportedHome, folder: Path) -> None:
         base = {"fixed_base": piece.is_fixed, "base_type": "fixed" if piece.is_fixed else "free"}
         row = _instance(home, piece, name) | base | {"initial_joint_pose": pose}
         articulated.append(row)
-    files[f"scenes/{house.id}.scene_instance.json"] = _json({
-        "stage_instance": {"template_name": f"stages/{house.id}"},
-        "object_instances": instances, "articulated_object_instances": articulated,
-        "semantic_scene_instance": house.id,
-        "translation_origin": "asset_local",
-        "user_defined": {"collision": COLLISION},
-    })  # fmt: skip
+    files[f"scenes/{house.id}.scene_instance.json"] = _json(
+        {
+            "stage_instance": {"template_name": f"stages/{house.id}"},
+            "object_instances": instances,
+            "articulated_object_instances": articulated,
+            "semantic_scene_instance": house.id,
+            "translation_origin": "asset_local",
+            "user_defined": {"collision": COLLISION},
+        }
+    )
     files[f"semantics/{house.id}.semantic_config.json"] = _json(
         {"region_annotations": _regions(home)}
     )
-    files[f"navigable/{house.id}.json"] = _json({
-        room: [ring.tolist() for ring in rings] for room, rings in home.navigable.items()
-    })  # fmt: skip
-    files[f"{house.id}.scene_dataset_config.json"] = _json({
-        "stages": {"paths": {".json": ["stages"]}}, "objects": {"paths": {".json": ["objects"]}},
-        "articulated_objects": {"paths": {".urdf": ["urdf/*"]}},
-        "scene_instances": {"paths": {".json": ["scenes"]}},
-        "semantic_scene_descriptor_instances": {"paths": {".json": ["semantics"]}},
-    })  # fmt: skip
+    files[f"navigable/{house.id}.json"] = _json(
+        {room: [ring.tolist() for ring in rings] for room, rings in home.navigable.items()}
+    )
+    files[f"{house.id}.scene_dataset_config.json"] = _json(
+        {
+            "stages": {"paths": {".json": ["stages"]}},
+            "objects": {"paths": {".json": ["objects"]}},
+            "articulated_objects": {"paths": {".urdf": ["urdf/*"]}},
+            "scene_instances": {"paths": {".json": ["scenes"]}},
+            "semantic_scene_descriptor_instances": {"paths": {".json": ["semantics"]}},
+        }
+    )
     write_files(folder, files)
 
 
@@ -93,11 +99,13 @@ def _instance(home: ExportedHome, piece: Piece, name: str) -> dict[str, Any]:
     x, y, z, w = Rotation.from_matrix(piece.world_from_local[:3, :3]).as_quat().tolist()
     number = next(k for k, p in enumerate(home.pieces) if p is piece) + 1
     return {
-        "template_name": name, "translation": piece.world_from_local[:3, 3].tolist(),
-        "rotation": [w, x, y, z], "translation_origin": "asset_local",
+        "template_name": name,
+        "translation": piece.world_from_local[:3, 3].tolist(),
+        "rotation": [w, x, y, z],
+        "translation_origin": "asset_local",
         "motion_type": "STATIC" if piece.is_fixed else "DYNAMIC",
         "user_defined": item_extras(piece.item, number),
-    }  # fmt: skip
+    }
 
 
 def _articulated(home: ExportedHome, piece: Piece) -> tuple[str, dict[str, bytes]]:
@@ -136,13 +144,14 @@ def _articulated(home: ExportedHome, piece: Piece) -> tuple[str, dict[str, bytes
 def _regions(home: ExportedHome) -> list[dict[str, Any]]:
     return [
         {
-            "name": room.name, "label": room.types[0] if room.types else room.name,
+            "name": room.name,
+            "label": room.types[0] if room.types else room.name,
             "floor_height": float(room.floor_y),
             "extrusion_height": float(room.ceiling_y - room.floor_y),
             "poly_loop": [[float(x), float(room.floor_y), float(z)] for x, z in room.polygon],
         }
         for room in home.house.rooms
-    ]  # fmt: skip
+    ]
 
 
 def _collision(parts: tuple[F64, ...]) -> bytes:

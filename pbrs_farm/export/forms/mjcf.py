@@ -166,9 +166,13 @@ def _joint(element: ET.Element, body: Body, joint: Joint) -> None:
         "pos": numbers(z_up_points(np.array([joint.point]))[0]),
         "axis": numbers(z_up_points(np.array([joint.axis]))[0]),
         # Values count from the closed state, whatever the pose.
-        "range": numbers((joint.lower, joint.upper)), "limited": "true", "ref": f"{joint.value:.9g}",
-        "damping": f"{damping:.4g}", "frictionloss": f"{friction:.4g}", "armature": "0.01",
-    }  # fmt: skip
+        "range": numbers((joint.lower, joint.upper)),
+        "limited": "true",
+        "ref": f"{joint.value:.9g}",
+        "damping": f"{damping:.4g}",
+        "frictionloss": f"{friction:.4g}",
+        "armature": "0.01",
+    }
     ET.SubElement(element, "joint", row)
 
 

@@ -111,9 +111,13 @@ class _World:
                 ET.SubElement(row, "child").text = link_name(BODY)
 
     def _shapes(
-        self, link: ET.Element, piece: Piece, surfaces: tuple[Surface, ...],
-        colliders: Iterable[F64], mask: int | None,
-    ) -> None:  # fmt: skip
+        self,
+        link: ET.Element,
+        piece: Piece,
+        surfaces: tuple[Surface, ...],
+        colliders: Iterable[F64],
+        mask: int | None,
+    ) -> None:
         word = piece.class_name.replace(" ", "_")
         if surfaces:
             visual = replace(piece, surfaces=surfaces)

@@ -80,9 +80,14 @@ def _facts_of_frame(frame: Frame, size: Size, mode: str) -> PictureFacts:
 
 
 def _fitted(
-    id: str, group: str, colour: Srgb8Image, size: Size, depth_m: NDArray[Any] | None = None,
-    K: F64 | None = None, class40: NDArray[np.uint8] | None = None,
-) -> PictureFacts:  # fmt: skip
+    id: str,
+    group: str,
+    colour: Srgb8Image,
+    size: Size,
+    depth_m: NDArray[Any] | None = None,
+    K: F64 | None = None,
+    class40: NDArray[np.uint8] | None = None,
+) -> PictureFacts:
     """Statistics of the middle of a picture at the common size; BadInput for a smaller picture."""
     small, rows, columns = crop_to_size(colour, size)
     if columns.stop - columns.start < size[0]:

@@ -84,11 +84,16 @@ def compare_sets(ours: PictureSet, photographs: PictureSet, network: LiteFeature
         "kinds": _kinds(a, b),
         "classes": _classes(a, b),
         "unlike": [
-            {"view": u.view.id, "photograph": u.photograph.id, "times": u.times, "reasons": list(u.reasons)}
+            {
+                "view": u.view.id,
+                "photograph": u.photograph.id,
+                "times": u.times,
+                "reasons": list(u.reasons),
+            }
             for u in unlike
         ],
         "notes": [*ours.notes, *photographs.notes],
-    }  # fmt: skip
+    }
     return Comparison(ours, photographs, _rounded(report), unlike)
 
 
@@ -107,10 +112,12 @@ def _features(network: LiteFeatures, pictures: Sequence[PictureFacts], light: fl
 
 def _set_row(pictures: PictureSet, groups: Sequence[str]) -> dict[str, Any]:
     return {
-        "place": pictures.place, "pictures": len(pictures.pictures),
-        "groups": len({picture.group for picture in pictures.pictures}), "drawn": len(set(groups)),
+        "place": pictures.place,
+        "pictures": len(pictures.pictures),
+        "groups": len({picture.group for picture in pictures.pictures}),
+        "drawn": len(set(groups)),
         "left_out": list(pictures.left_out),
-    }  # fmt: skip
+    }
 
 
 def _shared(
@@ -125,10 +132,11 @@ def _shared(
         if ours is None or photographs is None:
             continue
         rows[name] = {
-            "title": title, "pictures": [len(ours.rows), len(photographs.rows)],
+            "title": title,
+            "pictures": [len(ours.rows), len(photographs.rows)],
             "shared": asdict(shared_histogram(ours, photographs)),
             "halves": shared_of_halves(photographs),
-        }  # fmt: skip
+        }
         if name in ("colour", "depth"):
             # The score of `select`: the overlap with the most similar photograph.
             queries, references = (s.rows.astype(np.float32) for s in (ours, photographs))

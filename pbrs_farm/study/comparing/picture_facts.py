@@ -23,6 +23,7 @@ _DIRECTION_BINS: Final = 8  # number of bands of elevation and of sectors of azi
 _LEAST_PIXELS: Final = 50  # minimum number of normals for their histogram
 
 # Name of each number, title, and adjectives for a lower and a higher value.
+# fmt: off
 NUMBERS: Final = (
     ("luma", "median luma, 0 to 1", "darker", "brighter"),
     ("contrast", "spread of luma", "of less contrast", "of more contrast"),
@@ -36,7 +37,8 @@ NUMBERS: Final = (
     ("oblique", "share of walls seen from the side", "with less wall seen from the side", "with more wall seen from the side"),
     ("slanted", "share of slanted surfaces", "with less that is slanted", "with more that is slanted"),
     ("down", "share of surfaces that face down", "with less ceiling", "with more ceiling"),
-)  # fmt: skip
+)
+# fmt: on
 KINDS: Final = ("up", "frontal", "oblique", "slanted", "down")
 
 
@@ -52,9 +54,13 @@ class PictureFacts:
 
 
 def facts_of(
-    id: str, group: str, colour: Srgb8Image, depth_m: NDArray[Any] | None = None,
-    K: F64 | None = None, class40: NDArray[np.uint8] | None = None,
-) -> PictureFacts:  # fmt: skip
+    id: str,
+    group: str,
+    colour: Srgb8Image,
+    depth_m: NDArray[Any] | None = None,
+    K: F64 | None = None,
+    class40: NDArray[np.uint8] | None = None,
+) -> PictureFacts:
     """Statistics of a picture (H, W, 3) uint8 and its layers, all of one size.
 
     depth_m: (H, W) metres, 0 = unknown. K: (3, 3) pixels, needed for normals. class40: (H, W) NYU40

@@ -69,7 +69,11 @@ def kernel_distance(a: Grouped, b: Grouped) -> Estimate:
         True
     """
     same = np.array(a.names)[:, None] == np.array(b.names)[None]
-    parts = [_Pairs.of(a, a, np.eye(len(a.names), dtype=bool)), _Pairs.of(b, b, np.eye(len(b.names), dtype=bool)), _Pairs.of(a, b, same)]  # fmt: skip
+    parts = [
+        _Pairs.of(a, a, np.eye(len(a.names), dtype=bool)),
+        _Pairs.of(b, b, np.eye(len(b.names), dtype=bool)),
+        _Pairs.of(a, b, same),
+    ]
 
     def distance(u: F64, v: F64) -> F64:
         """(draws,) distances for counts of each group (draws, groups)."""

@@ -89,9 +89,13 @@ def compare(
 
 
 def _trained_row(
-    comparison: Comparison, row: TrainingSet, views: TrainingViews, held_out: ViewArrays | None,
-    judged_on: Sequence[JudgedViews], seed: int,
-) -> dict[str, Any]:  # fmt: skip
+    comparison: Comparison,
+    row: TrainingSet,
+    views: TrainingViews,
+    held_out: ViewArrays | None,
+    judged_on: Sequence[JudgedViews],
+    seed: int,
+) -> dict[str, Any]:
     """Figures of one seed of a set on its own views and on the test views."""
     out = comparison.out / row.name / f"seed{seed}"
     job = Job(comparison.plan, out, seed, row.source.modes[0], row.source.name)

@@ -258,10 +258,14 @@ def parts_tables(evaluations: list[Evaluation]) -> str:
             continue
         shares = next(iter(evaluation.parts.values())).shares()
         rows = [
-            [part, f"{100 * shares[part]:.1f} %", *(shown_figure("mean_deg", row[part]) for row in means.values())]
+            [
+                part,
+                f"{100 * shares[part]:.1f} %",
+                *(shown_figure("mean_deg", row[part]) for row in means.values()),
+            ]
             for part in PARTS
             if all(part in row for row in means.values())
-        ]  # fmt: skip
+        ]
         titles = [f"{evaluation.views.name}: mean, degrees", "pixels", *means]
         tables.append(markdown(titles, rows))
     return "\n\n".join(tables)

@@ -11,6 +11,7 @@ UNDERFIT: Final = (
     0.8  # training error, as a share of the baseline's, above which a network is underfit
 )
 _UNITS: Final = ("_deg", "_m")  # endings of names with units; other figures are shares
+# fmt: off
 _TITLES: Final = {
     "mean_deg": "mean, degrees", "median_deg": "median, degrees",
     "rms_deg": "RMS, degrees", "below_5": "< 5", "below_7_5": "< 7.5",
@@ -20,7 +21,8 @@ _TITLES: Final = {
     "scale_invariant": "scale-invariant", "abs_rel": "absolute relative",
     "below_1_25": "ratio < 1.25", "rms_m": "RMS, metres",
     "ods": "ODS", "ois": "OIS", "ap": "AP", "r50": "R50",
-}  # fmt: skip
+}
+# fmt: on
 
 
 def title_of(figure: str) -> str:

@@ -34,16 +34,27 @@ from pbrs_farm.views.open_views import open_views
 
 
 def open_judged_places(
-    words: Sequence[str], plan: TrainingPlan, *, mode: str, trained_on: frozenset[str] = frozenset(),
-    most: int = 0, hold_out: frozenset[str] | None = None, known_held_out: frozenset[str] | None = None,
-) -> list[JudgedViews]:  # fmt: skip
+    words: Sequence[str],
+    plan: TrainingPlan,
+    *,
+    mode: str,
+    trained_on: frozenset[str] = frozenset(),
+    most: int = 0,
+    hold_out: frozenset[str] | None = None,
+    known_held_out: frozenset[str] | None = None,
+) -> list[JudgedViews]:
     """The views of each word, as in open_judged_place; BadInput for two places of one name."""
     places: dict[str, JudgedViews] = {}
     for word in words:
         views = open_judged_place(
-            word, plan, mode=mode, trained_on=trained_on, most=most, hold_out=hold_out,
+            word,
+            plan,
+            mode=mode,
+            trained_on=trained_on,
+            most=most,
+            hold_out=hold_out,
             known_held_out=known_held_out,
-        )  # fmt: skip
+        )
         if views.name in places:
             hint = f"--on other={word.partition('=')[2] or word}"
             raise BadInput("--on", word, f"a second place named {views.name}", hint=hint)
@@ -52,9 +63,15 @@ def open_judged_places(
 
 
 def open_judged_place(
-    word: str, plan: TrainingPlan, *, mode: str, trained_on: frozenset[str] = frozenset(), most: int = 0,
-    hold_out: frozenset[str] | None = None, known_held_out: frozenset[str] | None = None,
-) -> JudgedViews:  # fmt: skip
+    word: str,
+    plan: TrainingPlan,
+    *,
+    mode: str,
+    trained_on: frozenset[str] = frozenset(),
+    most: int = 0,
+    hold_out: frozenset[str] | None = None,
+    known_held_out: frozenset[str] | None = None,
+) -> JudgedViews:
     """The views of `[NAME=]PLACE[@MODE]` at a plan's size.
 
     Of a root: all views if none of its homes is in trained_on, else those of hold_out or of the

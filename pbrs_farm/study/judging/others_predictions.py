@@ -78,8 +78,12 @@ def _files_of(folder: Path, ids: Sequence[str], kind: str) -> list[Path | None]:
     files: list[Path | None] = []
     for id in ids:
         end = id.rpartition("/")[2]
-        names = [name for stem in dict.fromkeys((id, end)) if stem == id or ends[end] == 1
-                 for name in _prediction_names(stem, kind)]  # fmt: skip
+        names = [
+            name
+            for stem in dict.fromkeys((id, end))
+            if stem == id or ends[end] == 1
+            for name in _prediction_names(stem, kind)
+        ]
         files.append(next((folder / name for name in names if (folder / name).is_file()), None))
     return files
 

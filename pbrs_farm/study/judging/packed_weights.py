@@ -110,7 +110,7 @@ def model_card(run: Trained, record: Mapping[str, Any], evaluations: list[dict[s
         "## Whose works it saw",
         "\n".join(f"- {line}" for line in _training_credits(record)) or "The run names none.",
         f"weights.safetensors, sha256 {record['weights_sha256']}",
-    ]  # fmt: skip
+    ]
     return "\n\n".join(parts) + "\n"
 
 
@@ -150,8 +150,11 @@ def _figures(run: Trained, evaluations: list[dict[str, Any]]) -> str:
         columns.append((title, figures["network"], figures[baseline_name]))
     rows = [
         [title_of(name)]
-        + [f"{shown_figure(name, net[name])} ({shown_figure(name, base[name])})" for _, net, base in columns]
+        + [
+            f"{shown_figure(name, net[name])} ({shown_figure(name, base[name])})"
+            for _, net, base in columns
+        ]
         for name in run.task.figures
-    ]  # fmt: skip
+    ]
     text = markdown(["", *(title for title, _, _ in columns)], rows)
     return f"{text}\n\nIn brackets: {baseline_name}, which looks at no picture."

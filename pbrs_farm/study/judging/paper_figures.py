@@ -12,8 +12,12 @@ from typing import Final
 _PAPER_CLASSES: Final = 40  # of segmentation
 
 # Lighting mode -> its name in the paper.
-_NAMES: Final = {"mlt_il_ol": "MLT-IL/OL", "mlt_ol": "MLT-OL", "opengl_il": "OpenGL-IL",
-                 "opengl_dl": "OpenGL-DL"}  # fmt: skip
+_NAMES: Final = {
+    "mlt_il_ol": "MLT-IL/OL",
+    "mlt_ol": "MLT-OL",
+    "opengl_il": "OpenGL-IL",
+    "opengl_dl": "OpenGL-DL",
+}
 
 
 @dataclass(frozen=True, slots=True)

@@ -82,9 +82,11 @@ class EdgeCounts:
 
 
 def edge_counts(
-    strength: NDArray[Any], truth: Mask, n_thresholds: int = N_THRESHOLDS,
+    strength: NDArray[Any],
+    truth: Mask,
+    n_thresholds: int = N_THRESHOLDS,
     max_distance: float = MAX_DISTANCE,
-) -> EdgeCounts:  # fmt: skip
+) -> EdgeCounts:
     """Counts of one picture: strength (H, W) 0..1 of the network, truth (H, W) lines.
 
     Maxima of strength are cut at n_thresholds equal steps inside 0..1 and thinned; max_distance is

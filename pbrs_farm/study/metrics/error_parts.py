@@ -19,11 +19,13 @@ _FRONTAL_DEG: Final = 30.0  # maximum azimuth of frontal surfaces from the camer
 _NEAR_M, _FAR_M = 2.0, 4.0
 _DARK, _BRIGHT = 0.25, 0.6  # bounds of luma 0..1 of the encoded picture
 
+# fmt: off
 PARTS: Final = (
     "up", "frontal", "oblique", "slanted", "down",
     f"nearer than {_NEAR_M:g} m", f"{_NEAR_M:g} to {_FAR_M:g} m", f"farther than {_FAR_M:g} m",
     f"luma below {_DARK:g}", f"luma {_DARK:g} to {_BRIGHT:g}", f"luma above {_BRIGHT:g}",
-)  # fmt: skip
+)
+# fmt: on
 """Kinds of surface, ranges of depth and ranges of luma; each pixel has one of each, unless its depth is unknown."""
 
 
@@ -43,9 +45,12 @@ def surface_kinds(normal: NDArray[Any]) -> dict[str, Mask]:
     frontal = upright & (azimuth <= _FRONTAL_DEG) & (length > 1e-6)
     up, down = elevation >= _LEVEL_DEG, elevation <= -_LEVEL_DEG
     return {
-        "up": up, "frontal": frontal, "oblique": upright & ~frontal,
-        "slanted": ~(upright | up | down), "down": down,
-    }  # fmt: skip
+        "up": up,
+        "frontal": frontal,
+        "oblique": upright & ~frontal,
+        "slanted": ~(upright | up | down),
+        "down": down,
+    }
 
 
 class ErrorParts:
@@ -70,7 +75,11 @@ class ErrorParts:
         masks = list(surface_kinds(truth["normal"][valid]).values())
         if "depth" in truth:
             depth = truth["depth"][valid]
-            masks += [(depth > 0) & (depth < _NEAR_M), (depth >= _NEAR_M) & (depth <= _FAR_M), depth > _FAR_M]  # fmt: skip
+            masks += [
+                (depth > 0) & (depth < _NEAR_M),
+                (depth >= _NEAR_M) & (depth <= _FAR_M),
+                depth > _FAR_M,
+            ]
         else:
             masks += [np.zeros(len(errors), bool)] * 3
         masks += [luma < _DARK, (luma >= _DARK) & (luma <= _BRIGHT), luma > _BRIGHT]

@@ -29,9 +29,14 @@ class DilatedVgg(nn.Module):  # type: ignore[misc]
     """
 
     def __init__(
-        self, n_classes: int, *, head: str = "full", tiny: bool = False, context: bool = False,
+        self,
+        n_classes: int,
+        *,
+        head: str = "full",
+        tiny: bool = False,
+        context: bool = False,
         n_in: int = 3,
-    ) -> None:  # fmt: skip
+    ) -> None:
         super().__init__()
         table: Sequence[tuple[int, int]] = TINY_STAGES if tiny else STAGES
         self.stages = vgg_stages(table, batch_norm=tiny, dilations=_DILATIONS, n_in=n_in)
@@ -40,10 +45,14 @@ class DilatedVgg(nn.Module):  # type: ignore[misc]
         n_hidden = n_hidden // 2 if tiny else n_hidden
         self.reach = dilation * (kernel - 1) // 2  # padding of the first layer, cells
         self.head = nn.Sequential(
-            nn.Conv2d(width, n_hidden, kernel, dilation=dilation), nn.ReLU(inplace=True),
-            nn.Dropout(0.5), nn.Conv2d(n_hidden, n_hidden, 1), nn.ReLU(inplace=True),
-            nn.Dropout(0.5), nn.Conv2d(n_hidden, n_classes, 1),
-        )  # fmt: skip
+            nn.Conv2d(width, n_hidden, kernel, dilation=dilation),
+            nn.ReLU(inplace=True),
+            nn.Dropout(0.5),
+            nn.Conv2d(n_hidden, n_hidden, 1),
+            nn.ReLU(inplace=True),
+            nn.Dropout(0.5),
+            nn.Conv2d(n_hidden, n_classes, 1),
+        )
         nn.init.normal_(self.head[-1].weight, std=0.001)
         nn.init.zeros_(self.head[-1].bias)
         self.context = _context(n_classes) if context else nn.Identity()

@@ -19,9 +19,14 @@ from pbrs_farm.study.networks.vgg import start_he
 # Repeats, kernel, stride, expansion and width of each stage (table 1 of the paper; Lite keeps the
 # stem's 32 channels).
 _STAGES: Final = (
-    (1, 3, 1, 1, 16), (2, 3, 2, 6, 24), (2, 5, 2, 6, 40), (3, 3, 2, 6, 80), (3, 5, 1, 6, 112),
-    (4, 5, 2, 6, 192), (1, 3, 1, 6, 320),
-)  # fmt: skip
+    (1, 3, 1, 1, 16),
+    (2, 3, 2, 6, 24),
+    (2, 5, 2, 6, 40),
+    (3, 3, 2, 6, 80),
+    (3, 5, 1, 6, 112),
+    (4, 5, 2, 6, 192),
+    (1, 3, 1, 6, 320),
+)
 _STEM: Final = 32
 _EPSILON: Final = 1e-3  # of batch normalisation
 N_FEATURES: Final = 1280  # number of inputs of the classifier

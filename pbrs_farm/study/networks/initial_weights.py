@@ -142,7 +142,12 @@ def _naming_lite(path: Path) -> Iterator[None]:
 def _lite_names(encoder: LiteEncoder) -> dict[str, str]:
     """Name of each tensor of the encoder in the package, whose block numbers run through all stages."""
     first = list(itertools.accumulate((len(stage) for stage in encoder.stages), initial=0))
-    convs = {"stem": "_conv_stem", "expand": "_expand_conv", "filter": "_depthwise_conv", "project": "_project_conv"}  # fmt: skip
+    convs = {
+        "stem": "_conv_stem",
+        "expand": "_expand_conv",
+        "filter": "_depthwise_conv",
+        "project": "_project_conv",
+    }
     norms = {"stem": "_bn0", "expand": "_bn0", "filter": "_bn1", "project": "_bn2"}
     names = {}
     for ours in encoder.state_dict():

@@ -21,9 +21,12 @@ class ResidualUnet(nn.Module):  # type: ignore[misc]
     """(B, n_in, H, W) colour -> (B, n_out, H, W); H and W even, of 32 pixels or more."""
 
     def __init__(
-        self, n_out: int = 3, widths: tuple[int, ...] = (32, 64, 96, 128, 160), n_attention: int = 2,
+        self,
+        n_out: int = 3,
+        widths: tuple[int, ...] = (32, 64, 96, 128, 160),
+        n_attention: int = 2,
         n_in: int = 3,
-    ) -> None:  # fmt: skip
+    ) -> None:
         super().__init__()
         self.stem = Residual(n_in * FOLD**2 + 2, widths[0])
         pairs = list(itertools.pairwise(widths))

@@ -32,8 +32,15 @@ class NormalsTask(StudyTask):
     layers = ("colour", "normal")
     targets_of_pixels = ("normal", "valid")
     figures = (
-        "mean_deg", "median_deg", "below_11_25", "below_22_5", "below_30", "below_5", "below_7_5", "rms_deg",
-    )  # fmt: skip
+        "mean_deg",
+        "median_deg",
+        "below_11_25",
+        "below_22_5",
+        "below_30",
+        "below_5",
+        "below_7_5",
+        "rms_deg",
+    )
     error_name = "mean angle, degrees"
     error_scale = 1
     error_unit = " degrees"

@@ -51,9 +51,12 @@ class Position:
 
 
 def save_checkpoint(
-    path: Path, network: nn.Module, optimiser: torch.optim.Optimizer, position: Position,
+    path: Path,
+    network: nn.Module,
+    optimiser: torch.optim.Optimizer,
+    position: Position,
     average: nn.Module | None = None,
-) -> None:  # fmt: skip
+) -> None:
     """Write the whole state of a training; average: running mean of the weights."""
     tensors = {f"model.{name}": tensor for name, tensor in network.state_dict().items()}
     if average is not None:
@@ -73,9 +76,11 @@ def save_weights(path: Path, network: nn.Module, position: Position) -> None:
 
 
 def load_checkpoint(
-    path: Path, network: nn.Module, optimiser: torch.optim.Optimizer | None = None,
+    path: Path,
+    network: nn.Module,
+    optimiser: torch.optim.Optimizer | None = None,
     average: nn.Module | None = None,
-) -> Position:  # fmt: skip
+) -> Position:
     """Load the state into the network and, if given, the optimiser with torch's generator and the mean.
 
     Raises BadInput if the file is damaged or of another network.

@@ -51,9 +51,13 @@ def move_to_device(network: nn.Module, plan: TrainingPlan) -> nn.Module:
 
 
 def predict(
-    network: nn.Module, colour: NDArray[np.uint8], task: StudyTask, plan: TrainingPlan,
-    sizes: Sequence[tuple[int, int]] = (), cameras: F32 | None = None,
-) -> Iterator[NDArray[Any]]:  # fmt: skip
+    network: nn.Module,
+    colour: NDArray[np.uint8],
+    task: StudyTask,
+    plan: TrainingPlan,
+    sizes: Sequence[tuple[int, int]] = (),
+    cameras: F32 | None = None,
+) -> Iterator[NDArray[Any]]:
     """Predictions of the pictures in colour (N, H, W, 3), in order. The network's mode is restored.
 
     sizes: (height, width) of each prediction, by default that of colour.
@@ -135,10 +139,13 @@ def write_onnx(network: nn.Module, plan: TrainingPlan, path: Path) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # deprecations within the exporter
         program = torch.onnx.export(
-            whole, tuple(inputs), dynamo=True, input_names=["colour", "rays"][: len(inputs)],
+            whole,
+            tuple(inputs),
+            dynamo=True,
+            input_names=["colour", "rays"][: len(inputs)],
             output_names=["map"],
             verbose=False,
-        )  # fmt: skip
+        )
     program.save(path, external_data=False)
 
 

@@ -48,9 +48,12 @@ class Job:
 
 
 def train(
-    job: Job, views: TrainingViews, held_out: ViewArrays | None = None,
-    observe: Observer = lambda _row: None, also: Judge = lambda _network: {},
-) -> dict[str, Any]:  # fmt: skip
+    job: Job,
+    views: TrainingViews,
+    held_out: ViewArrays | None = None,
+    observe: Observer = lambda _row: None,
+    also: Judge = lambda _network: {},
+) -> dict[str, Any]:
     """Train and write weights, figures and curves; the figures. A finished run is not trained again.
 
     also: further errors by name, evaluated each plan.judge_every steps. Errors of the loop are raised
@@ -73,10 +76,17 @@ def train(
         return folder.figures() if share.is_first else {}
     try:
         network = train_network(
-            network, views, task, plan,
-            seed=job.seed, folder=folder, observe=observe,
-            judge=_judge_of_curve(views, held_out, plan, also), share=share, stop_on=job.stop_on,
-        )  # fmt: skip
+            network,
+            views,
+            task,
+            plan,
+            seed=job.seed,
+            folder=folder,
+            observe=observe,
+            judge=_judge_of_curve(views, held_out, plan, also),
+            share=share,
+            stop_on=job.stop_on,
+        )
         if not share.is_first:
             return {}
         figures = _judge(network, views, held_out, plan, folder)
@@ -93,8 +103,12 @@ def train(
 
 
 def _faster(
-    folder: RunFolder, network: torch.nn.Module, views: TrainingViews, plan: TrainingPlan, share: Share
-) -> tuple[TrainingPlan, dict[str, Any]]:  # fmt: skip
+    folder: RunFolder,
+    network: torch.nn.Module,
+    views: TrainingViews,
+    plan: TrainingPlan,
+    share: Share,
+) -> tuple[TrainingPlan, dict[str, Any]]:
     """The plan with bfloat16 only if that is faster here, and the measured times.
 
     A resumed run keeps its arithmetic. GPUs and several processes follow the plan.
@@ -168,9 +182,12 @@ def _judge_of_curve(
 
 
 def _judge(
-    network: torch.nn.Module, views: TrainingViews, held_out: ViewArrays | None, plan: TrainingPlan,
+    network: torch.nn.Module,
+    views: TrainingViews,
+    held_out: ViewArrays | None,
+    plan: TrainingPlan,
     folder: RunFolder,
-) -> dict[str, Any]:  # fmt: skip
+) -> dict[str, Any]:
     """Figures of the network and of the baseline on training and held-out views."""
     task = task_of(plan.task)
     parts = {"train": views.decoded(plan.final_views)}

@@ -68,9 +68,18 @@ def share_of_process() -> Share:
 
 
 def train_network(
-    network: nn.Module, views: TrainingViews, task: StudyTask, plan: TrainingPlan, *, seed: int,
-    folder: RunFolder, observe: Observer, judge: Judge, share: Share, stop_on: str = "",
-) -> nn.Module:  # fmt: skip
+    network: nn.Module,
+    views: TrainingViews,
+    task: StudyTask,
+    plan: TrainingPlan,
+    *,
+    seed: int,
+    folder: RunFolder,
+    observe: Observer,
+    judge: Judge,
+    share: Share,
+    stop_on: str = "",
+) -> nn.Module:
     """Train from the folder's checkpoint, or from the network's weights; writes the weights at the end.
 
     observe: called with each row of the metrics. judge: evaluated each plan.judge_every steps, a row
@@ -168,9 +177,12 @@ def _row_since(
 
 
 def _resumed(
-    folder: RunFolder, network: nn.Module, optimiser: torch.optim.Optimizer, start: Position,
+    folder: RunFolder,
+    network: nn.Module,
+    optimiser: torch.optim.Optimizer,
+    start: Position,
     average: nn.Module | None,
-) -> int:  # fmt: skip
+) -> int:
     """Load the checkpoint, if any; the number of steps done."""
     if not folder.checkpoint.exists():
         return 0

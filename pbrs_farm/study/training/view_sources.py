@@ -195,9 +195,10 @@ def _real(source: TrainingSource, plan: TrainingPlan, *, held_out: bool) -> list
         photographs = photographs_of(Path(place), plan)
         folder = photographs.folder
         pairs = tuple(
-            pair for pair in photographs.pairs
+            pair
+            for pair in photographs.pairs
             if _is_scene_held_out(id_of(pair, folder).partition("/")[0], source) == held_out
-        )  # fmt: skip
+        )
         folders += [Photographs(folder, pairs)] if pairs else []
     if held_out or not source.most:
         return folders
