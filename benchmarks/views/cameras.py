@@ -142,14 +142,11 @@ def _bare_mrays(geometry: Geometry, cameras: list[Camera]) -> float:
     """Mitsuba's own rate: a default scene, coherent rays that lie ready in memory, t alone."""
     import drjit as dr
 
+    from pbrs_farm.raycast.mitsuba_mesh import mitsuba_mesh
     from pbrs_farm.raycast.variant import choose_variant, mitsuba
 
     mi = mitsuba(choose_variant())
-    mesh = mi.Mesh("house", len(geometry.positions), len(geometry.faces))
-    parameters = mi.traverse(mesh)
-    parameters["vertex_positions"] = geometry.positions.ravel()
-    parameters["faces"] = geometry.faces.astype(np.uint32).ravel()
-    parameters.update()
+    mesh = mitsuba_mesh(mi, "house", geometry.positions, geometry.faces)
     scene = mi.load_dict({"type": "scene", "house": mesh})
     pairs = [camera.rays() for camera in cameras]
     directions = np.concatenate([d.reshape(-1, 3) for _o, d in pairs])

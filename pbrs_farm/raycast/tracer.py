@@ -16,8 +16,10 @@ from numpy.typing import NDArray
 from pbrs_farm.core.arrays import F32, I32, Mask
 from pbrs_farm.core.camera import Camera, Intrinsics
 from pbrs_farm.raycast.host_memory import with_slack
+from pbrs_farm.raycast.mitsuba_mesh import mitsuba_mesh
 from pbrs_farm.raycast.variant import mitsuba
 
+MESH_NAME: Final = "house"  # of the one mesh of each scene
 _RAYS_PER_LAUNCH: Final = 1 << 22  # both bound the memory of one kernel launch
 _COUNTS_PER_LAUNCH: Final = 1 << 24  # cameras x labels
 _TILE: Final = 4  # px, edge of the tiles in which a packet of rays walks the picture
@@ -82,13 +84,9 @@ def scene_from_mesh(mi: Any, positions: F32, faces: I32, *, watertight: bool = T
     positions: (V, 3) float32; faces: (F, 3) int32, at least one. mi: the module of the variant.
     watertight costs some speed and matters to Embree alone: leave it on for labels.
     """
-    mesh = mi.Mesh("house", len(positions), len(faces))
-    parameters = mi.traverse(mesh)
-    parameters["vertex_positions"] = np.ascontiguousarray(positions, np.float32).ravel()
-    parameters["faces"] = np.ascontiguousarray(faces, np.uint32).ravel()
-    parameters.update()
+    mesh = mitsuba_mesh(mi, MESH_NAME, positions, faces)
     return mi.load_dict(
-        {"type": "scene", "embree_use_robust_intersections": watertight, "house": mesh}
+        {"type": "scene", "embree_use_robust_intersections": watertight, MESH_NAME: mesh}
     )
 
 

@@ -20,6 +20,7 @@ from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.gloss import MIN_ALPHA
 from pbrs_farm.core.lighting import Group
 from pbrs_farm.core.recipe import LightFields
+from pbrs_farm.raycast.mitsuba_mesh import mitsuba_mesh
 from pbrs_farm.raycast.variant import mitsuba
 from pbrs_farm.transport.scene_tables.material_rows import (
     ALPHA,
@@ -94,7 +95,7 @@ class ScalarScene:
             if group is Group.INDOOR and tag >> 16 != NO_LAMP:
                 radiance = [float(v) for v in t.lamp_rows[int(tag >> 16), :3]]
                 fields["emitter"] = {"type": "area", "radiance": {"type": "rgb", "value": radiance}}
-            shapes[f"mesh_{tag}_{int(flipped)}"] = _mitsuba_mesh(mi, t.face_rows[faces], fields)
+            shapes[f"mesh_{tag}_{int(flipped)}"] = _mesh_of_rows(mi, t.face_rows[faces], fields)
         return shapes
 
 
@@ -103,28 +104,19 @@ def _is_mirrored(rows: F32) -> Bools:
     return np.asarray(a[:, 0] * b[:, 1] < a[:, 1] * b[:, 0])
 
 
-def _mitsuba_mesh(mi: Any, rows: F32, fields: dict[str, Any]) -> Any:
-    # Give every face separate corners; a mesh takes its BSDF and emitter at construction.
-    n = len(rows)
-    properties = mi.Properties()
-    for name, plugin in fields.items():
-        properties[name] = mi.load_dict(plugin)
-    mesh = mi.Mesh(
-        "part", 3 * n, n, props=properties, has_vertex_normals=True, has_vertex_texcoords=True
-    )
+def _mesh_of_rows(mi: Any, rows: F32, fields: dict[str, Any]) -> Any:
+    # Faces share no corners.
     corners = rows[:, None, ORIGIN] + np.stack(
         [0 * rows[:, EDGE1], rows[:, EDGE1], rows[:, EDGE2]], 1
     )
     # Mitsuba measures v downwards, from the first row of a picture.
     uvs = rows[:, None, UV0] + np.stack([0 * rows[:, DUV1], rows[:, DUV1], rows[:, DUV2]], 1)
     uvs[..., 1] = 1 - uvs[..., 1]
-    parameters = mi.traverse(mesh)
-    parameters["vertex_positions"] = np.ascontiguousarray(corners, np.float32).ravel()
-    parameters["vertex_normals"] = np.stack([rows[:, c] for c in NORMALS], 1).ravel()
-    parameters["vertex_texcoords"] = np.ascontiguousarray(uvs, np.float32).ravel()
-    parameters["faces"] = np.arange(3 * n, dtype=np.uint32)
-    parameters.update()
-    return mesh
+    return mitsuba_mesh(
+        mi, "part", corners.reshape(-1, 3), np.arange(3 * len(rows)).reshape(-1, 3),
+        normals=np.stack([rows[:, c] for c in NORMALS], 1).reshape(-1, 3), uvs=uvs.reshape(-1, 2),
+        plugins={name: mi.load_dict(plugin) for name, plugin in fields.items()},
+    )  # fmt: skip
 
 
 def _bsdf(mi: Any, row: F32, tables: SceneTables, *, mirrored: bool) -> dict[str, Any]:

@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F32
-from pbrs_farm.raycast.tracer import scene_from_mesh
+from pbrs_farm.raycast.mitsuba_mesh import move_vertices
+from pbrs_farm.raycast.tracer import MESH_NAME, scene_from_mesh
 from pbrs_farm.transport.kernels.bsdf import Bsdf, thin_glass_reflectance, thin_glass_transmittance
 from pbrs_farm.transport.kernels.packets import colour, point, vector
 from pbrs_farm.transport.kernels.sampler import device_array
@@ -131,13 +132,10 @@ class DeviceScene:
 
         Guiding's entries in the rows are kept. Acceleration structures are rebuilt. Emitters must not move.
         """
-        flat = np.ascontiguousarray(positions, np.float32).ravel()
         scenes = {id(s): s for s in (self._all, self._fast, self._opaque, self._transparent)}
         for scene in scenes.values():
             if scene is not None:
-                parameters = mi.traverse(scene)
-                parameters["house.vertex_positions"] = flat
-                parameters.update()
+                move_vertices(mi, scene, MESH_NAME, positions)
         geometric = np.setdiff1d(
             np.arange(FACE_FLOATS), (FRONT_PDF, BACK_PDF, TARGET_EMITTER)
         ).astype(np.uint32)

@@ -33,6 +33,7 @@ from pbrs_farm.transport.kernels.outdoor_choice import OutdoorChoice, choose_tec
 from pbrs_farm.transport.kernels.packets import colour, vector
 from pbrs_farm.transport.kernels.sampler import (
     alias_rows,
+    as_random,
     device_array,
     opaque3,
     sample_alias_table,
@@ -180,10 +181,11 @@ class Emitters:
         active = active & self._has_lamps
         nearby_share = self._nearby_share(near.reference)
         is_near = u < nearby_share
-        rest = dr.select(
-            is_near, u / dr.maximum(nearby_share, 1e-6), (u - nearby_share) / (1 - nearby_share)
+        rest = as_random(
+            dr.select(
+                is_near, u / dr.maximum(nearby_share, 1e-6), (u - nearby_share) / (1 - nearby_share)
+            )
         )
-        rest = dr.clip(rest, 0, 1 - 1e-7)
         lamp, v = sample_alias_table(self._lamp_alias, mi.UInt32(0), self._n_lamps, rest, active)
         near_lamp, near_v = sample_discrete(near.lamps, near.chances, near.reference.total, rest)
         lamp, u = dr.select(is_near, near_lamp, lamp), dr.select(is_near, near_v, v)

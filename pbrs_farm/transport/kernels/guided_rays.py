@@ -37,6 +37,7 @@ from pbrs_farm.transport.kernels.lamp_guiding import (
     sample_discrete,
 )
 from pbrs_farm.transport.kernels.path_state import PathState
+from pbrs_farm.transport.kernels.sampler import as_random
 
 # Guided part of the rays scattered at a vertex. In between it takes the rays that roulette would
 # end, so that daylight, which is not guided, loses little.
@@ -123,8 +124,7 @@ def sample_guided(
     u_bsdf = dr.select(is_guided, 0, (u - share) / (1 - share))
     v = u / dr.maximum(share, 1e-6)
     is_cone = is_guided & (v < cone_share)
-    v = dr.select(is_cone, v / CONE_SHARE, (v - cone_share) / (1 - cone_share))
-    v = dr.clip(v, 0, 1 - 1e-7)
+    v = as_random(dr.select(is_cone, v / CONE_SHARE, (v - cone_share) / (1 - cone_share)))
     # Choose a lamp, and a point on one of its targets.
     near = guiding.near
     lamp, rest = sample_discrete(near.lamps, near.guided, near.reference.guided_total, v)

@@ -20,7 +20,7 @@ from pbrs_farm.core.arrays import F32, F64
 from pbrs_farm.core.frames import LUMINANCE
 from pbrs_farm.transport.kernels.guiding_targets import GuidingTargets, no_targets
 from pbrs_farm.transport.kernels.packets import point
-from pbrs_farm.transport.kernels.sampler import device_array
+from pbrs_farm.transport.kernels.sampler import as_random, device_array
 from pbrs_farm.transport.scene_tables.scene_tables import SceneTables, bounding_spheres
 
 MAX_NEAR: Final = 8  # lamps weighted by position
@@ -239,7 +239,7 @@ def sample_discrete(values: list[Any], weights: list[Any], total: Any, u: Any) -
         value = dr.select(is_it, candidate, value)
         again = dr.select(is_it, (x - below) / dr.maximum(weight, 1e-30), again)
         below += weight
-    return value, dr.clip(again, 0, 1 - 1e-7)
+    return value, as_random(again)
 
 
 def sample_cones(cones: Cones, u: Any, uv: Any) -> Any:

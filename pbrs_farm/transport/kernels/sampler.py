@@ -129,6 +129,14 @@ def unit_float(bits: Any) -> Any:
     return mi.Float(bits >> 8) * (1.0 / (1 << 24))
 
 
+def as_random(u: Any) -> Any:
+    """Clamp a reused random number to [0, 1), against rounding; NaN becomes 0.
+
+    Random numbers become indices, and a NaN is no index.
+    """
+    return dr.minimum(dr.fmax(u, 0), 1 - 1e-7)
+
+
 def _laine_karras(x: Any, seed: Any) -> Any:
     # Scramble a bit-reversed number uniformly, nested; constants of Vegdahl 2021.
     x = x ^ (x * mi.UInt32(0x3D20ADEA))
@@ -166,7 +174,7 @@ def sample_alias_table(alias: Any, first: Any, count: Any, u: Any, active: Any) 
     stay = f < row[0]
     # Stretch the remainder of u to [0, 1).
     again = dr.select(stay, f / row[0], (f - row[0]) / (1 - row[0]))
-    return dr.select(stay, i, other), dr.clip(again, 0, 1 - 1e-7)
+    return dr.select(stay, i, other), as_random(again)
 
 
 def alias_rows(weights: NDArray[np.floating]) -> F32:

@@ -109,7 +109,7 @@ class SunPlane:
             (dr.dot(q, axis) - low) / self._edge
             for axis, low in zip((self._a, self._b), self._low, strict=True)
         )
-        column, row = mi.UInt32(dr.maximum(x, 0)), mi.UInt32(dr.maximum(y, 0))
+        column, row = mi.UInt32(dr.fmax(x, 0)), mi.UInt32(dr.fmax(y, 0))  # no index is NaN
         inside = (
             (ahead < REACH_M)
             & (x >= 0)

@@ -31,9 +31,9 @@ class VoxelGrid:
         self._shape = [dr.opaque(mi.UInt32, int(n)) for n in shape]
 
     def voxel(self, p: Any) -> Any:
-        """The number of the voxel of p, the nearest one for a p outside."""
-        at = dr.maximum((mi.Vector3f(p) - self._low) * self._scale, 0)
-        x, y, z = (dr.minimum(mi.UInt32(at[k]), self._shape[k] - 1) for k in range(3))
+        """Index of the voxel of p; of the nearest one if p is outside, of the first if p is NaN."""
+        place = dr.fmax((mi.Vector3f(p) - self._low) * self._scale, 0)
+        x, y, z = (dr.minimum(mi.UInt32(place[k]), self._shape[k] - 1) for k in range(3))
         return (x * self._shape[1] + y) * self._shape[2] + z
 
     def centres(self) -> F64:
