@@ -8,7 +8,7 @@ HOME_NAME ?= Studio
 # Processes of ours find their modules compiled: without that each takes a second of CPU more.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help setup demo lint check check-fast test test-all test-long test-farm test-infra test-kube test-slow test-web test-sweethome3d test-study test-manual test-notebooks test-cuda gpu-check bench bench-light bench-light-tables bench-cycles bench-farm dist image docs format clean
+.PHONY: help setup demo lint check check-fast test test-all test-long test-oldest test-newest test-farm test-infra test-kube test-slow test-web test-sweethome3d test-study test-manual test-notebooks test-cuda gpu-check bench bench-light bench-light-tables bench-cycles bench-farm dist image docs format clean
 
 # Markers of the tests that need more than a CPU and the packages of `make setup` and `make test-all`.
 APART := not gpu and not infra and not kube and not sweethome3d and not notebooks and not pages
@@ -78,6 +78,12 @@ test-all: setup ## every other test for a machine without a GPU: long, slow, stu
 
 test-long: setup ## what make test leaves out below a minute a test: long, and all examples of hypothesis
 	$(BIN)/pytest -n 2 --dist loadfile --hypothesis-profile=long -m "$(LONG)"
+
+test-oldest: setup ## the quick tests with the lowest versions that pyproject.toml names: out/oldest-venv; NAME=tests/store for a part
+	@bash scripts/test_versions.sh oldest "$(QUICK)" $(NAME)
+
+test-newest: setup ## the quick tests with the newest Python here and the newest versions: out/newest-venv
+	@bash scripts/test_versions.sh newest "$(QUICK)" $(NAME)
 
 test-slow: setup ## the tests that take minutes
 	$(BIN)/pytest -m slow

@@ -105,7 +105,7 @@ missing_on_macos() {
 
 find_python() {
   local p
-  for p in "${PYTHON:-}" python3 python3.13 python3.12 python3.11; do
+  for p in "${PYTHON:-}" python3 python3.14 python3.13 python3.12 python3.11; do
     [ -n "$p" ] && command -v "$p" >/dev/null || continue
     if "$p" -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then
       command -v "$p"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,9 @@ def loaded(path: Path) -> Any:
 
 def test_ci_runs_the_one_script_on_every_python_that_the_project_takes() -> None:
     job = loaded(REPO / ".github/workflows/ci.yml")["jobs"]["test"]
-    assert job["strategy"]["matrix"]["python"] == ["3.11", "3.12", "3.13"]
+    project = tomllib.loads((REPO / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    pythons = [c.rpartition(" ")[2] for c in project["classifiers"] if ":: Python :: 3." in c]
+    assert job["strategy"]["matrix"]["python"] == pythons
     assert [step["run"] for step in job["steps"] if "run" in step][-1] == ".ci/run"
     assert (REPO / ".ci/run").exists()
 
@@ -41,6 +44,12 @@ def test_a_workflow_makes_targets_that_there_are(path: Path) -> None:
     makefile = (REPO / "Makefile").read_text(encoding="utf-8")
     for target in made:
         assert re.search(rf"^{target}:", makefile, re.MULTILINE), target
+
+
+@pytest.mark.parametrize("path", WORKFLOWS, ids=lambda p: p.stem)
+def test_a_workflow_names_actions_by_the_digest_of_a_commit(path: Path) -> None:
+    for action in re.findall(r"uses: (.*)", path.read_text(encoding="utf-8")):
+        assert re.fullmatch(r"[\w/-]+@[0-9a-f]{40} # v\d+\.\d+\.\d+", action), action
 
 
 @pytest.mark.parametrize("path", [f for f in FORMS if f.stem != "config"], ids=lambda p: p.stem)

@@ -76,7 +76,7 @@ def view_of(root: Path, written: Path, frame: loaders.HypersimFrame) -> Path:
     rows = pd.read_csv(written / "index.csv")
     at = (rows.scene_name == frame.scene.name) & (rows.camera_name == frame.camera)
     row = rows[at & (rows.frame_id == frame.frame)].iloc[0]
-    return root / "houses" / row.house / "views" / row.view
+    return root / "houses" / row["house"] / "views" / row["view"]
 
 
 def stored(view: Path, name: str) -> np.ndarray:
