@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -210,8 +211,25 @@ def test_a_heartbeat_does_not_hold_up_a_worker_while_redis_stalls(
         step = Heartbeat(None)
         step._heartbeat()
         assert server.client.zcard("pbrs:workers") == 1
-        # The connection that it has, and one more: each may take 30 s, the probe waits for 120.
-        n_tries = 1 + proxy.n_connections
+        # One timeout and no second try: the probe waits for 120 s.
+        n_connections = proxy.n_connections
         proxy.stall(also_new=True)
         step._heartbeat()
-        assert proxy.n_connections == n_tries
+        assert proxy.n_connections == n_connections
+
+
+def test_one_timeout_is_enough_where_all_connections_are_silent(
+    server: RedisServer, farm_config: FarmConfig
+) -> None:
+    with StallingProxy(server.port) as proxy:
+        url = Secret(f"{proxy.url}?socket_timeout=0.3")
+        ledgers = [RedisLedger(replace(farm_config, redis_url=url)) for _ in range(3)]
+        for ledger in ledgers:
+            assert ledger.active_jobs() == []
+        proxy.stall()
+        began = time.monotonic()
+        with pytest.raises(LedgerUnavailable, match="Timeout"):
+            ledgers[0].active_jobs()
+        for ledger in ledgers:
+            assert ledger.active_jobs() == []
+        assert 0.3 <= time.monotonic() - began < 0.6

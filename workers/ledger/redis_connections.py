@@ -1,17 +1,25 @@
-"""Treat temporary refusals of Redis as lost connections. Effects: sockets.
+"""Treat temporary refusals and the silence of Redis as lost connections. Effects: sockets.
 
 A replica that has just lost its lead answers READONLY, a full disk MISCONF, a starting server LOADING: the request is
 valid and will succeed later, perhaps on another server of the same name. redis-py raises a dozen classes for these,
 kombu treats most of them as errors of the caller, and Celery's worker ends at one. Here all of them become a lost
 connection, on which the ledger, kombu and Celery wait and retry.
+
+A proxy may keep connections open and forward nothing. Each of them would cost its own timeout, so after the first
+timeout the process replaces all its connections.
 """
 
 from __future__ import annotations
 
 import re
+import time
 from typing import Any, Final
 
 import redis
+
+ANSWER_S: Final = (
+    10  # Redis that sends nothing for so long is away; above the longest blocking read
+)
 
 # From Redis' own list (createSharedObjects of server.c, script.c, cluster.c): refusals that say nothing of the command.
 # Not in it: what stays wrong (NOAUTH, NOPERM, WRONGTYPE, MOVED) and what redis-py answers itself (NOSCRIPT).
@@ -55,18 +63,43 @@ def _answer(error: Exception) -> str:
     return text if not prefix or text.startswith(prefix) else f"{prefix} {text}"
 
 
+class _Silence:
+    """When a connection of this process last got no answer in time; monotonic seconds."""
+
+    at = -1.0
+
+
 class _LostWhereRefused:
-    """Mixin of redis-py's connections: an answer that refuses for now ends the connection."""
+    """Mixin of redis-py's connections: a refusal for now ends the connection, a silence all of them."""
+
+    _made_at: float | None = None  # None = not connected
+
+    def connect(self) -> None:
+        self._made_at = self._made_at or time.monotonic()
+        super().connect()  # type: ignore[misc]
+
+    def disconnect(self, *args: Any, **options: Any) -> None:
+        self._made_at = None
+        super().disconnect(*args, **options)  # type: ignore[misc]
+
+    def send_packed_command(self, *args: Any, **options: Any) -> None:
+        if self._made_at and self._made_at <= _Silence.at:
+            self.disconnect()
+        self._made_at = self._made_at or time.monotonic()
+        super().send_packed_command(*args, **options)  # type: ignore[misc]
 
     def read_response(self, *args: Any, **options: Any) -> Any:
         try:
             return super().read_response(*args, **options)  # type: ignore[misc]
+        except redis.TimeoutError:
+            _Silence.at = time.monotonic()
+            raise
         except redis.RedisError as error:
             prefix = passing_prefix(error)
             if not prefix:
                 raise
             # The next try connects anew: the name may lead to the new master by then.
-            self.disconnect()  # type: ignore[attr-defined]
+            self.disconnect()
             raise RefusedForNow(prefix, _answer(error)) from error
 
 

@@ -20,7 +20,7 @@ from redis.retry import Retry
 
 from workers.config import FarmConfig, shown_url
 from workers.ids import LIGHT_GPU, POOLS, STAGES
-from workers.ledger.redis_connections import BY_SCHEME, RefusedForNow
+from workers.ledger.redis_connections import ANSWER_S, BY_SCHEME, RefusedForNow
 from workers.ledger.task_ledger import (
     ALIVE_S,
     EVERYWHERE,
@@ -59,11 +59,11 @@ _REAP_MOST: Final = 200  # in one script, which nobody else can interrupt
 _RESEND_MOST: Final = 500
 
 
-def redis_client(config: FarmConfig, n_retries: int = 5) -> Any:
-    """A client that tries again for a few seconds, also where Redis refuses for now, and never hangs
-    on a half-open connection.
+def redis_client(config: FarmConfig) -> Any:
+    """A client that retries lost connections and passing refusals for a few seconds, but no timeout.
 
-    Typed Any: redis-py types every answer as str, bytes, None or an awaitable.
+    The caller decides what follows a timeout. Typed Any: redis-py types every answer as str, bytes,
+    None or an awaitable.
     """
     url = config.redis_url.reveal()
     scheme = url.partition(":")[0]
@@ -74,12 +74,11 @@ def redis_client(config: FarmConfig, n_retries: int = 5) -> Any:
     return redis.Redis.from_url(
         url,
         decode_responses=True,
-        socket_timeout=30,  # above the longest blocking read
+        socket_timeout=ANSWER_S,
         socket_connect_timeout=5,
         socket_keepalive=True,
         health_check_interval=25,
-        retry=Retry(ExponentialWithJitterBackoff(cap=2.0, base=0.05), n_retries),
-        retry_on_error=[redis.ConnectionError, redis.TimeoutError],
+        retry=Retry(ExponentialWithJitterBackoff(cap=2.0, base=0.05), 5, (redis.ConnectionError,)),
         client_name="pbrs-ledger",
         **kind,
         **tls,

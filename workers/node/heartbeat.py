@@ -11,7 +11,7 @@ from celery.worker import state
 
 from pbrs_farm.operating_system import tree_mb
 from workers.config import config_from_environment
-from workers.ledger.redis_ledger import RedisLedger, redis_client
+from workers.ledger.redis_ledger import RedisLedger
 from workers.ledger.task_ledger import LedgerUnavailable
 from workers.ledger.worker_registry import Registry
 from workers.liveness import touch
@@ -28,9 +28,7 @@ class Heartbeat(bootsteps.StartStopStep):  # type: ignore[misc]
     def __init__(self, parent: Any, **options: Any) -> None:
         super().__init__(parent, **options)
         self._config = config_from_environment()
-        # A Redis that stalls must not hold up this loop for as long as the liveness probe waits.
-        client = redis_client(self._config, n_retries=1)
-        self._registry = Registry(RedisLedger(self._config, client))
+        self._registry = Registry(RedisLedger(self._config))
         self._timer: Any = None
 
     def start(self, parent: Any) -> None:

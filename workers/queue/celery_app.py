@@ -21,6 +21,7 @@ from pbrs_farm.operating_system import die_with_parent
 from pbrs_farm.store.s3 import forbid_in_this_process
 from workers.config import FarmConfig, config_from_environment
 from workers.ids import QUEUES
+from workers.ledger.redis_connections import ANSWER_S
 from workers.liveness import touch
 
 MAX_MESSAGE: Final = 2048  # bytes
@@ -77,10 +78,10 @@ _TRANSPORT: Final[dict[str, Any]] = {
     "visibility_timeout": _VISIBILITY_S,
     "unacked_restore_interval": 10,
     "unacked_restore_throttle": 1,
-    "socket_timeout": 30,
+    "socket_timeout": ANSWER_S,
     "socket_connect_timeout": 5,
     "socket_keepalive": True,
-    "health_check_interval": 25,
+    "health_check_interval": ANSWER_S,
     "sep": ":",
     "client_name": "pbrs-celery",
 }
