@@ -58,6 +58,11 @@ def published_directions(world: F64, pose: F64) -> F64:
     return np.stack([right, forward, -down], axis=1)
 
 
+def dot(a: NDArray[Any], b: NDArray[Any]) -> F64:
+    """(...) dot products of vectors (..., 3)."""
+    return np.asarray(np.einsum("...i,...i->...", a, b))
+
+
 def is_rigid(pose: F64, tolerance: float = 1e-6) -> bool:
     """True if a (4, 4) matrix is a rotation and a translation."""
     is_affine = pose.shape == (4, 4) and bool((pose[3] == [0, 0, 0, 1]).all())

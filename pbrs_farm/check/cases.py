@@ -18,7 +18,7 @@ from pbrs_farm.check.moved_house import MovedHouse, house_at
 from pbrs_farm.check.stored_house import StoredHouse
 from pbrs_farm.check.stored_mesh import Triangles
 from pbrs_farm.check.stored_view import StoredView
-from pbrs_farm.core.arrays import F32, I64, Bools
+from pbrs_farm.core.arrays import F32, F64, I64, Bools
 
 SAMPLE = 2000  # pixels of each view to recompute by default
 _MOST_TIMES = 4  # cached scenes of a moving house: at rest, a frame and its neighbours
@@ -34,6 +34,42 @@ class Scene(NamedTuple):
 
     triangles: Triangles
     rays: Hits
+
+
+@dataclass(frozen=True, eq=False)
+class Cast:
+    """N pixels of a view and the first hits of their rays."""
+
+    rays: Hits
+    rows: I64
+    columns: I64
+    origin: F64  # (3,)
+    directions: F64  # (N, 3)
+    face: I64  # (N,), -1 = nothing
+
+    def some(self, index: NDArray[Any]) -> Cast:
+        """Some of the pixels."""
+        rows, columns = self.rows[index], self.columns[index]
+        directions, face = self.directions[index], self.face[index]
+        return Cast(self.rays, rows, columns, self.origin, directions, face)
+
+    @property
+    def z(self) -> F64:
+        """(N,) distance of the hits in lengths of directions."""
+        return self.rays.distance(self.face, self.origin, self.directions)
+
+    @property
+    def point(self) -> F64:
+        """(N, 3) the hits."""
+        return np.asarray(self.origin + self.directions * self.z[:, None])
+
+    @property
+    def normal(self) -> F64:
+        """(N, 3) unit normals of the faces, towards the camera."""
+        return self.rays.normal(self.face, self.directions)
+
+    def __len__(self) -> int:
+        return len(self.face)
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,6 +217,12 @@ class ViewCase:
     def expect(self, check: str, file: str = "") -> Expect:
         """Reports facts of a check, about the view or a file of it."""
         return self.tally.at(check, f"{self.place}/{file}".rstrip("/"))
+
+    def cast(self, rows: I64, columns: I64) -> Cast:
+        """The first hits of pixels' rays among all triangles."""
+        origin, directions = self.view.rays(rows, columns)
+        face = self.now.rays.first(origin, directions)
+        return Cast(self.now.rays, rows, columns, origin, directions, face)
 
     def sample(self, n_pixels: int | None) -> Pixels:
         """Rows and columns of all pixels, or of a sample that the view's name fixes."""

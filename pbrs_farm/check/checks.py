@@ -18,15 +18,15 @@ Subject = Literal["root", "files", "house", "camera", "view", "views"]
 """What a check looks at: a root, the files of a house, its documents, a view's camera, a view, all views of a house."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Check:
     """An entry of the table."""
 
     name: str
     of: Subject
     function: Callable[[Any], None]  # takes the case of its subject: see cases.py
-    needs: tuple[str, ...] = ()  # layers or files, one of which must be present; () = always runs
     cost: int  # order among the checks of a subject: cheap ones run first
+    needs: tuple[str, ...] = ()  # layers or files, one of which must be present; () = always runs
     files: Mapping[str, str] = field(default_factory=dict)
     """File of a view that only this check recomputes -> how, for the certificate's list."""
 

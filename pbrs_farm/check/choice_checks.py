@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from pbrs_farm.check.axes import is_rigid, opencv_pose, opencv_transform
 from pbrs_farm.check.cases import HouseCase
@@ -36,7 +37,7 @@ def check_choice(case: HouseCase) -> None:
     ids = [row["id"] for row in rows]
     expect(len(set(ids)) == len(ids), "a view stands twice in cameras.json")
     n_views = report.get("n_views")
-    n_firsts = sum(not Shot.of_row(row["id"], row).eye for row in rows)
+    n_firsts = sum(not _eye(row) for row in rows)
     expect(n_views in (len(rows), n_firsts), f"reports {n_views} views of {len(rows)}")
     in_marker = house.marker_facts("cameras").get("views")
     if in_marker:
@@ -46,6 +47,11 @@ def check_choice(case: HouseCase) -> None:
     for row in rows:
         _check_view(case, row)
     _check_sequence(case, rows)
+
+
+def _eye(row: Mapping[str, Any]) -> str:
+    """The camera of a rig that took a view, "" for its first."""
+    return Shot.of_row(row["id"], row).eye
 
 
 def _check_report(case: HouseCase, report: Mapping[str, Any]) -> None:
@@ -103,9 +109,7 @@ def _check_view(case: HouseCase, row: Mapping[str, Any]) -> None:
         is_free = row["origin"] == "walk" or "rig" in row
         same &= is_free or is_within(room["polygon"], np.array([x, z]))
         expect(same, f"does not stand in room {row['room']}")
-    first = (
-        house.camera_rows.get(row["rig"]["instant"]) if Shot.of_row(row["id"], row).eye else None
-    )
+    first = house.camera_rows.get(row["rig"]["instant"]) if _eye(row) else None
     if first is not None:
         # A rig is judged once an instant.
         same = (row["objects"], row["score"]) == (first["objects"], first["score"])
@@ -158,18 +162,14 @@ def _check_sequence(case: HouseCase, rows: list[dict[str, Any]]) -> None:
         place = f"{case.house.id} {row['id']} in cameras.json"
         frame = row.get("frame")
         if frame is not None:
-            name = Shot.of_frame(frame, Shot.of_row(row["id"], row).eye).id
+            name = Shot.of_frame(frame, _eye(row)).id
             judge("frame", place, case.tally, row=row, name=name)
             if fields.get("source") == "walk":
                 time_s = frame / fields["walk_fps"]
                 judge("time of a frame", place, case.tally, row=row, time_s=time_s)
         if "rig" in row or fields.get("stereo_m") or recipe.get("rig"):
             _check_rig(case, row, place)
-    times = [
-        row["time_s"]
-        for row in rows
-        if row.get("frame") is not None and not Shot.of_row(row["id"], row).eye
-    ]
+    times = [row["time_s"] for row in rows if row.get("frame") is not None and not _eye(row)]
     ascend = all(b > a for a, b in itertools.pairwise(times))
     case.expect("sequence")(ascend, "its frames do not follow each other in time")
 
@@ -184,21 +184,16 @@ def rig_of_recipe(recipe: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
 
 
 def _rig_from_camera(row: Mapping[str, Any]) -> F64:
-    """(4, 4) pose of a camera in the recipe's rig, by products of single rotations, or its quaternion."""
+    """(4, 4) pose of a camera in the recipe's rig, by its angles or its quaternion."""
     pose = np.eye(4)
     pose[:3, 3] = row.get("translation_m", (0.0, 0.0, 0.0))
-    if row.get("rotation_wxyz") is not None:
-        w, *xyz = np.array(row["rotation_wxyz"]) / np.linalg.norm(row["rotation_wxyz"])
-        v = np.array(xyz)
-        cross = np.cross(np.eye(3), v)
-        pose[:3, :3] = (w * w - v @ v) * np.eye(3) + 2 * np.outer(v, v) + 2 * w * cross
-        return pose
-    angles = [np.radians(row.get(f"{name}_deg", 0.0)) for name in ("yaw", "pitch", "roll")]
-    c, s = np.cos(angles), np.sin(angles)
-    about_y = np.array([[c[0], 0, s[0]], [0, 1, 0], [-s[0], 0, c[0]]])
-    about_x = np.array([[1, 0, 0], [0, c[1], -s[1]], [0, s[1], c[1]]])
-    about_z = np.array([[c[2], -s[2], 0], [s[2], c[2], 0], [0, 0, 1]])
-    pose[:3, :3] = about_y @ about_x @ about_z
+    wxyz = row.get("rotation_wxyz")
+    if wxyz is not None:
+        rotation = Rotation.from_quat(np.roll(wxyz, -1))
+    else:
+        angles = [row.get(f"{name}_deg", 0.0) for name in ("yaw", "pitch", "roll")]
+        rotation = Rotation.from_euler("YXZ", angles, degrees=True)
+    pose[:3, :3] = rotation.as_matrix()
     return pose
 
 
@@ -258,4 +253,4 @@ def _world_from_rig(row: Mapping[str, Any]) -> F64:
     return np.asarray(opencv_pose(row["world_from_camera_opengl"]) @ np.linalg.inv(camera))
 
 
-CHECKS = (Check(name="choice", of="house", needs=("cameras.json",), function=check_choice, cost=8),)
+CHECKS = (Check("choice", "house", check_choice, 8, ("cameras.json",)),)

@@ -54,8 +54,4 @@ def _lux_of_rooms(document: dict[str, Any]) -> dict[str, float]:
         return {}
 
 
-CHECKS = (
-    Check(
-        name="darkness", of="view", needs=("radiance",), function=check_darkness, cost=22,
-    ),
-)  # fmt: skip
+CHECKS = (Check("darkness", "view", check_darkness, 22, ("radiance",)),)

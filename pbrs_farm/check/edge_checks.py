@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pbrs_farm.check.axes import camera_normals
+from pbrs_farm.check.axes import camera_normals, dot
 from pbrs_farm.check.cases import ViewCase
 from pbrs_farm.check.checks import Check
 from pbrs_farm.core.arrays import F64, Bools
@@ -57,7 +57,7 @@ def check_typed_boundaries(case: ViewCase) -> None:
             least[side] = np.maximum(least[side], np.where(gap, mark, 0))
             may_be = np.where(may_be_gap, np.where(is_open, _OWNER, mark), 0)
             most[side] = np.maximum(most[side], may_be)
-        cosine = np.einsum("...i,...i->...", a.normal, b.normal)
+        cosine = dot(a.normal, b.normal)
         hit = (a.z > 0) & (b.z > 0)
         crease = hit & ~may_be_gap & (cosine < _CREASE_COSINE - _COSINE_ERROR)
         creases.append((crease, hit & ~gap & (cosine < _CREASE_COSINE + _COSINE_ERROR)))
@@ -94,8 +94,8 @@ def _gaps(a: _Sides, b: _Sides) -> tuple[Bools, Bools]:
 
 def _miss(side: _Sides, other: _Sides) -> tuple[F64, F64]:
     """Distance of the other's depth from the plane here, and its rounding error; metres."""
-    cosine = np.einsum("...i,...i->...", side.normal, side.ray)
-    other_cosine = np.einsum("...i,...i->...", side.normal, other.ray)
+    cosine = dot(side.normal, side.ray)
+    other_cosine = dot(side.normal, other.ray)
     with np.errstate(divide="ignore", invalid="ignore"):
         predicted = side.z * cosine / other_cosine
         size = np.abs(predicted)
@@ -124,7 +124,10 @@ def _in_blocks(across: Bools, down: Bools) -> Bools:
 
 CHECKS = (
     Check(
-        name="typed boundaries", of="view", needs=("boundary_occlusion", "boundary_crease"),
-        function=check_typed_boundaries, cost=14,
+        "typed boundaries",
+        "view",
+        check_typed_boundaries,
+        14,
+        ("boundary_occlusion", "boundary_crease"),
     ),
-)  # fmt: skip
+)

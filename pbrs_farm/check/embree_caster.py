@@ -11,6 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 import trimesh
 
+from pbrs_farm.check.axes import dot
 from pbrs_farm.check.stored_mesh import Triangles
 from pbrs_farm.core.arrays import F64, I64, Bools
 
@@ -114,15 +115,24 @@ class Rays:
         """
         normal, corner = self._normal[face], self._corner[face]
         with np.errstate(divide="ignore", invalid="ignore"):
-            height = np.einsum("ni,ni->n", normal, corner - origin)
-            t = height / np.einsum("ni,ni->n", normal, directions)
+            height = dot(normal, corner - origin)
+            t = height / dot(normal, directions)
         return np.where(face >= 0, t, 0.0)
 
     def normal(self, face: I64, directions: F64) -> F64:
         """(N, 3) unit normals of the triangles, turned against directions; 0 where face is -1."""
         normal = self._normal[face]
-        away = np.einsum("ni,ni->n", normal, directions)[:, None] > 0
+        away = dot(normal, directions)[:, None] > 0
         return np.where(face[:, None] >= 0, np.where(away, -normal, normal), 0.0)
+
+
+def is_visible(rays: Hits, eye: F64, points: F64, slack_m: Any) -> Bools:
+    """(N,) True if rays from the eye to points (N, 3) hit nothing more than slack_m before them."""
+    to = points - eye
+    face = rays.first(eye, to)
+    with np.errstate(invalid="ignore"):
+        gap = (1 - rays.distance(face, eye, to)) * np.linalg.norm(to, axis=1)
+        return np.asarray((face < 0) | (gap <= slack_m), bool)
 
 
 class _Embree:

@@ -240,4 +240,4 @@ def _check_light_facts(case: ViewCase) -> None:
         expect(same, f"lamp_weights sum to {total:.4f}")
 
 
-CHECKS = (Check(name="facts", of="view", function=check_facts, cost=10),)
+CHECKS = (Check("facts", "view", check_facts, 10),)

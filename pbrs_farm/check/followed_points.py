@@ -12,7 +12,7 @@ import numpy as np
 
 from pbrs_farm.check.axes import into_frame
 from pbrs_farm.check.cases import Pixels
-from pbrs_farm.check.embree_caster import Hits
+from pbrs_farm.check.embree_caster import Hits, is_visible
 from pbrs_farm.check.lens_rays import StoredLens
 from pbrs_farm.check.stored_view import StoredView
 from pbrs_farm.core.arrays import F64, I64, Bools
@@ -81,13 +81,8 @@ class OtherView:
 
 def is_seen(points: F64, other: OtherView, rays: Hits, slack_m: float = 0) -> Bools:
     """(N,) True if nothing is between the other eye and a point, beyond the error of 32-bit rays."""
-    to = points - other.eye
-    face = rays.first(other.eye, to)
-    t = rays.distance(face, other.eye, to)
-    distance = np.linalg.norm(to, axis=1)
-    with np.errstate(invalid="ignore"):
-        is_near = (1 - t) * distance <= slack_m + _REACH * (1 + distance)
-    return np.asarray((face < 0) | is_near, bool)
+    distance = np.linalg.norm(points - other.eye, axis=1)
+    return is_visible(rays, other.eye, points, slack_m + _REACH * (1 + distance))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -224,4 +224,4 @@ def _check_source(house: StoredHouse, document: Mapping[str, Any], tally: Tally)
         tally.expect("credits", house.id, same, "its id is not of that source")
 
 
-CHECKS = (Check(name="house", of="house", needs=("house.json",), function=check_house, cost=1),)
+CHECKS = (Check("house", "house", check_house, 1, ("house.json",)),)

@@ -175,11 +175,11 @@ def _check_surfaces(case: ViewCase, raw: Mapping[str, F64], *, noise: float) -> 
 
     At pixels amid one surface, by independent rays. noise: of denoised light.
     """
-    view, arrays, (triangles, rays) = case.view, case.arrays, case.scene
+    view, arrays, triangles = case.view, case.arrays, case.now.triangles
     if view.recipe is None or view.recipe.materials.preset != "physical":
         return
     rows, columns = np.nonzero(is_amid(arrays["instance"], arrays["normal"]))
-    face = rays.first(*view.rays(rows, columns))
+    face = case.cast(rows, columns).face
     kinds = triangles.kinds_of(face)
     clear = np.isin(kinds, ("mirror", "glass", "pane"))
     if clear.sum() >= _FEW:
@@ -215,8 +215,4 @@ def _check_surfaces(case: ViewCase, raw: Mapping[str, F64], *, noise: float) -> 
         case.expect("matte surfaces", "radiance.exr")(share >= _SHARE, fault)
 
 
-CHECKS = (
-    Check(
-        name="intrinsic", of="view", needs=("radiance",), function=check_intrinsic, cost=25,
-    ),
-)  # fmt: skip
+CHECKS = (Check("intrinsic", "view", check_intrinsic, 25, ("radiance",)),)

@@ -91,8 +91,6 @@ def check_articulation(case: ViewCase) -> None:
 
 
 CHECKS = (
-    Check(name="joints", of="house", needs=("house.json",), function=check_joints, cost=5),
-    Check(
-        name="articulation", of="view", needs=("part",), function=check_articulation, cost=16,
-    ),
-)  # fmt: skip
+    Check("joints", "house", check_joints, 5, ("house.json",)),
+    Check("articulation", "view", check_articulation, 16, ("part",)),
+)

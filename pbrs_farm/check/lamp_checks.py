@@ -96,4 +96,4 @@ def flux_lm(light: Mapping[str, Any], emission: Mapping[str, Any]) -> float:
     return max(float(flux), 0.0)
 
 
-CHECKS = (Check(name="lamps", of="view", needs=("radiance",), function=check_lamps, cost=21),)
+CHECKS = (Check("lamps", "view", check_lamps, 21, ("radiance",)),)

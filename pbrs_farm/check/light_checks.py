@@ -213,8 +213,4 @@ class _Shot:
         self.case.expect(check, self.file)(share >= _TILES, fault)
 
 
-CHECKS = (
-    Check(
-        name="light developed", of="view", needs=("radiance",), function=check_developed, cost=23,
-    ),
-)  # fmt: skip
+CHECKS = (Check("light developed", "view", check_developed, 23, ("radiance",)),)

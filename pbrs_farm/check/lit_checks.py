@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from pbrs_farm.check.axes import dot
 from pbrs_farm.check.cases import ViewCase
 from pbrs_farm.check.checks import Check
 from pbrs_farm.check.colours import LM_PER_W, has_channels, luminance_of
@@ -181,27 +182,25 @@ def _places(case: ViewCase) -> _Places:
     rows, columns = np.nonzero(flat)
     rng = np.random.default_rng(zlib.crc32(f"{view.place} lit".encode()))
     chosen = rng.permutation(len(rows))[:_PLACES]
-    rows, columns = rows[chosen], columns[chosen]
-    origin, directions = view.rays(rows, columns)
-    face = rays.first(origin, directions)
-    keep = (face >= 0) & (triangles.kinds_of(face) == "opaque")
-    keep &= np.isin(triangles.instance[face], matte_items(case.house))
-    rows, columns, face, directions = rows[keep], columns[keep], face[keep], directions[keep]
-    normal = rays.normal(face, directions)
+    cast = case.cast(rows[chosen], columns[chosen])
+    is_matte = np.isin(triangles.instance[cast.face], matte_items(case.house))
+    is_matte &= triangles.kinds_of(cast.face) == "opaque"
+    cast = cast.some((cast.face >= 0) & is_matte)
+    rows, columns, face, normal = cast.rows, cast.columns, cast.face, cast.normal
     points = []
     h = n // 2
     for dy, dx in ((0, 0), (-h, -h), (-h, h), (h, -h), (h, h)):
         _, ray = view.rays(rows + dy, columns + dx)
         with np.errstate(divide="ignore", invalid="ignore"):
-            point = origin + ray * rays.distance(face, origin, ray)[:, None]
+            point = cast.origin + ray * rays.distance(face, cast.origin, ray)[:, None]
         points.append(np.nan_to_num(point) + _PUSH_M * normal)
     corners = np.stack(points, axis=1)
     painted = (1 - COAT) * (1 - COAT / np.maximum(albedo[rows, columns], COAT))
-    towards = directions / np.linalg.norm(directions, axis=1, keepdims=True)
+    towards = cast.directions / np.linalg.norm(cast.directions, axis=1, keepdims=True)
     return _Places(
         rows, columns, corners[:, 0], normal, corners,
         np.where(coated_materials(case.house)[triangles.material[face]], painted, 1.0),
-        -np.einsum("ni,ni->n", normal, towards),
+        -dot(normal, towards),
     )  # fmt: skip
 
 
@@ -280,7 +279,7 @@ def _direct_lux(case: ViewCase, places: _Places, bulb: _Bulb) -> F64:
     middle = (corners.min(0) + corners.max(0)) / 2
     to = middle - places.points
     distance = np.linalg.norm(to, axis=1)
-    cosine = np.einsum("ni,ni->n", places.normals, to) / np.maximum(distance, 1e-6)
+    cosine = dot(places.normals, to) / np.maximum(distance, 1e-6)
     free = cosine > _LEAST_COSINE
     step = max(len(corners) // 8, 1)
     for target in (middle, *(middle + 0.9 * (c - middle) for c in corners[::step])):
@@ -362,7 +361,7 @@ def _shows(case: ViewCase, faces: Bools, rows: NDArray[Any], columns: NDArray[An
     """(N,) these places of the picture show one of the faces (F,)."""
     if not len(rows):
         return np.zeros(0, bool)
-    face = case.now.rays.first(*case.view.rays(rows, columns))
+    face = case.cast(rows, columns).face
     return np.asarray((face >= 0) & faces[face])
 
 
@@ -425,4 +424,4 @@ def _outer_area(corners: F64) -> float:
     return area if float((counts >= 2).mean()) > 0.95 else 2 * area
 
 
-CHECKS = (Check(name="sun and lamps", of="view", needs=("radiance",), function=check_lit, cost=27),)
+CHECKS = (Check("sun and lamps", "view", check_lit, 27, ("radiance",)),)

@@ -5,60 +5,32 @@ A file without a row is compared with its hash and, if it is a layer, its size a
 
 from __future__ import annotations
 
+import functools
 from collections import Counter
 from pathlib import Path
+from typing import Literal
 
 from pbrs_farm.check.checks import all_checks
 from pbrs_farm.check.fields import field_lines
-from pbrs_farm.check.intrinsic_checks import LAYERS as INTRINSIC
 from pbrs_farm.check.pixel_checks import RAY_LAYERS
 from pbrs_farm.check.stored_view import StoredView
-from pbrs_farm.core.layers import LAYER, LAYERS, MOST_VARIANTS, OWN_LAYERS
+from pbrs_farm.core.layers import LAYER, LAYERS, OWN_LAYERS
+from pbrs_farm.core.record import Record, read_csv
 
-RAYS = "recomputed by rays"
-FORMULA = "recomputed from other layers"
-_MOTION = "followed by rays from view to view"
-_BEHIND = "recomputed by rays without glass"
-_MIRRORED = "recomputed by rays that mirrors send on"
-_INTRINSIC = "albedo x shading + residual against radiance.exr developed again, matte surfaces and clear ones by materials"
-_NOISE = "each value within its noise, mean and spread by their statistics"
 
-# File -> how it is recomputed. Checks may have further ones: see `how_of_files`.
-HOW: dict[str, str] = {
-    **{LAYER[name].file: RAYS for name in RAY_LAYERS},
-    "boundary.png": FORMULA, "boundary_semantic.png": FORMULA, "nyu13.png": FORMULA,
-    "class_source.png": FORMULA, "hha.png": FORMULA, "histogram.json": FORMULA,
-    "depth_sensor.png": _NOISE, "depth_sensor_tof.png": _NOISE, "depth_sensor_stereo.png": _NOISE,
-    "depth_sensor_d455.png": _NOISE, "depth_sensor_azure.png": _NOISE, "depth_sensor_l515.png": _NOISE,
-    "mlt_ol.png": "developed from radiance.exr again",
-    "mlt_il_ol.png": "developed from radiance.exr again",
-    **{LAYER[f"mlt_il_ol.{n}"].file: "developed from radiance.exr again" for n in range(1, MOST_VARIANTS + 1)},
-    "opengl_dl.png": "its edges against those of the instances",
-    "opengl_il.png": "its edges against those of the instances",
-    "articulation.json": "joints against house.json, their axes turned into the camera's frame again",
-    "view.json": "camera by rays; boxes, shares and counts recomputed; each field has its check",
-    "radiance.exr": "its guides against surfaces, its steps against their albedo, sun and bulbs by shadow rays",
-    "projector.png": "dots thrown again by rays, where rays through pixels meet",
-    **{f"{name}.exr": _INTRINSIC for name in INTRINSIC},
-    "boundary_occlusion.png": FORMULA, "boundary_crease.png": FORMULA,
-    "behind_glass/depth.png": _BEHIND, "behind_glass/normal.png": _BEHIND,
-    "behind_glass/semantic.png": _BEHIND, "behind_glass/instance.png": _BEHIND,
-    "behind_mirror/depth.png": _MIRRORED, "behind_mirror/normal.png": _MIRRORED,
-    "behind_mirror/semantic.png": _MIRRORED, "behind_mirror/instance.png": _MIRRORED,
-    "flow_forward.exr": _MOTION, "flow_forward_kitti.png": _MOTION, "occlusion_forward.png": _MOTION,
-    "scene_flow.exr": _MOTION, "flow_backward.exr": _MOTION, "flow_backward_kitti.png": _MOTION,
-    "occlusion_backward.png": _MOTION, "disparity.png": _MOTION, "occlusion_stereo.png": _MOTION,
-}  # fmt: skip
+class _Method(Record):
+    """The method for a file."""
 
-# The same of the files of a house and of a root, beside their fields.
-HOW_OF_HOUSE: dict[str, str] = {
-    "house.glb": "its triangles are what rays meet; items, materials and pictures are those of house.json",
-    "house.json": "each field has its check", "cameras.json": "each field has its check",
-    "illuminance.json": "each field has its check; no light is traced",
-    "repair.json": "rooms and lamps as house.json", "dress.json": "credits as ATTRIBUTION.txt",
-    "tracks.npz": "points followed by rays through up to twelve stored frames", "pairs.parquet": "followed by rays from view to view", "manifest.jsonl": "each file's size and hash",
-    "recipe.json": "by the digest and the seeds of its views", "ATTRIBUTION.txt": "names what dress.json says must be",
-}  # fmt: skip
+    of: Literal["view", "house"]
+    file: str
+    how: str
+
+
+@functools.cache
+def _methods(of: str) -> dict[str, str]:
+    rows = read_csv(Path(__file__).with_name("methods.csv"), _Method)
+    return {row.file: row.how for row in rows if row.of == of}
+
 
 # Facts that no file of a root holds.
 _NEVER = (
@@ -69,7 +41,9 @@ _NEVER = (
 
 def how_of_files() -> dict[str, str]:
     """File of a view -> how it is recomputed, also by checks of the table."""
-    return HOW | {file: how for check in all_checks() for file, how in check.files.items()}
+    rays = {LAYER[name].file: "recomputed by rays" for name in RAY_LAYERS}
+    by_checks = {file: how for check in all_checks() for file, how in check.files.items()}
+    return rays | _methods("view") | by_checks
 
 
 def looked_at(views: list[StoredView], fields: Counter[tuple[str, str]]) -> tuple[str, ...]:
@@ -121,7 +95,7 @@ def unknown_files(root: Path, houses: list[Path]) -> list[str]:
     return [
         f"{name} ({n}): no check knows it"
         for name, n in sorted(counts.items())
-        if name not in HOW_OF_HOUSE
+        if name not in _methods("house")
     ]
 
 

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from pbrs_farm.check.axes import dot
 from pbrs_farm.check.embree_caster import Rays
 from pbrs_farm.check.stored_mesh import Triangles
 from pbrs_farm.core.arrays import F64, I64
@@ -51,7 +52,7 @@ class MirrorRays:
         path = self._path(self._eye, directions)
         normal = self._rays.normal(face, path.directions)
         for n in reversed(path.mirrors):
-            normal = normal - 2 * np.einsum("ni,ni->n", normal, n)[:, None] * n
+            normal = normal - 2 * dot(normal, n)[:, None] * n
         return normal
 
     def without_holes(self, face: I64, origin: F64, directions: F64) -> I64:
@@ -78,17 +79,17 @@ class MirrorRays:
             flat = self._rays.normal(face[on], d[on])
             n = self._triangles.shading_normals(face[on], point, flat)
             unit = d[on] / np.linalg.norm(d[on], axis=1, keepdims=True)
-            cosine = -np.einsum("ni,ni->n", n, unit)[:, None]
+            cosine = -dot(n, unit)[:, None]
             bent = n + (cosine - _LEAST_COSINE) * unit
             bent /= np.linalg.norm(bent, axis=1, keepdims=True)
             n = np.where(cosine < _LEAST_COSINE, bent, n)
             mirror = np.zeros(directions.shape)
             mirror[on] = n
             mirrors.append(mirror)
-            d[on] = d[on] - 2 * np.einsum("ni,ni->n", n, d[on])[:, None] * n
+            d[on] = d[on] - 2 * dot(n, d[on])[:, None] * n
             way[on] += t
             origin[on] = point
-            away = np.einsum("ni,ni->n", d[on], flat) > 0
+            away = dot(d[on], flat) > 0
             step = _OFF * (1 + np.abs(point).max(axis=1, keepdims=True))
             face[on] = np.where(away, self._rays.first(point + step * flat, d[on]), -1)
         return _Path(face, way, origin, d, mirrors)

@@ -12,9 +12,8 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pbrs_farm.check.cases import HouseCase, Layers, Pixels, Scenes, ViewCase
+from pbrs_farm.check.cases import Cast, HouseCase, Layers, Scenes, ViewCase
 from pbrs_farm.check.checks import Check
 from pbrs_farm.check.embree_caster import Rays
 from pbrs_farm.check.followed_points import SEEN, Followed, OtherView, follow_points, near_edge
@@ -55,34 +54,12 @@ class _Then:
         return points if self.carry is None else self.carry(points, faces)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Points:
-    """The surfaces at N pixels."""
-
-    rows: I64
-    columns: I64
-    z: F64  # metres
-    face: I64
-
-    @property
-    def pixels(self) -> Pixels:
-        return self.rows, self.columns
-
-    def some(self, index: NDArray[Any]) -> _Points:
-        return _Points(self.rows[index], self.columns[index], self.z[index], self.face[index])
-
-
 def check_motion(case: ViewCase) -> None:
     """Recompute the layers between views at some pixels."""
-    view, rays = case.view, case.now.rays
-    rows, columns = case.pixels
-    origin, directions = view.rays(rows, columns)
-    face = rays.first(origin, directions)
-    z = rays.distance(face, origin, directions)
+    view, cast = case.view, case.cast(*case.pixels)
     # Keep the pixels whose stored depth is that of the ray.
-    depth = case.arrays["depth"][rows, columns]
-    points = _Points(rows, columns, z, face)
-    points = points.some((face >= 0) & (np.abs(depth - z * 1000) <= 1.0 + z))
+    depth = case.arrays["depth"][cast.rows, cast.columns]
+    cast = cast.some((cast.face >= 0) & (np.abs(depth - cast.z * 1000) <= 1.0 + cast.z))
     for relation, names in _LAYERS.items():
         layers = {n: case.arrays[n] for n in names if n in case.arrays}
         other = OtherView.of(view, relation)
@@ -90,57 +67,59 @@ def check_motion(case: ViewCase) -> None:
             case.expect("motion")(not layers, f"{[*layers]} without a {relation} view")
             continue
         then = _Then.at(case, view.table["partners"][relation].get("time_s"))
-        right, ties = _judge_layers(view, other, points, layers, then)
-        all_right = np.logical_and.reduce([np.ones(len(points.z), bool), *right.values()])
+        right, ties = _judge_layers(view, other, cast, layers, then)
+        all_right = np.logical_and.reduce([np.ones(len(cast), bool), *right.values()])
         wrong = np.nonzero(~all_right)[0]
         if len(wrong) and then.carry is not None:
             # Of two surfaces at one depth either may move, if it explains all layers together.
-            some = points.some(wrong)
-            faces = of_another_part(some.face, *view.rays(*some.pixels), case.scene)
+            some = cast.some(wrong)
+            faces = of_another_part(some.face, some.origin, some.directions, case.scene)
             wrong, some = wrong[faces >= 0], replace(some, face=faces).some(faces >= 0)
             again, _ = _judge_layers(view, other, some, layers, then)
             either = wrong[np.logical_and.reduce(list(again.values()))]
             for name in layers:
                 right[name][either] = ties[name][either] = True
         for name in layers:
-            case.tally.add(f"motion: {name}", len(points.rows), ties=int(ties[name].sum()))
+            case.tally.add(f"motion: {name}", len(cast), ties=int(ties[name].sum()))
             for k in np.nonzero(~right[name])[0]:
-                place = f"row {points.rows[k]}, column {points.columns[k]}"
+                place = f"row {cast.rows[k]}, column {cast.columns[k]}"
                 case.tally.fail(f"motion: {name}", case.place, place)
 
 
 def _judge_layers(
-    view: StoredView, other: OtherView, points: _Points, layers: Layers, then: _Then
+    view: StoredView, other: OtherView, cast: Cast, layers: Layers, then: _Then
 ) -> tuple[dict[str, Bools], dict[str, Bools]]:
     """Layer -> (N,) its values at pixels are right; and (N,) right as another answer is right, too."""
 
-    def carry_of(some: _Points) -> Callable[[F64], F64]:
+    def carry_of(some: Cast) -> Callable[[F64], F64]:
         return lambda positions: then.moved(positions, some.face)
 
-    followed = follow_points(view, other, points.pixels, points.z, then.rays, carry_of(points))
+    followed = follow_points(
+        view, other, (cast.rows, cast.columns), cast.z, then.rays, carry_of(cast)
+    )
     rights, all_ties = dict[str, Bools](), dict[str, Bools]()
     for name, array in layers.items():
-        values = array[points.rows, points.columns].astype(np.float64)
-        tied = np.zeros(len(points.z), bool)
+        values = array[cast.rows, cast.columns].astype(np.float64)
+        tied = np.zeros(len(cast), bool)
         if name == "scene_flow":
-            right, may_tie = _judge_scene_flow(view, values, points, then), tied
+            right, may_tie = _judge_scene_flow(values, cast, then), tied
         else:
             right, may_tie = _judge_motion(name, values, followed)
         # Look again at wrong values.
         ties = np.nonzero(~right & may_tie)[0]
-        some = points.some(ties)
-        ties = ties[near_edge(view, other, some.pixels, some.z, then.rays, carry_of(some))]
+        some = cast.some(ties)
+        ties = ties[
+            near_edge(view, other, (some.rows, some.columns), some.z, then.rays, carry_of(some))
+        ]
         right[ties] = tied[ties] = True
         rights[name], all_ties[name] = right, tied
     return rights, all_ties
 
 
-def _judge_scene_flow(view: StoredView, values: F64, points: _Points, then: _Then) -> Bools:
+def _judge_scene_flow(values: F64, cast: Cast, then: _Then) -> Bools:
     """(N,) True where a layer holds the movement of the pixels' points until the next frame."""
-    origin, directions = view.rays(*points.pixels)
-    positions = origin + directions * points.z[:, None]
-    off = np.abs(values - (then.moved(positions, points.face) - positions)).max(axis=1)
-    return np.asarray(off <= _SCENE_FLOW_M, bool)
+    motion = then.moved(cast.point, cast.face) - cast.point
+    return np.asarray(np.abs(values - motion).max(axis=1) <= _SCENE_FLOW_M, bool)
 
 
 def _judge_motion(name: str, values: F64, followed: Followed) -> tuple[Bools, Bools]:
@@ -217,8 +196,6 @@ def _name_of_partner(
 
 
 CHECKS = (
-    Check(
-        name="motion", of="view", needs=sum(_LAYERS.values(), ()), function=check_motion, cost=95,
-    ),
-    Check(name="partners", of="views", function=check_partners, cost=2),
-)  # fmt: skip
+    Check("motion", "view", check_motion, 95, sum(_LAYERS.values(), ())),
+    Check("partners", "views", check_partners, 2),
+)

@@ -69,6 +69,6 @@ def check_motion_table(case: ViewCase) -> None:
 
 
 CHECKS = (
-    Check(name="motions", of="house", needs=("house.json",), function=check_motions, cost=6),
-    Check(name="motions", of="view", function=check_motion_table, cost=17),
+    Check("motions", "house", check_motions, 6, ("house.json",)),
+    Check("motions", "view", check_motion_table, 17),
 )

@@ -15,7 +15,7 @@ import numpy as np
 from pbrs_farm.check.axes import into_frame, opencv_pose
 from pbrs_farm.check.cases import HouseCase
 from pbrs_farm.check.checks import Check
-from pbrs_farm.check.embree_caster import Rays
+from pbrs_farm.check.embree_caster import Rays, is_visible
 from pbrs_farm.check.lens_rays import StoredLens
 from pbrs_farm.check.rules import judge
 from pbrs_farm.check.stored_files import BadFile, stored_bytes, stored_object
@@ -121,11 +121,8 @@ def _share(camera: _Camera, other: _Camera, rays: Rays) -> float:
     points = (camera.eye + directions * z[:, None])[face >= 0]
     if not len(points):
         return 0.0
-    to = points[other.shows(points)] - other.eye
-    face = rays.first(other.eye, to)
-    t = rays.distance(face, other.eye, to)
-    visible = (face < 0) | ((1 - t) * np.linalg.norm(to, axis=1) <= _REACH_M)
+    visible = is_visible(rays, other.eye, points[other.shows(points)], _REACH_M)
     return float(visible.sum() / len(points))
 
 
-CHECKS = (Check(name="pairs", of="views", needs=(_FILE,), function=check_pairs, cost=3),)
+CHECKS = (Check("pairs", "views", check_pairs, 3, (_FILE,)),)

@@ -198,6 +198,6 @@ def _compare_scene(
 
 
 CHECKS = (
-    Check(name="opengl edges", of="view", needs=("opengl_dl", "opengl_il"), function=check_edges, cost=60),
-    Check(name="histogram", of="view", needs=("histogram.json",), function=check_histogram, cost=70),
-)  # fmt: skip
+    Check("opengl edges", "view", check_edges, 60, ("opengl_dl", "opengl_il")),
+    Check("histogram", "view", check_histogram, 70, ("histogram.json",)),
+)

@@ -17,7 +17,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.check.axes import published_directions, stored_normals
+from pbrs_farm.check.axes import dot, published_directions, stored_normals
 from pbrs_farm.check.cases import Pixels, Scene, ViewCase
 from pbrs_farm.check.checks import Check
 from pbrs_farm.check.colours import srgb_from_linear
@@ -206,7 +206,7 @@ class _Hits:
     @property
     def depth_error_mm(self) -> F64:
         """(N,) tolerance of a depth in whole mm: rounding, and the ray's error on a slant."""
-        cosine = np.abs(np.einsum("ni,ni->n", self.normal, self.directions))
+        cosine = np.abs(dot(self.normal, self.directions))
         slant_mm = _RAY_ERROR_MM * self.z / np.maximum(cosine, 1e-9)
         return np.asarray(_ROUNDING_MM + np.minimum(slant_mm, _MAX_RAY_ERROR_MM))
 
@@ -322,7 +322,7 @@ def normal_is_right(
     length = np.linalg.norm(normals, axis=1)
     sine = np.linalg.norm(np.cross(normals, expected), axis=1)
     is_near = sine <= np.radians(tolerance_deg) * length
-    close = (np.einsum("ni,ni->n", normals, expected) > 0) & is_near & (np.abs(length - 1) < 1e-3)
+    close = (dot(normals, expected) > 0) & is_near & (np.abs(length - 1) < 1e-3)
     nothing = (stored == 32768).all(axis=1)
     return np.asarray(np.where(expected.any(axis=1), close, nothing), bool)
 
@@ -393,7 +393,7 @@ def _pierced_beside(
     starts, legs, way = rays.last_leg(origin, directions)
     depth = rays.distance(face, origin, directions) - way
     # Measure gaps across the surface: along a slanting ray they are longer.
-    across = np.abs(np.einsum("ni,ni->n", rays.normal(face, directions), directions))
+    across = np.abs(dot(rays.normal(face, directions), directions))
     for k in range(len(face)):
         faces = candidates(k)
         if len(faces):
@@ -411,7 +411,7 @@ def _number_planes(corners: F64) -> I64:
     normal = np.nan_to_num(normal)
     largest = np.take_along_axis(normal, np.abs(normal).argmax(1)[:, None], 1)
     normal *= np.where(largest < 0, -1.0, 1.0)
-    offset = np.einsum("fi,fi->f", normal, corners[:, 0])
+    offset = dot(normal, corners[:, 0])
     keys = np.round(np.column_stack([normal * 1e3, offset / _TIE_M])).astype(np.int64)
     return np.asarray(np.unique(keys, axis=0, return_inverse=True)[1].reshape(-1), np.int64)
 
@@ -424,10 +424,10 @@ def distances_pierced(triangles: Triangles, faces: I64, origin: F64, ray: F64) -
     p = np.cross(ray, e2)
     q = np.cross(s, e1)
     with np.errstate(divide="ignore", invalid="ignore"):
-        inverse = 1 / np.einsum("fi,fi->f", e1, p)
+        inverse = 1 / dot(e1, p)
         # Barycentric coordinates, with slack at the edges, and the distance.
-        u, v = np.einsum("fi,fi->f", s, p) * inverse, (q @ ray) * inverse
-        t = np.einsum("fi,fi->f", e2, q) * inverse
+        u, v = dot(s, p) * inverse, (q @ ray) * inverse
+        t = dot(e2, q) * inverse
         inside = (u >= -1e-6) & (v >= -1e-6) & (u + v <= 1 + 1e-6) & (t > 0)
     return np.where(inside, t, np.inf)
 
@@ -467,4 +467,4 @@ RAY_LAYERS: Final = tuple(_LABELS)
 """Layers that a ray through the pixel's centre decides."""
 
 
-CHECKS = (Check(name="ray", of="view", function=check_rays, cost=90),)
+CHECKS = (Check("ray", "view", check_rays, 90),)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from pbrs_farm.check.axes import is_rotation, opencv_pose, world_normals
+from pbrs_farm.check.axes import dot, is_rotation, opencv_pose, world_normals
 from pbrs_farm.check.cases import HouseCase, SeenView, ViewCase
 from pbrs_farm.check.checks import Check
 from pbrs_farm.check.stored_view import StoredView
@@ -83,7 +83,7 @@ def _points_of(seen: SeenView) -> F64:
     flat = (z > 0) & (z < 65) & ~seen.moves[rows, columns]
     for dy, dx in np.ndindex(5, 5):
         r, c = (rows + dy - 2).clip(0, height - 1), (columns + dx - 2).clip(0, width - 1)
-        off = np.einsum("ni,ni->n", _positions(seen, r, c) - centre, normal)
+        off = dot(_positions(seen, r, c) - centre, normal)
         flat &= np.abs(off) < _SLACK_M / 2
     return np.asarray(np.stack([centre, normal, np.broadcast_to(eye, centre.shape)], 1)[flat])
 
@@ -105,7 +105,7 @@ def _count_in_front(points: F64, view: StoredView, nearest: F64) -> tuple[int, i
     towards = points[:, 0] - view.world_from_camera[:3, 3]
     distance = np.linalg.norm(towards, axis=1)
     first_distance = np.linalg.norm(points[:, 0] - points[:, 2], axis=1)
-    broad = np.abs(np.einsum("ni,ni->n", points[:, 1], towards)) > _MIN_COSINE * distance
+    broad = np.abs(dot(points[:, 1], towards)) > _MIN_COSINE * distance
     broad &= first_distance > _MIN_NEARER * distance
     pixel, depth = view.pixels_and_depths(towards[broad] @ view.world_from_camera[:3, :3])
     with np.errstate(invalid="ignore"):
@@ -118,6 +118,6 @@ def _count_in_front(points: F64, view: StoredView, nearest: F64) -> tuple[int, i
 
 
 CHECKS = (
-    Check(name="pose", of="camera", function=check_pose, cost=1),
-    Check(name="reprojection", of="views", function=check_reprojection, cost=1),
+    Check("pose", "camera", check_pose, 1),
+    Check("reprojection", "views", check_reprojection, 1),
 )

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from pbrs_farm.check.axes import dot
 from pbrs_farm.check.cases import ViewCase
 from pbrs_farm.check.checks import Check
 from pbrs_farm.check.colours import linear_from_srgb, srgb_from_linear
+from pbrs_farm.check.embree_caster import is_visible
 from pbrs_farm.check.pixel_checks import albedo_of_faces
 from pbrs_farm.core.arrays import F64
 
@@ -23,14 +25,11 @@ _MASK = (1 << 64) - 1
 def check_projector(case: ViewCase) -> None:
     """Brightness of dots at some pixels; up to _EDGES of them may be at an edge, counted as ties."""
     view, (triangles, rays) = case.view, case.scene
-    rows, columns = case.pixels
-    origin, directions = view.rays(rows, columns)
-    face = rays.first(origin, directions)
-    hit = face >= 0
-    rows, columns, directions, face = rows[hit], columns[hit], directions[hit], face[hit]
-    if len(rows) < _FEW:
+    cast = case.cast(*case.pixels)
+    cast = cast.some(cast.face >= 0)
+    if len(cast) < _FEW:
         return
-    point = origin + directions * rays.distance(face, origin, directions)[:, None]
+    point, origin = cast.point, cast.origin
     right, down, ahead = view.world_from_camera[:3, :3].T
     partner = view.table.get("partners", {}).get("stereo")
     eye = origin + _BESIDE_M * right
@@ -40,19 +39,17 @@ def check_projector(case: ViewCase) -> None:
     distance, along = np.linalg.norm(to, axis=1), to @ ahead
     angles = np.arctan2(np.stack([to @ right, -(to @ down)], axis=1), along[:, None])
     light = np.where(along > 0, _pattern(angles), 0.0)
-    normal = rays.normal(face, directions)
-    cosine = np.abs(np.einsum("ni,ni->n", normal, to)) / np.maximum(distance, 1e-6)
-    infrared = linear_from_srgb(albedo_of_faces(view, face, point, triangles).max(axis=1) / 255)
+    cosine = np.abs(dot(cast.normal, to)) / np.maximum(distance, 1e-6)
+    infrared = linear_from_srgb(
+        albedo_of_faces(view, cast.face, point, triangles).max(axis=1) / 255
+    )
     level = np.clip(light * infrared * cosine * (_FULL_M / np.maximum(distance, 1e-3)) ** 2, 0, 1)
-    first = rays.first(eye, to)
-    t = rays.distance(first, eye, to)
-    is_lit = (first < 0) | ((1 - t) * distance <= _REACH_M)
-    expected = np.where(is_lit, 255 * srgb_from_linear(level), 0.0)
-    wrong = np.abs(case.arrays["projector"][rows, columns] - expected) > _STEPS
+    expected = np.where(is_visible(rays, eye, point, _REACH_M), 255 * srgb_from_linear(level), 0.0)
+    wrong = np.abs(case.arrays["projector"][cast.rows, cast.columns] - expected) > _STEPS
     k = int(np.argmax(wrong))
-    place = f"row {rows[k]}, column {columns[k]}"
-    most = max(3, _EDGES * len(rows))
-    case.tally.tolerate("projector", case.place, len(rows), int(wrong.sum()), most, place)
+    place = f"row {cast.rows[k]}, column {cast.columns[k]}"
+    most = max(3, _EDGES * len(cast))
+    case.tally.tolerate("projector", case.place, len(cast), int(wrong.sum()), most, place)
 
 
 def _pattern(angles: F64) -> F64:
@@ -74,8 +71,4 @@ def _splitmix(value: int) -> int:
     return z ^ z >> 31
 
 
-CHECKS = (
-    Check(
-        name="projector", of="view", needs=("projector",), function=check_projector, cost=18,
-    ),
-)  # fmt: skip
+CHECKS = (Check("projector", "view", check_projector, 18, ("projector",)),)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from pbrs_farm.check.axes import world_normals
+from pbrs_farm.check.axes import dot, world_normals
 from pbrs_farm.check.cases import SAMPLE, ViewCase
 from pbrs_farm.check.checks import Check
 from pbrs_farm.check.colours import has_channels, linear_from_srgb, luminance_of
@@ -75,22 +75,19 @@ def check_guides(case: ViewCase) -> None:
         return
     _check_alignment(case)
     triangles, rays = case.scene
-    rows, columns = case.sample(SAMPLE)
-    origin, directions = view.rays(rows, columns)
-    face = rays.first(origin, directions)
-    kinds = triangles.kinds_of(face)
-    flat = is_amid(case.arrays["instance"], case.arrays["normal"])[rows, columns]
-    keep = (face >= 0) & flat & ~np.isin(kinds, ("glass", "pane", "mirror", "bulb"))
+    cast = case.cast(*case.sample(SAMPLE))
+    flat = is_amid(case.arrays["instance"], case.arrays["normal"])[cast.rows, cast.columns]
+    is_guided = ~np.isin(triangles.kinds_of(cast.face), ("glass", "pane", "mirror", "bulb"))
     # The outdoors is a picture, and no surface of the home.
-    keep &= np.isin(triangles.instance[face], matte_items(house))
-    if keep.sum() < _FEW_GUIDES:
+    is_guided &= np.isin(triangles.instance[cast.face], matte_items(house))
+    cast = cast.some((cast.face >= 0) & flat & is_guided)
+    if len(cast) < _FEW_GUIDES:
         return
-    rows, columns, face, directions = rows[keep], columns[keep], face[keep], directions[keep]
-    point = origin + directions * rays.distance(face, origin, directions)[:, None]
-    middle = albedo_of_faces(view, face, point, triangles) / 255
+    face, origin = cast.face, cast.origin
+    middle = albedo_of_faces(view, face, cast.point, triangles) / 255
     linear = [linear_from_srgb(middle)]
     for dy, dx in itertools.product(_BESIDE, repeat=2):
-        _, ray = view.rays(rows + dy, columns + dx)
+        _, ray = view.rays(cast.rows + dy, cast.columns + dx)
         beside = rays.first(origin, ray)
         beside = np.where(beside >= 0, beside, face)
         point = origin + ray * rays.distance(beside, origin, ray)[:, None]
@@ -104,12 +101,14 @@ def check_guides(case: ViewCase) -> None:
     # The guide contains all reflected light, also that of a coat.
     albedo += np.where(coated_materials(house)[triangles.material[face]], COAT, 0.0)[:, None]
     guides = [
-        np.stack([channels[f"{g}.{c}"][rows, columns] for c in axes], axis=1).astype(np.float64)
+        np.stack([channels[f"{g}.{c}"][cast.rows, cast.columns] for c in axes], axis=1).astype(
+            np.float64
+        )
         for g, axes in (("albedo", "RGB"), ("normal", "XYZ"))
     ]
     close = np.abs(guides[0] - albedo).max(axis=1) <= _GUIDE_ALBEDO
     length = np.maximum(np.linalg.norm(guides[1], axis=1), 1e-9)
-    cosine = np.einsum("ni,ni->n", rays.normal(face, directions), guides[1]) / length
+    cosine = dot(cast.normal, guides[1]) / length
     aligned = cosine >= np.cos(np.radians(_GUIDE_DEG))
     for name, right in (("albedo", close), ("normal", aligned)):
         share = float(right.mean())
@@ -280,11 +279,8 @@ def _correlation(light: NDArray[Any], surface: _Transformed) -> tuple[F64, float
     return np.asarray(np.fft.irfft2(products, light.shape)), surface.energy
 
 
-CHECKS = tuple(
-    Check(name=name, of="view", needs=("radiance",), function=function, cost=cost)
-    for name, function, cost in (
-        ("radiance", check_radiance, 20),
-        ("light guides", check_guides, 24),
-        ("light edges", check_fit, 26),
-    )
+CHECKS = (
+    Check("radiance", "view", check_radiance, 20, ("radiance",)),
+    Check("light guides", "view", check_guides, 24, ("radiance",)),
+    Check("light edges", "view", check_fit, 26, ("radiance",)),
 )

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from scipy import ndimage
 
-from pbrs_farm.check.axes import world_normals
+from pbrs_farm.check.axes import dot, world_normals
 from pbrs_farm.check.cases import ViewCase
 from pbrs_farm.check.checks import Check
 from pbrs_farm.core.arrays import F64, Bools
@@ -111,7 +111,7 @@ def _check_tof(case: ViewCase, name: str) -> None:
     stored, depth, reach_m = case.arrays[name], case.arrays["depth"], _TOF_REACH_M[name]
     rays = case.view.ray_grid()
     normals = world_normals(case.arrays["normal"], case.view.world_from_camera)
-    cosine = np.abs(np.einsum("...i,...i->...", normals, rays)) / np.linalg.norm(rays, axis=-1)
+    cosine = np.abs(dot(normals, rays)) / np.linalg.norm(rays, axis=-1)
     angle = np.minimum(np.arccos(np.clip(cosine, 0, 1)), np.radians(85))
     true = np.where(depth > 0, depth / 1000, np.nan)
     low, high = _extremes(true)
@@ -179,9 +179,4 @@ def _check_statistics(
     expect(_SPREAD[0] <= spread <= _SPREAD[1], fault)
 
 
-CHECKS = (
-    Check(
-        name="derived layers", of="view", needs=("hha", *_MATCHING, *_TOF_REACH_M),
-        function=check_derived, cost=15,
-    ),
-)  # fmt: skip
+CHECKS = (Check("derived layers", "view", check_derived, 15, ("hha", *_MATCHING, *_TOF_REACH_M)),)

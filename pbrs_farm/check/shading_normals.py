@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from pbrs_farm.check.axes import dot
 from pbrs_farm.core.arrays import F32, F64
 
 _LEAST_Z = 0.1  # least slope of a map's unit normal: a steeper one is noise of the picture
@@ -17,7 +18,7 @@ def between_corners(weights: F64, normals: F32, facing: F64) -> F64:
     mean = np.einsum("nk,nkc->nc", weights, normals.astype(np.float64))
     length = np.linalg.norm(mean, axis=1, keepdims=True)
     smooth = np.where(length > 1e-6, mean / np.maximum(length, 1e-12), facing)
-    away = np.einsum("nc,nc->n", smooth, facing) < 0
+    away = dot(smooth, facing) < 0
     return np.where(away[:, None], -smooth, smooth)
 
 
@@ -32,9 +33,9 @@ def bent(normals: F64, corners: F64, uv: F64, mapped: F64) -> F64:
     along = (b[:, 1:] * e1 - a[:, 1:] * e2) * side
     # The map is on the front: turn normals of the back there and back.
     front = np.cross(e1, e2)
-    turn = np.where(np.einsum("nc,nc->n", normals, front) < 0, -1.0, 1.0)[:, None]
+    turn = np.where(dot(normals, front) < 0, -1.0, 1.0)[:, None]
     normal = turn * normals
-    tangent = along - normal * np.einsum("nc,nc->n", normal, along)[:, None]
+    tangent = along - normal * dot(normal, along)[:, None]
     length = np.linalg.norm(tangent, axis=1, keepdims=True)
     tangent = tangent / np.maximum(length, 1e-30)
     across = np.cross(normal, tangent) * side

@@ -143,8 +143,4 @@ def _sky_lx(height: float, is_overcast: bool, light: Mapping[str, Any]) -> tuple
     return clear * scale, normal * math.sin(height)
 
 
-CHECKS = (
-    Check(
-        name="illuminance", of="house", needs=("illuminance.json",), function=check_illuminance, cost=7,
-    ),
-)  # fmt: skip
+CHECKS = (Check("illuminance", "house", check_illuminance, 7, ("illuminance.json",)),)

@@ -147,11 +147,8 @@ def check_models(case: HouseCase) -> None:
             expect(same, fault)
 
 
-CHECKS = tuple(
-    Check(name=name, of="house", needs=("house.json",), function=function, cost=cost)
-    for name, function, cost in (
-        ("model poses", check_models, 2),
-        ("floating", check_floating, 3),
-        ("house items", check_solids, 4),
-    )
+CHECKS = (
+    Check("model poses", "house", check_models, 2, ("house.json",)),
+    Check("floating", "house", check_floating, 3, ("house.json",)),
+    Check("house items", "house", check_solids, 4, ("house.json",)),
 )

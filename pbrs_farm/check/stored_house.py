@@ -13,6 +13,18 @@ from typing import Any
 from pbrs_farm.check.stored_files import BadFile, stored_object
 
 
+def _document(file: Path) -> dict[str, Any]:
+    try:
+        return stored_object(file)
+    except BadFile:
+        return {}
+
+
+def _stored(name: str) -> cached_property[dict[str, Any]]:
+    """A document of a house's folder, read when first asked for; {} if missing or damaged."""
+    return cached_property(lambda house: _document(house.folder / name))
+
+
 @dataclass(frozen=True)
 class StoredHouse:
     """A houses/<house_id> folder."""
@@ -30,30 +42,11 @@ class StoredHouse:
         """house.json, of a house at another time for that time."""
         return self.moved if self.moved is not None else _document(self.folder / "house.json")
 
-    @cached_property
-    def cameras(self) -> dict[str, Any]:
-        """cameras.json."""
-        return _document(self.folder / "cameras.json")
-
-    @cached_property
-    def illuminance(self) -> dict[str, Any]:
-        """illuminance.json."""
-        return _document(self.folder / "illuminance.json")
-
-    @cached_property
-    def repair(self) -> dict[str, Any]:
-        """repair.json."""
-        return _document(self.folder / "repair.json")
-
-    @cached_property
-    def dress(self) -> dict[str, Any]:
-        """dress.json of a dressed house."""
-        return _document(self.folder / "dress.json")
-
-    @cached_property
-    def recipe(self) -> dict[str, Any]:
-        """recipe.json of the root, without added fields."""
-        return _document(self.folder.parents[1] / "recipe.json")
+    cameras = _stored("cameras.json")
+    illuminance = _stored("illuminance.json")
+    repair = _stored("repair.json")
+    dress = _stored("dress.json")
+    recipe = cached_property(lambda house: _document(house.folder.parents[1] / "recipe.json"))
 
     @cached_property
     def items(self) -> dict[int, dict[str, Any]]:
@@ -98,10 +91,3 @@ class StoredHouse:
         name = f"{step}.{view}.json" if view else f"{step}.json"
         facts = _document(self.folder / "done" / name).get("facts", {})
         return facts if isinstance(facts, dict) else {}
-
-
-def _document(file: Path) -> dict[str, Any]:
-    try:
-        return stored_object(file)
-    except BadFile:
-        return {}

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pbrs_farm.check.axes import dot
 from pbrs_farm.check.colours import linear_from_srgb, srgb_from_linear
 from pbrs_farm.check.finishes import Finishes, mapped_alpha
 from pbrs_farm.check.shading_normals import bent, between_corners, decoded
@@ -188,10 +189,10 @@ class Triangles:
         corners = self.faces[face]
         a, b, c = (self.vertices[corners[:, k]].astype(np.float64) for k in range(3))
         normal = np.cross(b - a, c - a)
-        squared = np.einsum("ni,ni->n", normal, normal)
+        squared = dot(normal, normal)
         with np.errstate(divide="ignore", invalid="ignore"):
-            at_b = np.einsum("ni,ni->n", np.cross(points - a, c - a), normal) / squared
-            at_c = np.einsum("ni,ni->n", np.cross(b - a, points - a), normal) / squared
+            at_b = dot(np.cross(points - a, c - a), normal) / squared
+            at_c = dot(np.cross(b - a, points - a), normal) / squared
         return np.stack([1 - at_b - at_c, at_b, at_c], axis=1)
 
 

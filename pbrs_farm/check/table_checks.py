@@ -150,4 +150,4 @@ def _reach(view: StoredView, corners: F64) -> Pixels:
     return rows.reshape(-1), columns.reshape(-1)
 
 
-CHECKS = (Check(name="table of items", of="view", function=check_rows, cost=80),)
+CHECKS = (Check("table of items", "view", check_rows, 80),)

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pbrs_farm.check.axes import dot
 from pbrs_farm.check.cases import HouseCase, Scenes
 from pbrs_farm.check.certificate import Expect, Tally
 from pbrs_farm.check.checks import Check
@@ -159,7 +160,7 @@ def _check_frame(film: _Film, frame: int, index: I64, points: F64, face: I64) ->
     # A face seen edge-on may hide its own points.
     towards = points[wrong] - other.eye
     towards /= np.linalg.norm(towards, axis=1, keepdims=True)
-    slant = np.einsum("ni,ni->n", rays.normal(face[wrong], towards), towards)
+    slant = dot(rays.normal(face[wrong], towards), towards)
     wrong = wrong[np.abs(slant) > _EDGE_ON]
     film.tally.add("tracks", len(index))
     for k in wrong[:_MOST_LISTED]:
@@ -187,4 +188,4 @@ def _may_be_either(points: F64, other: OtherView, margin: F64, rays: Hits) -> Bo
     return np.asarray(is_tie | (np.ptp(np.array(answers, np.int8), axis=0) > 0), bool)
 
 
-CHECKS = (Check(name="tracks", of="views", needs=(_FILE,), function=check_tracks, cost=4),)
+CHECKS = (Check("tracks", "views", check_tracks, 4, (_FILE,)),)

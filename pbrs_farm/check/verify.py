@@ -20,13 +20,12 @@ from pbrs_farm.check.cases import SAMPLE, HouseCase, RootCase, ScenesInTime, See
 from pbrs_farm.check.certificate import Certificate, Tally
 from pbrs_farm.check.checks import Subject, checks
 from pbrs_farm.check.fields import stored_fields
-from pbrs_farm.check.labels import read_labels, read_radiance
 from pbrs_farm.check.light_checks import may_be_halved
 from pbrs_farm.check.methods import looked_at, not_looked_at
 from pbrs_farm.check.stored_files import BadFile, stored_bytes
 from pbrs_farm.check.stored_house import StoredHouse
 from pbrs_farm.check.stored_mesh import BadGlb, triangles_from_glb
-from pbrs_farm.check.stored_view import StoredView, views_of_house
+from pbrs_farm.check.stored_view import StoredView, read_labels, read_radiance, views_of_house
 from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadInput
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from pbrs_farm.check.axes import camera_normals, stored_normals
+from pbrs_farm.check.axes import camera_normals, dot, stored_normals
 from pbrs_farm.check.cases import Layers, ViewCase
 from pbrs_farm.check.checks import Check
 from pbrs_farm.check.rules import judge
@@ -126,8 +126,8 @@ def check_planes(case: ViewCase) -> None:
     west, east = np.s_[:, :-1], np.s_[:, 1:]
     same = (normal[west] == normal[east]).all(-1) & (instance[west] == instance[east])
     same &= (depth[west] > 0) & (depth[east] > 0)
-    first = np.einsum("ni,ni->n", facing[west][same], rays[west][same])
-    second = np.einsum("ni,ni->n", facing[west][same], rays[east][same])
+    first = dot(facing[west][same], rays[west][same])
+    second = dot(facing[west][same], rays[east][same])
     near, far = depth[west][same], depth[east][same]
     # Follow the plane through the first to the ray of the second.
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -140,7 +140,7 @@ def check_planes(case: ViewCase) -> None:
 
 
 CHECKS = (
-    Check(name="pictures", of="view", function=check_pictures, cost=11),
-    Check(name="layers", of="view", function=check_consistency, cost=12),
-    Check(name="planes", of="view", function=check_planes, cost=13),
+    Check("pictures", "view", check_pictures, 11),
+    Check("layers", "view", check_consistency, 12),
+    Check("planes", "view", check_planes, 13),
 )

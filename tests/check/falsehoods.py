@@ -1,4 +1,4 @@
-"""Kinds of falsehood, each planted in a finished root: what is changed, and the check that must find it.
+"""Kinds of falsehood, each planted in a finished root: the change, and the check that must find it.
 
 Effects: a plant changes files of the root that it is given; `planted` mends all hashes afterwards.
 """
@@ -28,21 +28,29 @@ Plant = Callable[[Path], None]
 
 
 def view_of(root: Path) -> Path:
-    """Its first view."""
+    """The first view of a root."""
     return min((house_of(root) / "views").iterdir())
 
 
-def table(change: Callable[[dict], object]) -> Plant:
-    def plant(view: Path) -> None:
-        held = json.loads((view / "view.json").read_text())
-        change(held)
-        (view / "view.json").write_text(json.dumps(held))
+def edit_json(file: Path, change: Callable[[dict], object]) -> None:
+    """Change a JSON file in place."""
+    document = json.loads(file.read_text())
+    change(document)
+    file.write_text(json.dumps(document))
 
-    return plant
+
+def json_file(name: str, change: Callable[[dict], object]) -> Plant:
+    """Change a JSON file of the view."""
+    return lambda view: edit_json(view / name, change)
+
+
+def table(change: Callable[[dict], object]) -> Plant:
+    """Change view.json."""
+    return json_file("view.json", change)
 
 
 def row(change: Callable[[dict], object]) -> Plant:
-    """Of the instance that covers most."""
+    """Change the row of the largest instance."""
     return table(lambda t: change(max(t["instances"], key=lambda r: r["pixels"])))
 
 
@@ -88,11 +96,11 @@ def brighter_shading(view: Path) -> None:
     albedo = np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
     for ending in ("", "_indoor", "_outdoor"):
         files = view / f"shading{ending}.exr", view / f"residual{ending}.exr"
-        lit, left = (layers_from_exr(file.read_bytes()) for file in files)
+        lit, residual = (layers_from_exr(file.read_bytes()) for file in files)
         for k, c in enumerate("RGB"):
-            left[c] = (left[c] - 0.1 * albedo[..., k] * lit[c]).astype(np.float32)
+            residual[c] = (residual[c] - 0.1 * albedo[..., k] * lit[c]).astype(np.float32)
             lit[c] = (1.1 * lit[c]).astype(np.float32)
-        for file, planes in zip(files, (lit, left), strict=True):
+        for file, planes in zip(files, (lit, residual), strict=True):
             file.write_bytes(exr_from_layers(planes))
 
 
@@ -107,18 +115,14 @@ def brighter_diffuse_light(view: Path) -> None:
 
 
 def histogram(change: Callable[[dict], object]) -> Plant:
-    def plant(view: Path) -> None:
-        held = json.loads((view / "histogram.json").read_text())
-        change(held)
-        (view / "histogram.json").write_text(json.dumps(held))
-
-    return plant
+    """Change histogram.json."""
+    return json_file("histogram.json", change)
 
 
 def move_count(counts: dict) -> None:
-    held = list(counts["counts"])
-    held[0], held[-1] = held[0] + 40, held[-1] - 40
-    counts["counts"] = held
+    numbers = list(counts["counts"])
+    numbers[0], numbers[-1] = numbers[0] + 40, numbers[-1] - 40
+    counts["counts"] = numbers
 
 
 def turn_box(r: dict) -> None:
@@ -166,27 +170,22 @@ def swapped_ids(view: Path) -> None:
 
 
 def document(name: str, change: Callable[[dict], object]) -> Plant:
-    """Changes a JSON file of the view's house; of the root, for its recipe."""
+    """Change a JSON file of the view's house, or of the root for its recipe."""
 
-    def plant(view: Path) -> None:
-        file = view.parents[3 if name == "recipe.json" else 1] / name
-        held = json.loads(file.read_text())
-        change(held)
-        file.write_text(json.dumps(held))
-
-    return plant
+    level = 3 if name == "recipe.json" else 1
+    return lambda view: edit_json(view.parents[level] / name, change)
 
 
 def glb(change: Callable[[dict], object]) -> Plant:
-    """Changes the JSON of house.glb."""
+    """Change the JSON of house.glb."""
 
     def plant(view: Path) -> None:
         file = view.parents[1] / "house.glb"
         data = file.read_bytes()
         (n,) = struct.unpack_from("<I", data, 12)
-        held = json.loads(data[20 : 20 + n])
-        change(held)
-        text = json.dumps(held).encode()
+        document = json.loads(data[20 : 20 + n])
+        change(document)
+        text = json.dumps(document).encode()
         text += b" " * (-len(text) % 4)
         rest = data[20 + n :]
         head = struct.pack("<4sIII4s", b"glTF", 2, 20 + len(text) + len(rest), len(text), b"JSON")
@@ -205,23 +204,23 @@ def text_file(name: str, change: Callable[[str], str]) -> Plant:
 
 def both(*plants: Plant) -> Plant:
     def plant(view: Path) -> None:
-        for one in plants:
-            one(view)
+        for change in plants:
+            change(view)
 
     return plant
 
 
 def placed(change: Callable[[dict], object]) -> Plant:
-    """Of the first instance that is a placed model."""
+    """Change the row of the first placed model."""
     return table(lambda t: change(next(r for r in t["instances"] if "model" in r)))
 
 
 def moved(name: str, by: float) -> Callable[[dict], object]:
-    return lambda held: held[name][0].__setitem__(3, held[name][0][3] + by)
+    return lambda row: row[name][0].__setitem__(3, row[name][0][3] + by)
 
 
 def swapped(a: str, b: str) -> Plant:
-    """Two files of a view exchanged."""
+    """Exchange two files of a view."""
 
     def plant(view: Path) -> None:
         first, second = (view / a).read_bytes(), (view / b).read_bytes()
@@ -232,29 +231,29 @@ def swapped(a: str, b: str) -> Plant:
 
 
 def of_neighbour(*files: str) -> Plant:
-    """The files of another view of the home."""
+    """Copy files from another view of the home."""
 
     def plant(view: Path) -> None:
-        other = next(v for v in sorted(view.parent.iterdir()) if v != view)
+        neighbour = next(v for v in sorted(view.parent.iterdir()) if v != view)
         for file in files:
-            shutil.copy(other / file, view / file)
+            shutil.copy(neighbour / file, view / file)
 
     return plant
 
 
-def scene_without_outside(held: dict) -> None:
-    scene = held["scenes"][0]
+def scene_without_outside(gltf: dict) -> None:
+    scene = gltf["scenes"][0]
     scene["nodes"] = [
-        n for n in scene["nodes"] if not held["nodes"][n]["extras"]["item"].startswith("outside")
+        n for n in scene["nodes"] if not gltf["nodes"][n]["extras"]["item"].startswith("outside")
     ][: len(scene["nodes"]) - 1]
 
 
-def without_credit(held: dict) -> None:
-    held["asset"].pop("copyright", None)
+def without_credit(gltf: dict) -> None:
+    gltf["asset"].pop("copyright", None)
 
 
 def pairs(change: Callable[[list[dict]], object]) -> Plant:
-    """Changes the rows of pairs.parquet."""
+    """Change the rows of pairs.parquet."""
 
     def plant(view: Path) -> None:
         file = view.parents[1] / "pairs.parquet"
@@ -278,7 +277,7 @@ def turned_by(degrees: float) -> Callable[[np.ndarray], np.ndarray]:
 
 
 def lamps(change: Callable[[dict, dict], object]) -> Plant:
-    """Of the two lamps that bring most."""
+    """Change the rows of the two brightest lamps."""
 
     def both_rows(t: dict) -> None:
         rows = sorted(t["modes"]["light"]["lamps"], key=lambda r: -r["share"])
@@ -301,37 +300,37 @@ def pose_and_what_follows(r: dict) -> None:
 
 
 def eyes_exchanged(view: Path) -> None:
-    """All that is stored of the left eye under the name of the right one, and the other way round."""
+    """Exchange all files of the two eyes of a pair."""
     right = view.parent / f"{view.name}_right"
     spare = view.parent / "spare"
     view.rename(spare)
     right.rename(view)
     spare.rename(right)
 
-    def exchange(held: dict) -> None:
-        rows = {r["id"]: r for r in held["views"]}
+    def exchange(cameras: dict) -> None:
+        rows = {r["id"]: r for r in cameras["views"]}
         swap_keys(rows[view.name], rows[right.name], "world_from_camera_opengl")
 
     document("cameras.json", exchange)(view)
 
 
 def pictures_of_eyes(view: Path) -> None:
-    """Light, and what is developed of it, of one eye in the other's place."""
+    """Exchange light and developed pictures of the two eyes."""
     right = view.parent / f"{view.name}_right"
     for file in ("radiance.exr", "mlt_ol.png", "mlt_il_ol.png"):
         first, second = (view / file).read_bytes(), (right / file).read_bytes()
         (view / file).write_bytes(second)
         (right / file).write_bytes(first)
     names = ("mlt_ol", "mlt_il_ol")
-    held = [json.loads((v / "view.json").read_text()) for v in (view, right)]
+    tables = [json.loads((v / "view.json").read_text()) for v in (view, right)]
     for name in names:
-        swap_keys(held[0]["modes"]["develop"], held[1]["modes"]["develop"], name)
-    for folder, one in zip((view, right), held, strict=True):
-        (folder / "view.json").write_text(json.dumps(one))
+        swap_keys(tables[0]["modes"]["develop"], tables[1]["modes"]["develop"], name)
+    for folder, changed in zip((view, right), tables, strict=True):
+        (folder / "view.json").write_text(json.dumps(changed))
 
 
 def light(change: Callable[[dict[str, np.ndarray]], object]) -> Plant:
-    """Changes the planes of radiance.exr, and develops the pictures of it again, with their facts."""
+    """Change the planes of radiance.exr, and develop its pictures again, with their facts."""
 
     def plant(view: Path) -> None:
         planes = dict(layers_from_exr((view / "radiance.exr").read_bytes()))
@@ -344,22 +343,22 @@ def light(change: Callable[[dict[str, np.ndarray]], object]) -> Plant:
 
 
 def develop_again(view: Path) -> None:
-    """The pictures of radiance.exr as it stands, in view.json and the step's marker, too."""
+    """Develop radiance.exr again, with the facts in view.json and in the step's marker."""
     root = view.parents[3]
     recipe = recipe_from_json((root / "recipe.json").read_bytes(), "recipe.json")
     stored = radiance_from_exr((view / "radiance.exr").read_bytes(), "radiance.exr")
     tone = recipe.camera_of(view.parents[1].name, view.name).tone
     images = develop(linear_aovs(stored), tone, denoise=recipe.light.denoise)
-    told = {}
+    facts = {}
     for mode, image in images.items():
         (view / f"{mode}.png").write_bytes(png_from_array(image.rgb_srgb8))
-        told[str(mode)] = image.facts()
-    table(lambda t: t["modes"]["develop"].update(told))(view)
-    document(f"done/develop.{view.name}.json", lambda m: m["facts"].update(told))(view)
+        facts[str(mode)] = image.facts()
+    table(lambda t: t["modes"]["develop"].update(facts))(view)
+    document(f"done/develop.{view.name}.json", lambda m: m["facts"].update(facts))(view)
 
 
 def light_planes(planes: dict[str, np.ndarray], *names: str) -> list[str]:
-    """Channels of light, of the groups that are named or of all and their lamps."""
+    """Channels of the named light groups, by default of all groups and lamps."""
     chosen = names or ("outdoor", "indoor", "lamp")
     return [n for n in planes if n.startswith(chosen)]
 
@@ -373,8 +372,8 @@ def of_other_view(*, with_guides: bool) -> Plant:
     """The light of another view of the home, with its guides or under the view's own."""
 
     def plant(view: Path) -> None:
-        other = max(v for v in view.parent.iterdir() if v != view)
-        theirs = layers_from_exr((other / "radiance.exr").read_bytes())
+        neighbour = max(v for v in view.parent.iterdir() if v != view)
+        theirs = layers_from_exr((neighbour / "radiance.exr").read_bytes())
         names = list(theirs) if with_guides else light_planes(dict(theirs))
         light(lambda p: p.update({n: theirs[n] for n in names}))(view)
 
@@ -386,12 +385,12 @@ def exchange_groups(planes: dict[str, np.ndarray]) -> None:
         swap_keys_of(planes, f"outdoor.{c}", f"indoor.{c}")
 
 
-def swap_keys_of(held: dict, a: str, b: str) -> None:
-    held[a], held[b] = held[b], held[a]
+def swap_keys_of(planes: dict, a: str, b: str) -> None:
+    planes[a], planes[b] = planes[b], planes[a]
 
 
 def exchange_lamps(view: Path) -> None:
-    """The layers of the two lamps that bring most, with the shares that are told of them."""
+    """Exchange the layers and stated shares of the two brightest lamps."""
     rows = json.loads((view / "view.json").read_text())["modes"]["light"]["lamps"]
     first, second = sorted(rows, key=lambda r: -r["share"])[:2]
 
@@ -660,32 +659,29 @@ _EDITED: dict[str, tuple[Plant, str]] = {
 
 
 def parts(change: Callable[[dict], object]) -> Plant:
-    """Of the part that covers most in articulation.json."""
+    """Change the row of the largest part in articulation.json."""
 
-    def plant(view: Path) -> None:
-        held = json.loads((view / "articulation.json").read_text())
-        change(max(held["parts"], key=lambda r: r["pixels"]))
-        (view / "articulation.json").write_text(json.dumps(held))
-
-    return plant
+    return json_file(
+        "articulation.json", lambda h: change(max(h["parts"], key=lambda r: r["pixels"]))
+    )
 
 
 def joint(change: Callable[[dict], object]) -> Plant:
-    """Of the open door in house.json."""
+    """Change the joint of the open door in house.json."""
 
     def open_one(house: dict) -> dict:
-        every = [j for i in house["items"] for j in i.get("joints", [])]
-        return next(j for j in every if j["value"] > 0)
+        joints = [j for i in house["items"] for j in i.get("joints", [])]
+        return next(j for j in joints if j["value"] > 0)
 
     return document("house.json", lambda h: change(open_one(h)))
 
 
 def moving(change: Callable[[dict], object]) -> Plant:
-    """Of the first primitive of house.glb that moves."""
+    """Change the first moving primitive of house.glb."""
 
     def first(h: dict) -> dict:
-        every = [p for m in h["meshes"] for p in m["primitives"]]
-        return next(p for p in every if "part" in p.get("extras", {}))
+        primitives = [p for m in h["meshes"] for p in m["primitives"]]
+        return next(p for p in primitives if "part" in p.get("extras", {}))
 
     return glb(lambda h: change(first(h)))
 

@@ -78,31 +78,31 @@ def make_root(
         names = truth.OPTIONAL_NAMES if with_optional else ()
         layers |= truth.optional_layers(names, label_inputs)
         table |= truth.optional_tables(names, home)
-        made = {LAYER[k].file: encoded(k, v) for k, v in layers.items()}
-        made["view.json"] = json.dumps(table).encode()
+        of_view = {LAYER[k].file: encoded(k, v) for k, v in layers.items()}
+        of_view["view.json"] = json.dumps(table).encode()
         if with_optional:
             rows = truth.articulation_table(layers["part"], home, camera)
-            made[keys.ARTICULATION] = json.dumps(rows).encode()
-        files[f"truth.{name}"] = {f"views/{name}/{k}": v for k, v in made.items()}
-    for step, made in files.items():
-        for file, data in made.items():
+            of_view[keys.ARTICULATION] = json.dumps(rows).encode()
+        files[f"truth.{name}"] = {f"views/{name}/{k}": v for k, v in of_view.items()}
+    for step, contents in files.items():
+        for file, data in contents.items():
             (house / file).parent.mkdir(parents=True, exist_ok=True)
             (house / file).write_bytes(data)
         (house / "done").mkdir(exist_ok=True)
-        (house / "done" / f"{step}.json").write_text(json.dumps({"files": list(made)}))
+        (house / "done" / f"{step}.json").write_text(json.dumps({"files": list(contents)}))
     sign(root, house)
     return house
 
 
 def sign(root: Path, house: Path) -> None:
-    """Make manifest, markers and house.json agree with the files as they are now."""
+    """Make manifest, markers and house.json agree with the present files."""
     markers = []
     description = house / "house.json"
     if description.is_file() and (house / "house.glb").is_file():
-        held = json.loads(description.read_text())
+        house_json = json.loads(description.read_text())
         digest = keys.sha256((house / "house.glb").read_bytes())
-        if held.get("glb_sha256") != digest:
-            description.write_text(json.dumps(held | {"glb_sha256": digest}))
+        if house_json.get("glb_sha256") != digest:
+            description.write_text(json.dumps(house_json | {"glb_sha256": digest}))
     for marker in sorted((house / "done").glob("*.json")):
         stood = json.loads(marker.read_text())
         old = stood["files"]

@@ -10,7 +10,7 @@ from pbrs_farm.check.pixel_checks import of_another_part
 
 
 def test_of_two_that_cross_the_other_is_found_on_their_line_alone() -> None:
-    # A frame across the axis at 2 m, and a leaf that stands at 45 degrees and crosses it at x = 0.
+    # A frame across the axis at 2 m, and a leaf at 45 degrees that crosses it at x = 0.
     frame = [(-1, -1, -2), (1, -1, -2), (0, 2, -2)]
     leaf = [(-1, -1, -3), (1, -1, -1), (0, 2, -2)]
     triangles = SimpleNamespace(
@@ -24,6 +24,6 @@ def test_of_two_that_cross_the_other_is_found_on_their_line_alone() -> None:
     rays = Rays(triangles)
     directions = np.array([[1e-5, 0.1, -1], [0.1, 0.1, -1], [-0.1, 0.1, -1], [0.9, 0.9, -1]])
     first = rays.first(np.zeros(3), directions)
-    found = of_another_part(first, np.zeros(3), directions, Scene(triangles, rays))
+    faces = of_another_part(first, np.zeros(3), directions, Scene(triangles, rays))
     assert first.tolist() == [1, 1, 0, -1]
-    assert found.tolist() == [0, -1, -1, -1]
+    assert faces.tolist() == [0, -1, -1, -1]

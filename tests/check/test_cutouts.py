@@ -84,7 +84,7 @@ def test_labels_of_a_solid_surface_or_of_another_cutoff_are_caught(
     tmp_path: Path, wrong: str
 ) -> None:
     home = screened(MATERIALS["leaf"])
-    other = screened(MATERIALS["whole" if wrong == "solid" else "low"])
-    caster = Caster.of_house(other, geometry_from_house(home))
+    replacement = screened(MATERIALS["whole" if wrong == "solid" else "low"])
+    caster = Caster.of_house(replacement, geometry_from_house(home))
     make_root(tmp_path, home, caster=caster)
     assert {"ray: instance", "ray: depth"} <= failed(tmp_path)

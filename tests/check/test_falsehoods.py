@@ -16,7 +16,7 @@ from pbrs_farm.core import layers
 from pbrs_farm.core.layers import optional_layer
 from pbrs_farm.images import array_from_png, png_from_array
 from pbrs_farm.views.open_views import open_views
-from tests.check.falsehoods import FALSEHOODS, planted, view_of
+from tests.check.falsehoods import FALSEHOODS, edit_json, planted, view_of
 from tests.check.roots import house_of, sign
 from tests.check.sorts_of_roots import ROOTS
 
@@ -68,10 +68,10 @@ def test_a_certificate_says_what_was_looked_at(finished_root: Root) -> None:
     assert "albedo.png (2): recomputed by rays" in text
     assert "mlt_ol.png (2): developed from radiance.exr again" in text
     assert "levels of light" in text.partition("not looked at:")[2]
-    # Every file of a view is told of, one way or the other.
-    told = " ".join((*certificate.looked_at, *certificate.not_looked_at))
+    # Every file of a view is in one of the two lists.
+    listed = " ".join((*certificate.looked_at, *certificate.not_looked_at))
     view = view_of(root)
-    assert all(str(f.relative_to(view)) in told for f in view.rglob("*") if f.is_file())
+    assert all(str(f.relative_to(view)) in listed for f in view.rglob("*") if f.is_file())
 
 
 @pytest.mark.quick(18)
@@ -112,7 +112,7 @@ def test_further_pictures_by_other_cameras_are_developed_again(finished_root: Ro
 def test_a_true_root_of_dark_pictures_is_clean_by_its_tiles(finished_root: Root) -> None:
     certificate = verify(finished_root("dark"), sample=10)
     assert certificate.is_clean, certificate.text()
-    # The first view is denoised as it stands, the second at half its size: both modes and a variant.
+    # The first view is denoised at its full size, the second at half of it: both modes and a variant.
     assert certificate.counts["light by tiles"].checked == 3
     assert any(
         line.startswith("light of 1 views was denoised again") for line in certificate.not_looked_at
@@ -131,7 +131,7 @@ def test_a_patch_is_found_where_light_is_denoised_at_half_its_size(
     (view / file).write_bytes(png_from_array(picture))
     sign(root, house_of(root))
     certificate = verify(root, sample=10)
-    # It differs at half its size, and so it is looked at as it stands.
+    # It differs at half its size, so its full size is compared.
     assert "light by tiles" not in certificate.counts
     (fault,) = (line for line in certificate.failures if line.startswith("light developed"))
     assert f"{file}: " in fault
@@ -188,9 +188,7 @@ def test_a_new_field_and_a_new_layer_are_told_of_as_not_looked_at(
         (house_of(root) / "house.json", lambda t: t["rooms"][0].update(wallpaper="roses")),
         (house_of(root) / "cameras.json", lambda t: t["views"][0].update(focus_m=2.0)),
     ):
-        held = json.loads(file.read_text())
-        change(held)
-        file.write_text(json.dumps(held))
+        edit_json(file, change)
     new = optional_layer("incidence", "Y", "uint8", "degrees between normal and ray", "255")
     (view / new.file).write_bytes((view / "valid.png").read_bytes())
     marker = house_of(root) / f"done/truth.{view.name}.json"

@@ -1,4 +1,4 @@
-"""What a coated surface sends back of a light, as `verify` expects it, against the model of docs/light_methods.md."""
+"""Light that a coated surface reflects, as `verify` expects it, against the model of docs/light_methods.md."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ def _seen(albedo: float, to_light: float, to_camera: float) -> float:
 def test_a_coated_ceiling_seen_at_a_slant_sends_less_back(
     albedo: float, to_light: float, to_camera: float
 ) -> None:
-    one, none = np.ones(1), np.zeros((1, 3))
-    painted = one * 0.96 * (1 - 0.04 / albedo)
+    ones, none = np.ones(1), np.zeros((1, 3))
+    painted = ones * 0.96 * (1 - 0.04 / albedo)
     places = _Places(
-        np.zeros(1, int), np.zeros(1, int), none, none, none[None], painted, one * to_camera
+        np.zeros(1, int), np.zeros(1, int), none, none, none[None], painted, ones * to_camera
     )
     expected = min(_seen(albedo, to_light, to_camera), 1)
-    assert places.returned(one * to_light)[0] == pytest.approx(expected, rel=1e-3)
+    assert places.returned(ones * to_light)[0] == pytest.approx(expected, rel=1e-3)
 
 
 def test_a_roughness_makes_a_coat_and_a_colour_without_shine_none() -> None:

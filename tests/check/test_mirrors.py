@@ -1,4 +1,4 @@
-"""What mirrors show, and gloss, recomputed by `verify` in a home whose walls are mirrors."""
+"""Mirror images and gloss, recomputed by `verify` in a home whose walls are mirrors."""
 
 import shutil
 from dataclasses import replace
@@ -50,10 +50,10 @@ def test_what_mirrors_show_is_recomputed_to_the_last_pixel(mirrored):
         for name in ("mirror", "instance", "behind_mirror/instance", "roughness")
     }
     is_mirror = pictures["mirror"] > 0
-    other = pictures["behind_mirror/instance"] != pictures["instance"]
+    differs = pictures["behind_mirror/instance"] != pictures["instance"]
     assert is_mirror.mean() > 0.2
-    assert other[is_mirror].mean() > 0.5
-    assert not other[~is_mirror].any()
+    assert differs[is_mirror].mean() > 0.5
+    assert not differs[~is_mirror].any()
     assert len(np.unique(pictures["roughness"])) >= 4
     certificate = verify(mirrored, all_pixels=True)
     assert certificate.is_clean, certificate.text()

@@ -1,4 +1,4 @@
-"""How far a tracked point's place may be off: what 32-bit floats of vertices and places cost, and no more."""
+"""Tolerance of a tracked point's place: the error of 32-bit floats of vertices and places, and no more."""
 
 import numpy as np
 import pytest

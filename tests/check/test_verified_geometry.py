@@ -111,7 +111,7 @@ def with_frame_in_wall(by_m: float) -> House:
             normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
             normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
             upright = np.abs(normals[:, 1]) < 0.1
-            # Smaller triangles about the same middle, each in the plane of its own.
+            # Smaller triangles about the same middle, each in its plane.
             middle = corners.mean(1, keepdims=True)
             small = (middle + 0.8 * (corners - middle) + by_m * normals[:, None])[upright]
             faces = np.arange(3 * len(small)).reshape(-1, 3).astype(np.int32)
@@ -151,18 +151,18 @@ def test_parts_of_one_thing_in_one_plane_and_two_colours_are_told(tmp_path, by_m
     home = builtin_home()
     framed = with_frame_in_wall(by_m)
     frames = {i.id.removeprefix("frame_"): i for i in framed.items if i.id.startswith("frame_")}
-    other = max(s.material for i in home.items for s in i.surfaces)
+    last = max(s.material for i in home.items for s in i.surfaces)
     items = []
     for item in home.items:
         parts = frames[item.id].surfaces if item.id in frames else ()
-        parts = tuple(replace(s, material=other) for s in parts)
+        parts = tuple(replace(s, material=last) for s in parts)
         items.append(replace(item, surfaces=(*item.surfaces, *parts)))
     make_root(tmp_path, home.with_items(items))
     certificate = verify(tmp_path, all_pixels=True)
     # Instance, depth and normal are right by either: only the colour is a throw of dice.
     assert certificate.is_clean, certificate.text()
-    told = [c.items[0] for c in certificate.coincident if c.items[0] == c.items[1]]
-    assert bool(told) == coincide
+    listed = [c.items[0] for c in certificate.coincident if c.items[0] == c.items[1]]
+    assert bool(listed) == coincide
 
 
 def test_surfaces_half_a_millimetre_apart_do_not_coincide(tmp_path):
@@ -187,7 +187,7 @@ def test_model_coordinates_are_recomputed(tmp_path):
     posed = np.isin(instance, [r["id"] for r in rows if "model" in r])
     assert (label.any(-1) == posed).all()
     assert posed.sum() > 500
-    # A tenth of a model beside, and a point on what is no model.
+    # A tenth of a model beside, and a point off any model.
     for place, value in ((posed, 6000), (~posed, 1)):
         wrong = label.astype(int)
         row, column = np.argwhere(place)[7]
