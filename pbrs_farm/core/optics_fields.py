@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
 import numpy as np
@@ -14,6 +14,7 @@ from pbrs_farm.core.camera import Intrinsics
 from pbrs_farm.core.distortion import radius_of_angle
 from pbrs_farm.core.lenses import COEFFICIENTS, Lens, LensModel
 from pbrs_farm.core.recipe_fields import FieldGroup, Share, field
+from pbrs_farm.core.record import read_toml
 
 
 class BlurFields(FieldGroup):
@@ -55,39 +56,11 @@ _ASPECT_ERROR: Final = 0.01  # of a picture's width, against the lens's own pict
 Pixels = Annotated[float, Field(ge=0, le=1e6)]
 Coefficient = Annotated[float, Field(ge=-1e3, le=1e3)]
 
-# fmt: off
-LENS_PRESETS: Final[Mapping[str, Mapping[str, Any]]] = {
-    "none": {},
-    # The colour camera of NYUv2's Kinect: camera_params.m of its toolbox, Silberman et al. 2012.
-    "kinect": {
-        "model": "radtan", "width_px": 640, "height_px": 480,
-        "fx": 518.85790, "fy": 519.46961, "cx": 325.58245, "cy": 253.73617,
-        "k1": 0.20796615, "k2": -0.58613825, "p1": 7.2231363e-4, "p2": 1.04796272e-3,
-        "k3": 0.49856987,
-    },
-    # Camera 0 of TUM VI at 512 x 512, a lens of 195 degrees: Schubert et al. 2018. Kalibr counts from
-    # the middle of the first pixel, these from its corner: half a pixel more.
-    "tum_vi": {
-        "model": "fisheye", "width_px": 512, "height_px": 512,
-        "fx": 190.978477, "fy": 190.973307, "cx": 255.431706, "cy": 257.397443,
-        "k1": 0.0034823894, "k2": 0.00071503485, "k3": -0.0020532361, "k4": 0.00020293674,
-        "max_angle_deg": 97.5,
-    },
-    # Hypersim's: 60 degrees across, square pixels (Roberts et al. 2021).
-    "hypersim": {
-        "model": "pinhole", "width_px": 1024, "height_px": 768, "fx": 886.8100134752651,
-    },
-    # Left infrared cameras of Intel's D435 and D455: 87 and 86 degrees across (data sheet, D400 family).
-    "d435": {"model": "pinhole", "width_px": 848, "height_px": 480, "fx": 447.0},
-    "d455": {"model": "pinhole", "width_px": 848, "height_px": 480, "fx": 455.0},
-    # Half of all directions in a circle that touches the picture's edges, equidistant.
-    "fisheye180": {
-        "model": "fisheye", "width_px": 512, "height_px": 512, "hfov_deg": 180.0,
-        "max_angle_deg": 90.0,
-    },
-}
-# fmt: on
-"""Fields that a preset sets where the user does not."""
+_PRESETS: Final = read_toml(
+    Path(__file__).with_name("optics_presets.toml"), dict[str, dict[str, dict[str, Any]]]
+)
+LENS_PRESETS: Final = _PRESETS["lens"]
+SENSOR_PRESETS: Final = _PRESETS["sensor"]
 
 
 class LensFields(FieldGroup):
@@ -206,39 +179,6 @@ def fold_of(i: Intrinsics) -> str | None:
     more = "" if i.lens.model == "radtan" else ", or lens.max_angle_deg below it"
     hint = f"give other {names}, a larger lens.fx{more}"
     return f"the distortion folds the picture at {math.degrees(angle):.1f} degrees: {where}; {hint}"
-
-
-# fmt: off
-SENSOR_PRESETS: Final[Mapping[str, Mapping[str, Any]]] = {
-    "none": {},
-    # The colour camera of a first Kinect: a 1/4 inch CMOS of 2.8 um at 640 x 480, no JPEG.
-    "kinect": {
-        "is_on": True, "f_number": 2.4, "shutter_max_s": 1 / 30, "iso_min": 100, "iso_max": 800,
-        "full_well_e": 7_000, "read_noise_e": 6.0, "bits": 10, "vignetting": 0.15,
-        "aberration_px": 0.7, "headroom": 2.0,
-    },
-    # A telephone of about 2020: pixels of 1.4 um, JPEG of high quality. A pixel of a picture is the
-    # mean of some sixteen of the sensor's, so that no mosaic is seen.
-    "phone": {
-        "is_on": True, "f_number": 1.8, "shutter_max_s": 1 / 25, "iso_min": 25, "iso_max": 3200,
-        "full_well_e": 96_000, "read_noise_e": 7.0, "bits": 12, "vignetting": 0.1,
-        "aberration_px": 0.3, "jpeg_quality": 92, "headroom": 3.0, "mosaic": False,
-    },
-    # A camera with a large sensor: pixels of 5 um, 14 bits; means of sixteen pixels too.
-    "slr": {
-        "is_on": True, "f_number": 4.0, "shutter_max_s": 1 / 30, "iso_min": 100, "iso_max": 6400,
-        "full_well_e": 800_000, "read_noise_e": 12.0, "bits": 14, "vignetting": 0.2,
-        "aberration_px": 0.2, "jpeg_quality": 96, "headroom": 6.0, "mosaic": False,
-    },
-    # A cheap webcam: small pixels, a plastic lens, strong JPEG.
-    "webcam": {
-        "is_on": True, "f_number": 2.8, "shutter_max_s": 1 / 30, "iso_min": 100, "iso_max": 1600,
-        "full_well_e": 4_000, "read_noise_e": 5.0, "bits": 8, "vignetting": 0.35,
-        "aberration_px": 1.2, "jpeg_quality": 60, "headroom": 1.6,
-    },
-}
-# fmt: on
-"""Typical numbers of each kind of camera, none a product's measured ones but Kinect's size and rate."""
 
 
 class SensorFields(FieldGroup):

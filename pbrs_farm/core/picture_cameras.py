@@ -9,11 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
 from pbrs_farm.core.optics_fields import SensorFields
+from pbrs_farm.core.record import read_toml
 
 if TYPE_CHECKING:
     from pbrs_farm.core.recipe_fields import ToneFields
@@ -32,39 +34,7 @@ class CameraRow:
     sensor: str = "none"  # a preset of the group sensor
 
 
-# Typical behaviour of each kind, none a product's measured one. Errors of exposure are in stops, of
-# white balance in stops of red over blue (warmth) and of green over both (tint).
-# fmt: off
-CAMERAS: Final[Mapping[str, CameraRow]] = {
-    NEUTRAL: CameraRow("a good camera's JPEG, the same for each view"),
-    "phone": CameraRow(
-        "small pixels; local contrast opens shadows and holds windows; sharpened; JPEG",
-        tone={"contrast": 1.3, "flare": 0.004, "local_contrast": 0.4, "sharpening": 0.6,
-              "white_balance": 0.85},
-        spread={"exposure_ev": 0.25, "warmth_ev": 0.12, "tint_ev": 0.05, "contrast": 0.08},
-        sensor="phone",
-    ),
-    "slr": CameraRow(
-        "large pixels, a wide range, a firm curve, corners a little darker",
-        tone={"contrast": 1.55, "flare": 0.001, "white": 8.0, "sharpening": 0.3,
-              "white_balance": 0.8},
-        spread={"exposure_ev": 0.35, "warmth_ev": 0.12, "tint_ev": 0.04, "contrast": 0.12},
-        sensor="slr",
-    ),
-    "webcam": CameraRow(
-        "plastic lens with veil and dark corners, strong sharpening, strong JPEG, wrong whites",
-        tone={"contrast": 1.35, "flare": 0.012, "sharpening": 0.8, "white_balance": 0.6},
-        spread={"exposure_ev": 0.5, "warmth_ev": 0.3, "tint_ev": 0.12, "contrast": 0.1},
-        sensor="webcam",
-    ),
-    "kinect": CameraRow(
-        "the colour camera of a first Kinect: low range, burnt windows, noise, no JPEG",
-        tone={"contrast": 1.5, "flare": 0.006, "sharpening": 0.3, "white_balance": 0.5},
-        spread={"exposure_ev": 0.4, "warmth_ev": 0.25, "tint_ev": 0.1, "contrast": 0.1},
-        sensor="kinect",
-    ),
-}
-# fmt: on
+CAMERAS: Final = read_toml(Path(__file__).with_suffix(".toml"), dict[str, CameraRow])
 
 ERRING: Final = tuple(name for name, row in CAMERAS.items() if row.spread)
 """The cameras that `drawn` and variants choose from: all but `neutral`."""
