@@ -1,6 +1,6 @@
 """The table of a view's files: name, channels, dtype, unit, nodata, and the step that writes each.
 
-No effects. The table of docs/formats/layers.md is printed from it (`python -m pbrs_farm.core.layers`).
+Effect: reads layers.csv. The table of docs/formats/layers.md is printed from it (`python -m pbrs_farm.core.layers`).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The recipe's groups of the camera itself: blur, lens and sensor, with their presets; no effects."""
+"""The recipe's groups of the camera itself: blur, lens and sensor, with their presets; effect: reads its presets."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The cameras that pictures are developed as, one row each: response, sharpening, errors, sensor. No effects.
+"""The cameras that pictures are developed as, one row each: response, sharpening, errors, sensor. Effect: reads its table.
 
 `tone.camera` names a row, or `drawn`: a row that errs, another each view, by seed. A row says only what its camera does
 otherwise than `neutral`, whose values are the defaults of the recipe's group `tone`. A field that

@@ -1,4 +1,4 @@
-"""Every constant of the paper as a named field with its section; presets; overrides. No effects.
+"""Every constant of the paper as a named field with its section; presets; overrides. Effect: reads its presets.
 
 A recipe is a full set of fields in groups, one group per stage, so that a step's digest covers
 the groups it uses and nothing else. `--set group.field=value` overrides any field.
@@ -10,7 +10,8 @@ import json
 import math
 from collections.abc import Iterator, Mapping
 from functools import cache
-from typing import Any, Self, get_args
+from pathlib import Path
+from typing import Any, Final, Self, get_args
 
 from pydantic import ValidationError, model_validator
 from pydantic_core import ErrorDetails
@@ -40,6 +41,7 @@ from pbrs_farm.core.recipe_fields import (
     ToneFields,
     field,
 )
+from pbrs_farm.core.record import read_toml
 from pbrs_farm.core.rig_fields import RigFields, stereo_rig
 from pbrs_farm.core.shot import Shot
 from pbrs_farm.core.shown_text import hint_of_choice, near_names, question
@@ -208,61 +210,9 @@ def _digest_of_fields(fields: Mapping[str, Any], groups: tuple[str, ...]) -> str
     return keys.digest({g: fields[g] for g in chosen if fields[g] is not None})
 
 
-_PHOTO: Mapping[str, Any] = {
-    "preset": "photo",
-    "height_min_m": 1.2,
-    "height_max_m": 1.65,
-    "tilt_deg": 8.0,
-    "tilt_sd_deg": 10.0,
-    "roll_sd_deg": 4.0,
-    "clearance_m": 0.15,
-    "min_objects": 0,
-    "max_item_fraction": 0.5,
-    "max_wall_fraction": 0.7,
-    "max_opening_fraction": 0.35,
-    "min_score": 0.8,
-    "min_room_score": 0.2,
-    "likeness": 4.0,
-    "hfov_rad": 1.0472,
-    "hfov_spread": 0.1,
-}
-"""Cameras as people hold them, after NYUv2: docs/cameras.md has the measured numbers."""
-
-_PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
-    "preview": {
-        "dress": {"open_share": 0.1},
-        "repair": {"lamp_in_every_room": True, "lamp_lx": 100.0, "add_ceilings": True},
-        "surroundings": {"kind": "drawn"},
-        "cameras": _PHOTO,
-        "image": {"width_px": 320, "height_px": 240},
-        "light": {"spp": 10, "filter": "box"},
-        "sky": {"time": "drawn"},
-        "selection": {"min_room_lx": 1.0},
-    },
-    "fast": {
-        "dress": {"open_share": 0.1},
-        "repair": {"lamp_in_every_room": True, "lamp_lx": 100.0, "add_ceilings": True},
-        "surroundings": {"kind": "drawn"},
-        "cameras": _PHOTO,
-        "light": {"spp": 28, "filter": "box"},
-        "sky": {"time": "drawn"},
-        "selection": {"min_room_lx": 1.0},
-    },
-    "paper": {"light": {"integrator": "metropolis", "denoise": False}, "sky": {"kind": "panorama"}},
-    "released": {
-        "cameras": {
-            "preset": "released",
-            "n_sectors": 4,
-            "tilt_deg": 11.309932,  # direction (cos, -0.2, sin), docs/spec/suncg.md section 3.2 c
-            "clearance_m": 0.0,
-            "min_objects": 4,
-        },
-        "light": {"integrator": "metropolis", "denoise": False},
-        "sky": {"kind": "panorama"},
-        "emission": {"preset": "released"},
-        "materials": {"preset": "released"},
-        "tone": {"preset": "released", "key": 0.8, "white_balance": 0.0},
-    },
+_ROWS: Final = read_toml(Path(__file__).with_name("recipes.toml"), dict[str, dict[str, Any]])
+_PRESETS: Final = {
+    name: {**_ROWS.get(row.pop("base", ""), {}), **row} for name, row in _ROWS.items()
 }
 
 RECIPE_NAMES = tuple(_PRESETS)
