@@ -20,64 +20,31 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.camera import Intrinsics
 from pbrs_farm.core.checked_json import place_in, sentence
 from pbrs_farm.core.errors import BadRecipe
-from pbrs_farm.core.optics_fields import BlurFields, LensFields, SensorFields
+from pbrs_farm.core.optics_fields import BlurFields as BlurFields
+from pbrs_farm.core.optics_fields import LensFields as LensFields
+from pbrs_farm.core.optics_fields import SensorFields as SensorFields
 from pbrs_farm.core.picture_cameras import DRAWN, PictureCamera, picture_camera
-from pbrs_farm.core.recipe_fields import (
-    CAMERA_SOURCES,
-    CameraFields,
-    DressFields,
-    EmissionFields,
-    FieldGroup,
-    HistogramFields,
-    ImageFields,
-    LightFields,
-    MaterialFields,
-    RasterFields,
-    ReadFields,
-    RepairFields,
-    SelectionFields,
-    SkyFields,
-    SurroundingFields,
-    ToneFields,
-    field,
-)
+from pbrs_farm.core.recipe_fields import CAMERA_SOURCES as CAMERA_SOURCES
+from pbrs_farm.core.recipe_fields import CameraFields as CameraFields
+from pbrs_farm.core.recipe_fields import DressFields as DressFields
+from pbrs_farm.core.recipe_fields import EmissionFields as EmissionFields
+from pbrs_farm.core.recipe_fields import FieldGroup, field
+from pbrs_farm.core.recipe_fields import HistogramFields as HistogramFields
+from pbrs_farm.core.recipe_fields import ImageFields as ImageFields
+from pbrs_farm.core.recipe_fields import LightFields as LightFields
+from pbrs_farm.core.recipe_fields import MaterialFields as MaterialFields
+from pbrs_farm.core.recipe_fields import RasterFields as RasterFields
+from pbrs_farm.core.recipe_fields import ReadFields as ReadFields
+from pbrs_farm.core.recipe_fields import RepairFields as RepairFields
+from pbrs_farm.core.recipe_fields import SelectionFields as SelectionFields
+from pbrs_farm.core.recipe_fields import SkyFields as SkyFields
+from pbrs_farm.core.recipe_fields import SurroundingFields as SurroundingFields
+from pbrs_farm.core.recipe_fields import ToneFields as ToneFields
 from pbrs_farm.core.record import read_toml
-from pbrs_farm.core.rig_fields import RigFields, stereo_rig
+from pbrs_farm.core.rig_fields import RigFields as RigFields
+from pbrs_farm.core.rig_fields import stereo_rig
 from pbrs_farm.core.shot import Shot
 from pbrs_farm.core.shown_text import hint_of_choice, near_names, question
-
-__all__ = [
-    "CAMERA_SOURCES",
-    "RECIPE_NAMES",
-    "BlurFields",
-    "CameraFields",
-    "DressFields",
-    "EmissionFields",
-    "HistogramFields",
-    "ImageFields",
-    "LensFields",
-    "LightFields",
-    "MaterialFields",
-    "RasterFields",
-    "ReadFields",
-    "Recipe",
-    "RepairFields",
-    "RigFields",
-    "SelectionFields",
-    "SensorFields",
-    "SkyFields",
-    "SurroundingFields",
-    "ToneFields",
-    "changed_recipe",
-    "differences",
-    "field_paths",
-    "groups",
-    "groups_of_step",
-    "picture_groups",
-    "recipe_from_json",
-    "recipe_from_name",
-    "with_settings",
-]
 
 
 class Recipe(FieldGroup):
