@@ -1,4 +1,4 @@
-"""Generated furniture and small things on request: pf.thing. Effects: writes a GLB into the cache."""
+"""Furniture and small items made on request, by pf.thing. Effects: writes a GLB into the cache."""
 
 from __future__ import annotations
 
@@ -45,11 +45,11 @@ _WORDS: Final = {
 
 @checked_call
 def thing(name: str, *, seed: Whole = 0, style: str = "", **parameters: object) -> Model:
-    """A piece of furniture or a small thing of the generated catalogue, as a model to place.
+    """A piece of furniture or a small item of the generated catalogue, as a model to place.
 
-    name: of the thing, "bed" or "sofa"; docs/dress/catalogue.md lists all. seed: draws all that is
-    not given. style: a style of dressing, else by the seed. parameters: width_m, depth_m, height_m,
-    and those of its family; a colour stands for a material. Doors and drawers are shut, and a lamp
+    name: "bed", "sofa", "cup"; docs/dress/catalogue.md lists all. seed: of all values that are not
+    given. style: a style of dressing, else by the seed. parameters: width_m, depth_m, height_m,
+    and those of its family; a colour is taken for a material. Doors and drawers are shut, and a lamp
     is not lit: Home.add_light lights one.
 
     Raises BadInput for an unknown name or parameter, with the near names, and for a value that does
@@ -93,7 +93,7 @@ def thing(name: str, *, seed: Whole = 0, style: str = "", **parameters: object) 
 
 
 def _own_name(name: str) -> str:
-    """The family or thing of a name or everyday word; BadInput if there is none."""
+    """The family or item with a name or everyday word; BadInput if no name matches."""
     own = name if name in families() else _WORDS.get(name, name)
     called = {family.called: key for key, family in reversed([*families().items()])}
     own = own if own in families() or own in THINGS else called.get(own, own)
@@ -123,7 +123,7 @@ def _size(
 
 
 def _change(family: Family, name: str, chosen: Mapping[str, object]) -> Callable[[Any], Any] | None:
-    """How the drawn parameters of a family change; BadInput if it has none to choose."""
+    """A function that changes drawn parameters; BadInput if the family has no parameters."""
     if family.draw is not None:
         return lambda drawn: changed(drawn, chosen, name)
     if chosen:
