@@ -34,9 +34,7 @@ _ON = "[NAME=]ROOT[@MODE], nyu_depth_v2_labeled.mat, or a folder of photographs 
 _SHIPPED = "no RUN: the weights that come with the package for this task; depth has none"
 
 
-def add_verbs(verb: Verb) -> None:
-    """Add train, evaluate, predict, ablation and compare."""
-    p = verb("train", _train)
+def _add_train(p: argparse.ArgumentParser) -> None:
     p.add_argument("task", choices=TASKS, help="what the network learns to see")
     roots = "output folders, shards of `pack`, nyu_depth_v2_labeled.mat, or folders of photographs with depth"
     p.add_argument("root", metavar="ROOT", nargs="+", help=roots)
@@ -57,6 +55,11 @@ def add_verbs(verb: Verb) -> None:
     p.add_argument("--log", nargs="+", choices=LOGGERS, default=[], metavar="PLACE", help=text)
     export = "onnx: RUN/model.onnx, for pictures of the plan's size; weights: RUN/packed, half floats and a model card; of a finished run, too"
     p.add_argument("--export", choices=("onnx", "weights"), help=export)
+
+
+def add_verbs(verb: Verb) -> None:
+    """Add train, evaluate, predict, ablation and compare."""
+    _add_train(verb("train", _train))
 
     p = verb("evaluate", _evaluate)
     p.usage = (
