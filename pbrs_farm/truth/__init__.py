@@ -1,4 +1,4 @@
-"""Ground truth: one hit record at pixel centres -> every label layer; no effects, no effects."""
+"""Ground truth: one hit record at pixel centres -> every label layer; no effects."""
 
 from pbrs_farm.truth.articulation import articulation_table as articulation_table
 from pbrs_farm.truth.articulation import motion_table as motion_table
