@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import pytest
 
+from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadInput, BadRecipe
 from pbrs_farm.core.lighting import Mode
 from pbrs_farm.core.recipe import differences, recipe_from_name
+from pbrs_farm.formats.marker import Marker
 from pbrs_farm.run import plan
+from pbrs_farm.run.house_cache import HouseCache
 from pbrs_farm.run.request import Wanted
+from pbrs_farm.run.step_cache import StepOutput, Work, run_unless_done
+from pbrs_farm.store import MemoryStore
 
 
 def digest_of(step: str, **overrides: str) -> str:
@@ -143,3 +148,32 @@ def test_modes_may_be_given_by_name() -> None:
     assert plan.view_steps(want) == ("truth", "opengl_il", "light", "develop", "view")
     with pytest.raises(BadInput, match="no such lighting mode"):
         Wanted(modes=("opengl_li",))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("view", "is_developed_again"),
+    [("0_0_1", False), ("0_0_1_right", False), ("frame_00001_back", False), ("0_0_1_back", True)],
+)
+def test_only_stills_that_now_share_their_rig_s_camera_are_developed_again(
+    view: str, is_developed_again: bool
+) -> None:
+    rig = '{"cameras": [{"name": "front"}, {"name": "right"}, {"name": "back"}]}'
+    recipe = recipe_from_name("fast", {"rig": rig})
+    store = MemoryStore()
+    light = Marker(
+        step="light",
+        house_id="h",
+        view_id=view,
+        digest="d",
+        files=(),
+        facts={},
+        seconds=0.0,
+        worker="",
+        attempt=1,
+        finished_utc="",
+    )
+    store.put(keys.marker_key("h", "light", view), light.json_bytes())
+    work = Work(store, recipe, "h", HouseCache(), view_id=view)
+    digest = run_unless_done("develop", work, lambda _work: StepOutput({})).marker.digest
+    before = plan.step_digest(plan.STEPS["develop"], recipe, "h", view, {"light": "d"})
+    assert (digest != before) == is_developed_again
