@@ -122,7 +122,6 @@ def primitive(writer: glb.GlbWriter, house: House, item: Item, s: Surface) -> di
         row["extras"] = {"part": s.part}
     if len(s.faces):
         return row | {"indices": writer.add_faces(s.faces), "mode": _TRIANGLES}
-    # Keep vertices without faces as points.
     return row | {"mode": _POINTS}
 
 

@@ -29,7 +29,6 @@ def hit_record_from_faces(geometry: Geometry, camera: Camera, face: I32) -> HitR
     f, local = _distinct(face.ravel()[pixels], len(geometry.faces))
     planes = _planes_of_faces(geometry, f, origin)
 
-    # Intersect every ray with its plane and turn the normal towards the camera.
     is_planar = camera.intrinsics.lens.depth_is_planar
     axis = -camera.world_from_camera[:3, 2] if is_planar else None
     normal = planes.normal.take(local, axis=0)

@@ -49,7 +49,6 @@ def count_items(
 
     group: cameras in a row that stay together. A counter may give fewer columns, not more.
     """
-    # Keep cameras of a group in one part.
     most = max(1, min(_CAMERAS_PER_CALL, _COUNTS_PER_CALL // (n_items + 1)) // group) * group
     for start in range(0, len(cameras), most):
         part = slice(start, min(start + most, len(cameras)))

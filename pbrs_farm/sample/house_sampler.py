@@ -58,7 +58,6 @@ def sample_cameras(
         views += room_views
         rooms.append(report)
         traces.append(trace)
-    # Order as published: best views of the house first.
     if fields.preset == "released":
         views.sort(key=lambda view: -view.score)
     return Sampling(tuple(views), _camera_report(fields, views, tuple(rooms)), tuple(traces))

@@ -63,7 +63,6 @@ def viewpoint_mask(house: House, room: Room, clearance_m: float) -> tuple[Bools,
     nothing.
     """
     grid = room_grid(house, room)
-    # Lay the nodes over the box of the room and its objects.
     cell = min(clearance_m / 2, _MAX_MASK_CELL_M) if clearance_m > 0 else _MASK_CELL_M
     xs = np.arange(grid.x_min, grid.x_max + cell, cell)
     zs = np.arange(grid.z_min, grid.z_max + cell, cell)
@@ -119,7 +118,6 @@ def _plan_shapes(triangles: F64) -> NDArray[np.object_]:
     """Plan projections (x, z): triangles, or lines for vertical ones."""
     plan = triangles[:, :, [0, 2]]
     e, f = plan[:, 1] - plan[:, 0], plan[:, 2] - plan[:, 0]
-    # Draw vertical triangles as lines.
     upright = np.abs(e[:, 0] * f[:, 1] - e[:, 1] * f[:, 0]) < 1e-9
     ring = plan[:, [0, 1, 2, 0]]
     shapes = np.empty(len(plan), np.object_)

@@ -110,7 +110,6 @@ def floor_points(room: Room, n: int, seed: int) -> F64:
         inside.append(tried[shapely.contains_xy(shape, tried[:, 0], tried[:, 1])])
         if sum(len(k) for k in inside) >= n:
             break
-    # Fill up with the polygon's middle should it be too thin to hit.
     plan = np.concatenate([*inside, np.repeat(room.polygon.mean(0)[None], n, 0)])[:n]
     return np.stack([plan[:, 0], np.full(n, room.floor_y + _ABOVE_FLOOR_M), plan[:, 1]], 1)
 

@@ -176,7 +176,6 @@ def outdoor_weights(strength: F64, brought: NDArray[np.floating]) -> F64:
     Dome and portals are techniques for one emitter, the sky: the better of the two says how
     strong it is, and portals take most of it where most of its light comes through them.
     """
-    # Measure how much of the dome's light comes through the portals.
     portal = strength[FIRST_PORTAL:]
     by_portals = float(np.sqrt((portal**2).sum()))
     light = float(brought[DOME])

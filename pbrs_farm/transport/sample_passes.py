@@ -62,7 +62,6 @@ def path_sums(
     goal = max(fields.spp, fields.max_spp) if is_open else fields.spp
     if fields.noise > 0:
         per_launch = min(per_launch, fields.spp)
-    # Launch until samples, budget or noise say that it is enough.
     total, spp = _kept_sums(checkpoint, "path")
     noise = _noise_left(total, spp, view)
     while spp < goal and noise > 1 and (n := budget.n_that_fit(min(per_launch, goal - spp))) > 0:

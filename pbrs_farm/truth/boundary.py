@@ -23,7 +23,6 @@ def instance_boundary(instance: NDArray[Any]) -> NDArray[np.uint8]:
     different ids; in the last row when it differs from its right, in the last column from its
     lower neighbour; the bottom right corner never is.
     """
-    # Compare each pixel with its right and its lower neighbour.
     right = instance[:, :-1] != instance[:, 1:]
     down = instance[:-1, :] != instance[1:, :]
     return np.where(block_edges(right, down), 255, 0).astype(np.uint8)

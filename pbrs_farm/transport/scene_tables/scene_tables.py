@@ -74,7 +74,6 @@ def tables_from_house(
     textures: id -> (H, W, 3 or 4) uint8 sRGB, row 0 at the top. Degenerate faces are left
     out, with a note. Raises BadHouse when no surface is left.
     """
-    # Leave out panes, which would only cost rays, and faces without a plane.
     geometry = geometry_from_house(house, with_panes=False)
     keep = _solid_faces(geometry)
     if not keep.any():
