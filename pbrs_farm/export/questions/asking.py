@@ -76,7 +76,7 @@ class Asker:
             rng = random.Random(keys.seed(clip.name, kind.name))
             drafts = list(kind.drafts(clip, rng))
             for _ in range(min(len(drafts), _OF_A_WALK if clip.is_walk else _OF_A_PICTURE)):
-                draft = self._rarest(kind, drafts)
+                draft = self._take_rarest(kind, drafts)
                 if draft is None:
                     break
                 drafts = [d for d in drafts if set(d.about) != set(draft.about)]
@@ -85,11 +85,12 @@ class Asker:
                     break
         return found
 
-    def _rarest(self, kind: QuestionKind, drafts: Sequence[Draft]) -> Draft | None:
-        """The first draft whose answer has been given least often; then it is counted.
+    def _take_rarest(self, kind: QuestionKind, drafts: Sequence[Draft]) -> Draft | None:
+        """Take the first draft with the rarest answer, and count that answer.
 
-        None where that answer would become the usual one: of a kind with few answers, two more often
-        right than another; of any other kind, two more often than all others together.
+        Returns None, and counts nothing, if that answer would become the usual one: of a kind with few
+        answers, two more often right than another; of any other kind, two more often than all others
+        together.
         """
         count = self._answers[kind.name]
         draft = min(drafts, key=lambda d: count[d.answer])

@@ -89,13 +89,13 @@ def _holes(
 def _continued(
     area: plan.Shape, well: Room, surfaces: Sequence[PlanarSurface], *, is_ceiling: bool
 ) -> list[PlanarSurface]:
+    low, high = well.floor_y - GAP_M, well.ceiling_y + GAP_M
     near = [
         s
         for s in surfaces
         if s.is_ceiling == is_ceiling
         and s.area.distance(area) < _NEIGHBOUR_M
-        and well.floor_y - GAP_M < s.plane.at(shapely.get_coordinates(s.area)).mean()
-        and s.plane.at(shapely.get_coordinates(s.area)).mean() < well.ceiling_y + GAP_M
+        and low < s.plane.at(shapely.get_coordinates(s.area)).mean() < high
     ]
     if not near:
         return []
