@@ -133,7 +133,7 @@ def _end_untaken() -> None:
 def _handled(args: argparse.Namespace) -> int:
     """Run the verb's handler and turn what it raises into an exit code."""
     try:
-        return int(args.handler(args))
+        return int(args.handler(args) or 0)
     except PbrsError as error:
         if args.debug:
             traceback.print_exc()

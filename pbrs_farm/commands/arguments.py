@@ -9,7 +9,8 @@ import argparse
 import json
 import sys
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, cast
@@ -23,9 +24,11 @@ from pbrs_farm.core.shown_text import escaped, printable, shown
 if TYPE_CHECKING:
     from pbrs_farm.core.recipe import Recipe
     from pbrs_farm.run.request import RecipeOptions
+    from pbrs_farm.store.object_store import Store
     from workers.client.farm_client import Farm
 
-Handler = Callable[[argparse.Namespace], int]
+# of a verb: its exit code, or None for 0
+Handler = Callable[[argparse.Namespace], int | None]
 # (name, handler) -> the verb's parser; verbs.csv has its help
 Verb = Callable[[str, Handler], Parser]
 
@@ -211,6 +214,39 @@ def recipe_of(args: argparse.Namespace | RecipeOptions) -> Recipe:
     if args.recipe.endswith(ENDING):
         return recipe_from_toml(Path(args.recipe), overrides)
     return recipe_from_name(args.recipe, overrides)
+
+
+def store_of(url: str) -> Store:
+    """The store of a URL, or of a folder that exists, with the settings of the environment.
+
+    Raises BadInput if there is no such folder.
+    """
+    from pbrs_farm.settings import settings_from_environment
+    from pbrs_farm.store import store_from_url
+
+    if "://" not in url and not Path(url).is_dir():
+        raise BadInput(url, "", "no such folder", hint="the folder of --out, or a store's URL")
+    return store_from_url(url, settings_from_environment().store)
+
+
+@contextmanager
+def folder_of(root: str) -> Iterator[Path]:
+    """The files of an output root as a folder: itself, or those of its store."""
+    from pbrs_farm.run.output_root import as_files
+    from pbrs_farm.settings import settings_from_environment
+
+    with as_files(root, settings_from_environment().store) as folder:
+        yield folder
+
+
+def put_files(folder: Path, files: Mapping[str, bytes]) -> None:
+    """Write files into a folder, each whole or not at all."""
+    from pbrs_farm.store.folder import FolderStore
+
+    store = FolderStore(folder)
+    for name, data in files.items():
+        store.put(name, data)
+    store.tidy()
 
 
 def add_farm(p: argparse.ArgumentParser) -> None:

@@ -86,7 +86,7 @@ def _make(args: argparse.Namespace) -> int:
     return 1 if n_lost else 0
 
 
-def _estimate(args: argparse.Namespace) -> int:
+def _estimate(args: argparse.Namespace) -> None:
     from pbrs_farm.commands.set_file import set_from_word
     from pbrs_farm.sets.estimate_set import bill_text, clouds_of, estimate_set, estimate_text
 
@@ -102,9 +102,8 @@ def _estimate(args: argparse.Namespace) -> int:
             )
         else:
             echo("\n\n".join(f"{cloud}\n{bill_text(bill)}" for cloud, bill in bills.items()))
-        return 0
+        return
     if args.json:
         echo_json(estimate.model_dump(mode="json"))
     else:
         echo(estimate_text(estimate))
-    return 0

@@ -17,6 +17,7 @@ from pbrs_farm.commands.arguments import (
     dress_seeds,
     echo,
     echo_json,
+    put_files,
     recipe_of,
     warn,
 )
@@ -124,7 +125,6 @@ def _dress(args: argparse.Namespace) -> int:
     from pbrs_farm.prepare.source import resolve, variants
     from pbrs_farm.progress import share_bar
     from pbrs_farm.run.attributions import attribution_text
-    from pbrs_farm.store.folder import FolderStore
 
     at_least("--views", args.views, 0)
     need("mitsuba", "drjit", *(["moderngl"] if args.views else []))
@@ -145,8 +145,6 @@ def _dress(args: argparse.Namespace) -> int:
         if report is None:
             raise BadInput(args.home, "", "an object without context is not dressed")
         pictures = _before_after(args, house, recipe, tell) if args.views else {}
-    # Write the dressed and repaired house and what was done to it.
-    store = FolderStore(args.out)
     glb, description = bundle_from_house(house)
     text = attribution_text([house.source.attribution], report.credits)
     files = {
@@ -158,9 +156,7 @@ def _dress(args: argparse.Namespace) -> int:
     }
     files = {name: data for name, data in files.items() if data}
     files |= pictures
-    for name, data in files.items():
-        store.put(name, data)
-    store.tidy()
+    put_files(args.out, files)
     echo(summary_of_dressing(report))
     echo(f"{args.out}: {' '.join(files)}")
     return 0 if report.is_sound else 1
@@ -169,14 +165,14 @@ def _dress(args: argparse.Namespace) -> int:
 def _before_after(
     args: argparse.Namespace, house: House, recipe: Recipe, tell: ShareTeller
 ) -> dict[str, bytes]:
-    """The pictures of the home as it was and as it is, by file name."""
+    """File name -> picture of the home before and after."""
     from pbrs_farm.crash_notes import note_step
     from pbrs_farm.gallery.contact_sheet import before_after_png
     from pbrs_farm.prepare.finished_house import repaired_house
     from pbrs_farm.prepare.source import resolve
     from pbrs_farm.run.view_pairs import pairs
 
-    # The same recipe without dressing gives the home as it was drawn.
+    # the same recipe without dressing
     undressed = recipe.model_copy(update={"dress": type(recipe.dress)()})
     bare, _report = repaired_house(resolve(args.home, models=args.models), undressed)
     note_step(args.home, "before and after")
@@ -202,29 +198,25 @@ def _repair(args: argparse.Namespace) -> int:
     from pbrs_farm.prepare.read_source import read_house
     from pbrs_farm.prepare.source import resolve
     from pbrs_farm.repair import section_svg, summary_of_report
-    from pbrs_farm.store.folder import FolderStore
 
     recipe = recipe_of(args)
     source = resolve(args.home, models=args.models)
     house, report = repaired_house(source, recipe)
-    # Write the repaired house and what was done to it.
-    store = FolderStore(args.out)
     glb, description = bundle_from_house(house)
     files = {"house.glb": glb, "house.json": description, "repair.json": json_bytes(report)}
-    for name, data in files.items():
-        store.put(name, data)
-    # Draw each level's walls before and after.
+    # Each level's walls before and after.
     before = read_house(source, recipe.read)
-    cuts = {f"cut_{level.id}.svg": section_svg(before, house, level.id) for level in house.levels}
-    for name, svg in cuts.items():
-        store.put(name, svg.encode())
-    store.tidy()
+    files |= {
+        f"cut_{level.id}.svg": section_svg(before, house, level.id).encode()
+        for level in house.levels
+    }
+    put_files(args.out, files)
     echo(summary_of_report(report))
-    echo(f"{args.out}: house.glb house.json repair.json {' '.join(cuts)}")
+    echo(f"{args.out}: {' '.join(files)}")
     return 1 if report.is_leaking or report.structure.walls_lost else 0
 
 
-def _cameras(args: argparse.Namespace) -> int:
+def _cameras(args: argparse.Namespace) -> None:
     from pbrs_farm.crash_notes import note_step
     from pbrs_farm.formats.cameras_json import cameras_document
     from pbrs_farm.formats.serialise import json_bytes
@@ -233,7 +225,6 @@ def _cameras(args: argparse.Namespace) -> int:
     from pbrs_farm.raycast.caster import Caster
     from pbrs_farm.run.chosen_cameras import chosen_cameras
     from pbrs_farm.run.steps import camera_seed
-    from pbrs_farm.store.folder import FolderStore
 
     recipe = recipe_of(args)
     house, _report = repaired_house(resolve(args.home, models=args.models), recipe)
@@ -244,29 +235,25 @@ def _cameras(args: argparse.Namespace) -> int:
     sampling = chosen_cameras(house, recipe, seed, caster)
     document = cameras_document(sampling.views, sampling.report.model_dump(mode="json"))
     if args.out is not None:
-        store = FolderStore(args.out.parent)
-        store.put(args.out.name, json_bytes(document))
-        store.tidy()
+        put_files(args.out.parent, {args.out.name: json_bytes(document)})
     if args.map is not None:
         _write_map(args.map, house, sampling)
     if args.json:
         echo_json(document)
     else:
         _echo_report(sampling.report)
-    return 0
 
 
 def _write_map(path: Path, house: House, sampling: Sampling) -> None:
     """Write the floor plan with the candidates as PNG and as SVG."""
     from pbrs_farm.images import png_from_array
     from pbrs_farm.sample.camera_map import camera_map_rgb, camera_map_svg
-    from pbrs_farm.store.folder import FolderStore
 
-    # Take the ending off where it says what is written; other dots are part of the name.
+    # Only these endings are removed; other dots are part of the name.
     name = path.stem if path.suffix.lower() in (".png", ".svg") else path.name
-    folder = FolderStore(path.parent)
-    folder.put(f"{name}.png", png_from_array(camera_map_rgb(house, sampling)))
-    folder.put(f"{name}.svg", camera_map_svg(house, sampling).encode())
+    png = png_from_array(camera_map_rgb(house, sampling))
+    svg = camera_map_svg(house, sampling).encode()
+    put_files(path.parent, {f"{name}.png": png, f"{name}.svg": svg})
 
 
 def _echo_report(report: CameraReport) -> None:

@@ -60,7 +60,7 @@ def _add_make(p: argparse.ArgumentParser) -> None:
     add("--jobs", type=int, default=1, metavar="N", help="processes (default 1)")
 
 
-def _homes(args: argparse.Namespace) -> int:
+def _homes(args: argparse.Namespace) -> None:
     from pbrs_farm.assets import furniture_package, homes_package
 
     if args.fetch:
@@ -70,7 +70,7 @@ def _homes(args: argparse.Namespace) -> int:
     rows = homes_package.example_homes()
     if args.json:
         echo_json([asdict(row) for row in rows])
-        return 0
+        return
     # Listing fetches nothing: the list of homes is part of the program.
     package = homes_package.cached()
     for row in rows:
@@ -83,7 +83,6 @@ def _homes(args: argparse.Namespace) -> int:
     if package and package.note:
         echo(package.note)
     echo("home and models: E. and V. Puybaret / eTeks, CC-BY 3.0")
-    return 0
 
 
 def _make(args: argparse.Namespace) -> int:

@@ -8,7 +8,17 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pbrs_farm.commands.arguments import VIEW, Verb, counted, echo, echo_json, size_of, warn
+from pbrs_farm.commands.arguments import (
+    VIEW,
+    Verb,
+    counted,
+    echo,
+    echo_json,
+    folder_of,
+    put_files,
+    size_of,
+    warn,
+)
 from pbrs_farm.commands.options import add_options, request_from
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.export.form import HomeForm, ViewForm, form_names, form_of
@@ -105,15 +115,13 @@ def _export(args: argparse.Namespace) -> int:
     from pbrs_farm.core.house_split import shares_from_text
     from pbrs_farm.export.export_views import export, remarks_of
     from pbrs_farm.export.view_options import ViewOptions
-    from pbrs_farm.run.output_root import as_files
-    from pbrs_farm.settings import settings_from_environment
 
     choice = choice_of(request_from(args, ViewOptions))
     if form.options is not None:
         choice = replace(choice, options=request_from(args, form.options))
     shares = shares_from_text(args.split) if args.split else None
     out = args.out or Path(f"{Path(args.folder).resolve().name}_{args.to}")
-    with as_files(args.folder, settings_from_environment().store) as folder:
+    with folder_of(args.folder) as folder:
         n_views, n_files = export(
             folder, out, args.to, selection=args.selection, choice=choice, shares=shares
         )
@@ -139,8 +147,6 @@ def choice_of(options: ViewOptions) -> Choice:
 
 def _export_homes(args: argparse.Namespace) -> int:
     from pbrs_farm.export.export_homes import export_homes
-    from pbrs_farm.run.output_root import as_files
-    from pbrs_farm.settings import settings_from_environment
 
     options = {"--selection": args.selection, "--layers": args.layers, "--modes": args.modes}
     options |= {"--size": args.size, "--classes": args.classes, "--split": args.split}
@@ -148,7 +154,7 @@ def _export_homes(args: argparse.Namespace) -> int:
         if value:
             raise BadInput(option, "", f"chooses of views; --to {args.to} writes homes")
     out = args.out or Path(f"{Path(args.folder).resolve().name}_{args.to}")
-    with as_files(args.folder, settings_from_environment().store) as folder:
+    with folder_of(args.folder) as folder:
         n_homes, n_files, remarks = export_homes(folder, out, args.to)
     echo(f"{out}: {counted(n_homes, 'home')}, {n_files} files")
     for remark in remarks:
@@ -156,7 +162,7 @@ def _export_homes(args: argparse.Namespace) -> int:
     return 0
 
 
-def _pack_views(args: argparse.Namespace) -> int:
+def _pack_views(args: argparse.Namespace) -> None:
     from pbrs_farm.core.house_split import shares_from_text
     from pbrs_farm.views.open_views import open_views
     from pbrs_farm.views.packing.pack_options import PackOptions
@@ -174,7 +180,6 @@ def _pack_views(args: argparse.Namespace) -> int:
         warn(f"{counted(len(packed.left_out), 'view')} left out, {at}: {why}")
     said = ", ".join(f"{split} {n}" for split, n in packed.n_views.items())
     echo(f"{args.out}: {said} views, {packed.n_files} files, {packed.n_bytes / 1e6:.1f} MB")
-    return 0
 
 
 def packing_of(
@@ -234,11 +239,10 @@ def _home_classes(args: argparse.Namespace) -> int:
     return 0
 
 
-def _label_sheet(args: argparse.Namespace) -> int:
+def _label_sheet(args: argparse.Namespace) -> None:
     from pbrs_farm.formats.output_folder import views_of
     from pbrs_farm.gallery.label_sheet import label_sheet
     from pbrs_farm.images import png_from_array
-    from pbrs_farm.store.folder import FolderStore
 
     # The root is OUT of OUT/houses/<house>/views/<view>.
     folder = args.view.resolve()
@@ -247,6 +251,5 @@ def _label_sheet(args: argparse.Namespace) -> int:
     if view is None:
         raise BadInput(args.view, "", "no view's folder", hint="OUT/houses/<house>/views/<view>")
     out = args.out or Path(f"{folder.name}_labels.png")
-    FolderStore(out.parent).put(out.name, png_from_array(label_sheet(view)))
+    put_files(out.parent, {out.name: png_from_array(label_sheet(view))})
     echo(str(out))
-    return 0

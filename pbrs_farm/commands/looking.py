@@ -71,14 +71,14 @@ def _verdict(findings: Sequence[Finding], *, is_fine: bool) -> str:
     return "This machine can render."
 
 
-def _inputs(args: argparse.Namespace) -> int:
+def _inputs(args: argparse.Namespace) -> None:
     from pbrs_farm.prepare.formats import formats, formats_of_plugins, missing_library
 
     rows = [*formats(), *formats_of_plugins()]
     shown = ("kind", "title", "files", "brings", "needs", "where", "licence")
     if args.json:
         echo_json([{name: getattr(row, name) for name in shown} for row in rows])
-        return 0
+        return
     for row in rows:
         echo(f"{row.title}: {row.files}")
         echo(f"    brings    {row.brings}")
@@ -88,26 +88,24 @@ def _inputs(args: argparse.Namespace) -> int:
                 f"    needs     {row.needs}{f', not installed here: {command}' if command else ''}"
             )
         echo(f"    from      {row.where}; {row.licence}")
-    return 0
 
 
-def _skies(_args: argparse.Namespace) -> int:
+def _skies(_args: argparse.Namespace) -> None:
     from pbrs_farm.assets.skies import fetch_skies
 
     folder = fetch_skies()
     for path in sorted(folder.glob("*.exr")):
         echo(str(path))
     echo(f"use them with: --set sky.kind=panorama --set sky.panoramas={folder}")
-    return 0
 
 
-def _recipes(args: argparse.Namespace) -> int:
+def _recipes(args: argparse.Namespace) -> None:
     recipe = recipe_from_name(args.name)
     if args.toml:
         from pbrs_farm.formats.recipe_toml import toml_from_recipe
 
         echo(toml_from_recipe(recipe))
-        return 0
+        return
     echo(f"# recipe {args.name}; --set group.field=value overrides any field")
     # Print the recipe as --set takes it, group by group.
     for group, info in Recipe.model_fields.items():
@@ -120,16 +118,13 @@ def _recipes(args: argparse.Namespace) -> int:
         for name, field in type(value).model_fields.items():
             text = f"{group}.{name} = {json.dumps(getattr(value, name))}"
             echo(f"{text:<48} # {field.description}" if field.description else text)
-    return 0
 
 
-def _layers(_args: argparse.Namespace) -> int:
+def _layers(_args: argparse.Namespace) -> None:
     from pbrs_farm.core.layers import layer_table, text_table
 
     echo(text_table(shutil.get_terminal_size().columns) if sys.stdout.isatty() else layer_table())
-    return 0
 
 
-def _completion(args: argparse.Namespace) -> int:
+def _completion(args: argparse.Namespace) -> None:
     echo(completion_script(args.shell, args.every_verb().verbs()))
-    return 0

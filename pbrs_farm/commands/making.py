@@ -21,6 +21,7 @@ from pbrs_farm.commands.arguments import (
     echo_notes,
     home_arguments,
     recipe_of,
+    store_of,
     warn,
 )
 from pbrs_farm.commands.options import add_options, group_of, request_from
@@ -332,19 +333,17 @@ def _demo_dressing(args: argparse.Namespace) -> str | None:
     return args.dress or "1"
 
 
-def _step(args: argparse.Namespace) -> int:
+def _step(args: argparse.Namespace) -> None:
     from pbrs_farm.prepare.source import resolve, variants
     from pbrs_farm.run.house_cache import HouseCache
     from pbrs_farm.run.plan import STEPS, needed_of_house
     from pbrs_farm.run.step_cache import Work
     from pbrs_farm.run.steps import run_step
-    from pbrs_farm.settings import settings_from_environment
-    from pbrs_farm.store import store_from_url
 
-    # The recipe is the stored one, so that the step does what the run did.
+    # The stored recipe makes the step as the run did.
     if args.step not in STEPS:
         raise BadInput("step", args.step, "no such step", hint=hint_of_choice(args.step, STEPS))
-    store = store_from_url(args.out, settings_from_environment().store)
+    store = store_of(args.out)
     recipe = recipe_from_json(store.get("recipe.json"), f"{store.url}: recipe.json")
     (source,) = variants(resolve(args.home, models=args.models), [args.dress or recipe.dress.seed])
     # One process, one house: the cache keeps it for all steps.
@@ -365,7 +364,6 @@ def _step(args: argparse.Namespace) -> int:
     echo(f"{args.step}: {verdict}")
     for file in outcome.marker.files:
         echo(f"  {file.key}  {file.n_bytes} bytes")
-    return 0
 
 
 def _objects(args: argparse.Namespace) -> int:

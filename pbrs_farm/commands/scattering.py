@@ -63,7 +63,7 @@ def add_verbs(verb: Verb) -> None:
     add_options(p, SeededRecipeOptions)
 
 
-def _scatter(args: argparse.Namespace) -> int:
+def _scatter(args: argparse.Namespace) -> None:
     from pbrs_farm.formats.bop_camera import camera_of_bop
     from pbrs_farm.progress import counting_bar
     from pbrs_farm.scene.models import models
@@ -130,7 +130,6 @@ def _scatter(args: argparse.Namespace) -> int:
     total = counted(n_made + n_kept, "view")
     echo(f"{args.out}: {total}, {n_kept} already there; `pbrs-farm export {args.out} --to bop`")
     echo_notes(notes, args.out)
-    return 0
 
 
 def _homes_of(words: Sequence[str], recipe: Recipe, seeds: Sequence[int]) -> Iterator[Home]:

@@ -6,7 +6,16 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pbrs_farm.commands.arguments import Verb, add_set, echo, echo_json, fields_set
+from pbrs_farm.commands.arguments import (
+    Verb,
+    add_set,
+    echo,
+    echo_json,
+    fields_set,
+    folder_of,
+    put_files,
+    store_of,
+)
 from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.recipe import (
@@ -53,7 +62,7 @@ def add_verbs(verb: Verb) -> None:
 
 
 def _add_photographs(p: argparse.ArgumentParser) -> None:
-    """How photographs are read."""
+    """Add the options for reading photographs."""
     add = p.add_argument
     add("--depth-scale", type=float, help="depth units per metre (default by file kind)")
     add("--sun-rgbd", action="store_true", help="undo SUN RGB-D's rotation of depth bits")
@@ -75,35 +84,26 @@ def _built(
     return build_reference(source, histogram, selection, options)
 
 
-def _reference(args: argparse.Namespace) -> int:
+def _reference(args: argparse.Namespace) -> None:
     from pbrs_farm.selection.binning import table_text
     from pbrs_farm.selection.reference_set import bytes_from_reference
-    from pbrs_farm.store.folder import FolderStore
 
     recipe = recipe_from_name("fast", _overrides(args.set))
     reference = _built(args, args.source, recipe.histogram, recipe.selection)
-    # Through a store, so that the file appears whole or not at all.
-    store = FolderStore(args.out.parent)
-    store.put(args.out.name, bytes_from_reference(reference))
-    store.tidy()
+    put_files(args.out.parent, {args.out.name: bytes_from_reference(reference)})
     echo(table_text(reference.facts.table, reference.facts.binning))
     echo(f"{args.out}: {len(reference.facts.ids)} photographs")
-    return 0
 
 
 def _select(args: argparse.Namespace) -> int:
     from pbrs_farm.curate.reference_build import read_reference
     from pbrs_farm.curate.selection_run import select
-    from pbrs_farm.settings import settings_from_environment
-    from pbrs_farm.store import store_from_url
 
-    if "://" not in args.folder and not Path(args.folder).is_dir():
-        raise BadInput(args.folder, "", "no such folder")
+    store = store_of(args.folder)
     if (args.reference is None) == (args.by is None):
         raise BadInput("select", "", "give --reference or --by, one of them")
     if args.by is not None:
         return _select_by(args)
-    store = store_from_url(args.folder, settings_from_environment().store)
     recipe = recipe_from_json(store.get("recipe.json"), f"{store.url}: recipe.json")
     fields = _fields(recipe, args)
     # Read the reference, or build it from photographs as the views' recipe says.
@@ -130,18 +130,14 @@ def _select_by(args: argparse.Namespace) -> int:
     """Judge every view, or those that a run keeps, by rules, and write selection/<run>.jsonl."""
     from pbrs_farm.curate.teaching_rules import judged_by, write_verdicts
     from pbrs_farm.export.export_views import finished_entries
-    from pbrs_farm.run.output_root import as_files
-    from pbrs_farm.settings import settings_from_environment
-    from pbrs_farm.store import store_from_url
 
-    settings = settings_from_environment().store
-    with as_files(args.folder, settings) as folder:
-        found = judged_by(finished_entries(folder, args.selection), args.by)
-    summary = write_verdicts(store_from_url(args.folder, settings), args.run, args.by, found)
+    with folder_of(args.folder) as folder:
+        verdicts = judged_by(finished_entries(folder, args.selection), args.by)
+    summary = write_verdicts(store_of(args.folder), args.run, args.by, verdicts)
     if args.json:
         echo_json(summary)
         return 0
-    echo(f"{summary['kept']} of {len(found)} views kept")
+    echo(f"{summary['kept']} of {len(verdicts)} views kept")
     for reason, n in summary["reasons"].items():
         echo(f"  {n:>6}  {reason}")
     echo(keys.selection_key(args.run, "jsonl"))
@@ -149,7 +145,7 @@ def _select_by(args: argparse.Namespace) -> int:
 
 
 def _photograph_files(folder: Path) -> dict[str, Path]:
-    """Id -> picture of the photographs of a folder; none where it is a file."""
+    """Id -> picture of the photographs in a folder; {} for a file."""
     from pbrs_farm.curate.photographs import pairs_in
 
     return {pair.id: pair.rgb for pair in pairs_in(folder)} if folder.is_dir() else {}

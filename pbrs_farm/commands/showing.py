@@ -9,7 +9,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pbrs_farm.commands.arguments import Verb, echo, warn
+from pbrs_farm.commands.arguments import Verb, echo, store_of, warn
 from pbrs_farm.core.errors import BadInput, MachineFailed
 from pbrs_farm.installation import install_command
 from pbrs_farm.store.secret import Secret
@@ -40,7 +40,7 @@ def add_verbs(verb: Verb) -> None:
     add("--currency", default="EUR", help="of --price (default EUR)")
 
 
-def _board(args: argparse.Namespace) -> int:
+def _board(args: argparse.Namespace) -> None:
     missing = [name for name in ("starlette", "uvicorn") if find_spec(name) is None]
     if missing:
         raise MachineFailed(f"board needs {' and '.join(missing)}", hint=install_command("board"))
@@ -48,17 +48,14 @@ def _board(args: argparse.Namespace) -> int:
     from pbrs_farm.board.options import BoardOptions
     from pbrs_farm.board.serve import bound_socket, default_cache, server_of
     from pbrs_farm.board.sessions import new_token
-    from pbrs_farm.settings import settings_from_environment
-    from pbrs_farm.store import store_from_url
 
-    # Refuse what cannot be shown before a port is taken.
+    # Refuse a wrong root before a port is taken.
     root = args.root or os.environ.get("PBRS_STORE", "")
     if not root:
         raise BadInput("board", "", "nothing to show", hint="pbrs-farm board OUT, or PBRS_STORE")
-    if "://" not in root and not Path(root).is_dir():
-        raise BadInput(root, "", "no such folder", hint="the folder of --out, or a store's URL")
+    store = store_of(root)
     token = _token(args.token_file) if args.token_file else new_token()
-    # Bind first: only then is the port known that 0 stands for, and the address holds it.
+    # Bind first: only then is the port known if it was given as 0.
     listening = bound_socket(args.host, args.port)
     options = BoardOptions(
         cache=args.cache or default_cache(),
@@ -70,15 +67,13 @@ def _board(args: argparse.Namespace) -> int:
         price_per_slot_hour=args.price,
         currency=args.currency,
     )
-    store = store_from_url(root, settings_from_environment().store)
     board = new_board(store, options, _farm(store.url))
     _say(options, token, is_own_token=args.token_file is None)
     server_of(board).run(sockets=[listening])
-    return 0
 
 
 def _farm(store_url: str) -> LiveFarm | None:
-    """The farm that the environment names, None where it names none."""
+    """The farm that the environment names, if any."""
     if not (os.environ.get("PBRS_REDIS_URL") or os.environ.get("PBRS_REDIS_URL_FILE")):
         return None
     if find_spec("redis") is None:
@@ -100,7 +95,7 @@ def _say(options: BoardOptions, token: Secret, *, is_own_token: bool) -> None:
 
 
 def _token(path: Path) -> Secret:
-    """The token in a file; BadInput where it cannot be read or is too short to keep anybody out."""
+    """The token in a file; BadInput if it cannot be read or is too short."""
     from pbrs_farm.regular_files import fault_of, read_regular, text_from_bytes
 
     try:

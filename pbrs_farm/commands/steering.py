@@ -53,14 +53,22 @@ def add_verbs(verb: Verb) -> None:
     text = "again every two seconds, to the end (--json: a line each)"
     p.add_argument("--watch", action="store_true", help=text)
     farm_verb("jobs", _jobs)
-    p = farm_verb("why", _why)
+    p = farm_verb(
+        "why",
+        _printer(lambda farm, args: farm.explain(_job_of(farm, args), args.task), explanation_text),
+    )
     p.add_argument("task", help="HOUSE, HOUSE/VIEW or HOUSE/UNIT/STAGE")
     _add_job(p, flag=True)
     p = farm_verb("logs", _logs)
     p.add_argument("task", help="HOUSE/UNIT/STAGE")
     p.add_argument("--attempt", type=int, metavar="N", help="which one (default the last)")
     _add_job(p, flag=True)
-    _add_job(farm_verb("failures", _failures))
+    _add_job(
+        farm_verb(
+            "failures",
+            _printer(lambda farm, args: farm.failures(_job_of(farm, args)), failures_text),
+        )
+    )
     p = farm_verb("retry", _retry)
     p.add_argument("tasks", nargs="*", metavar="TASK", help="HOUSE/UNIT/STAGE (default all)")
     _add_job(p, flag=True)
@@ -90,7 +98,7 @@ def add_verbs(verb: Verb) -> None:
     p = farm_verb("drain", _drain)
     p.add_argument("worker", help="its name, as `workers` lists it")
     p.add_argument("--undo", action="store_true", help="let it take work again")
-    farm_verb("workers", _workers)
+    farm_verb("workers", _printer(lambda farm, _args: farm.workers(), workers_text))
     _add_users(farm_verb)
     p = farm_verb("recover", _recover)
     p.set_defaults(what="recover")
@@ -122,11 +130,10 @@ def _add_users(farm_verb: Callable[[str, Handler], argparse.ArgumentParser]) -> 
     yes_no = ("yes", "no")
     p.add_argument("--admin", choices=yes_no, help="may steer every job, workers and users")
     p.add_argument("--may-preempt", choices=yes_no, help="may submit urgent jobs (--preempt)")
-    p = farm_verb("audit", _audit)
+    p = farm_verb("audit", _printer(lambda farm, args: farm.users.changes(args.last), changes_text))
     p.add_argument("--last", type=int, default=20, metavar="N", help="lines (default 20)")
 
 
-# Verbs that change a job's state -> what they do.
 def _add_job(p: argparse.ArgumentParser, *, flag: bool = False) -> None:
     text = "job id (default: the newest)"
     if flag:  # of a verb whose positional arguments name tasks
@@ -135,13 +142,29 @@ def _add_job(p: argparse.ArgumentParser, *, flag: bool = False) -> None:
         p.add_argument("job", nargs="?", default="", help=text)
 
 
+def _job_of(farm: Farm, args: argparse.Namespace) -> str:
+    return args.job or farm.newest_job()
+
+
 def _farm_and_job(args: argparse.Namespace) -> tuple[Farm, str]:
     farm = farm_of(args)
-    return farm, args.job or farm.newest_job()
+    return farm, _job_of(farm, args)
+
+
+def _printer(
+    rows_of: Callable[[Farm, argparse.Namespace], Any], text_of: Callable[[Any], str]
+) -> Handler:
+    """The handler of a verb that prints rows of the farm."""
+
+    def handler(args: argparse.Namespace) -> None:
+        rows = rows_of(farm_of(args), args)
+        _show(args, rows, lambda: text_of(rows))
+
+    return handler
 
 
 def _show(args: argparse.Namespace, value: Any, text: Callable[[], str]) -> None:
-    """value as JSON when asked, else the text for people; at once, for who watches a pipe."""
+    """Print a value as JSON or as text for people, and flush for readers of a pipe."""
     if args.json:
         echo_json(value)
     else:
@@ -172,77 +195,56 @@ def _status(args: argparse.Namespace) -> int:
         time.sleep(2.0)
 
 
-def _jobs(args: argparse.Namespace) -> int:
+def _jobs(args: argparse.Namespace) -> None:
     from workers.client.job_rows import job_rows
 
     rows = job_rows(farm_of(args))
     _show(args, rows, lambda: jobs_text(rows))
-    return 0
 
 
-def _why(args: argparse.Namespace) -> int:
-    farm, job = _farm_and_job(args)
-    rows = farm.explain(job, args.task)
-    _show(args, rows, lambda: explanation_text(rows))
-    return 0
-
-
-def _logs(args: argparse.Namespace) -> int:
+def _logs(args: argparse.Namespace) -> None:
     farm, job = _farm_and_job(args)
     text = farm.logs(job, args.task, args.attempt)
     _show(args, {"task": args.task, "log": text}, lambda: text)
-    return 0
 
 
-def _failures(args: argparse.Namespace) -> int:
-    farm, job = _farm_and_job(args)
-    kinds = farm.failures(job)
-    _show(args, kinds, lambda: failures_text(kinds))
-    return 0
-
-
-def _retry(args: argparse.Namespace) -> int:
+def _retry(args: argparse.Namespace) -> None:
     farm, job = _farm_and_job(args)
     tasks = farm.retry(job, args.tasks)
     _show(args, tasks, lambda: f"{len(tasks)} tasks get fresh attempts")
-    return 0
 
 
-def _rerun(args: argparse.Namespace) -> int:
+def _rerun(args: argparse.Namespace) -> None:
     from workers.client.rerun import rerun
 
     farm, job = _farm_and_job(args)
     result = rerun(farm, job, args.task, lambda step: warn(f"rerun: {step}"))
     done = {"task": args.task, "views": result.n_views}
     _show(args, done, lambda: f"{args.task} done; `pbrs-farm retry {args.task}` tells the job")
-    return 0
 
 
-def _steer(args: argparse.Namespace) -> int:
+def _steer(args: argparse.Namespace) -> None:
     farm, job = _farm_and_job(args)
     # Each of these verbs is a method of the farm.
     state: str = getattr(farm, args.what)(job)
     _show(args, {"job": job, "state": state}, lambda: f"{job} {state}")
-    return 0
 
 
-def _priority(args: argparse.Namespace) -> int:
+def _priority(args: argparse.Namespace) -> None:
     farm, job = _farm_and_job(args)
     state = farm.set_priority(job, args.number)
     answer = {"job": job, "state": state, "priority": args.number}
     _show(args, answer, lambda: f"{job} {state}, priority {args.number}")
-    return 0
 
 
-def _limit(args: argparse.Namespace) -> int:
+def _limit(args: argparse.Namespace) -> None:
     farm, job = _farm_and_job(args)
     state = farm.limit(job, max_slots=args.max_slots, budget_h=args.budget)
     again = f"; `pbrs-farm resume {job}` goes on" if state == "paused" else ""
     _show(args, {"job": job, "state": state}, lambda: f"{job} {state}{again}")
-    return 0
 
 
-def _gc(args: argparse.Namespace) -> int:
+def _gc(args: argparse.Namespace) -> None:
     from workers.client.garbage import garbage, keep_from_text, remove
 
     farm, keep_s = farm_of(args), keep_from_text(args.keep)
@@ -262,26 +264,18 @@ def _gc(args: argparse.Namespace) -> int:
         return "\n".join([*lines, message])
 
     _show(args, {"found": rows, "removed": n}, text)
-    return 0
 
 
-def _drain(args: argparse.Namespace) -> int:
+def _drain(args: argparse.Namespace) -> None:
     farm_of(args).drain(args.worker, undo=args.undo)
     _show(
         args,
         {"worker": args.worker, "drain": not args.undo},
         lambda: f"{args.worker} is asked to {'stay' if args.undo else 'leave'}",
     )
-    return 0
 
 
-def _workers(args: argparse.Namespace) -> int:
-    rows = farm_of(args).workers()
-    _show(args, rows, lambda: workers_text(rows))
-    return 0
-
-
-def _users(args: argparse.Namespace) -> int:
+def _users(args: argparse.Namespace) -> None:
     from workers.client.users import add_user, change_user, limits_of, remove_user, user_rows
 
     farm = farm_of(args)
@@ -295,7 +289,7 @@ def _users(args: argparse.Namespace) -> int:
     if args.what == "list" and not args.name and not limits:
         rows = user_rows(farm)
         _show(args, rows, lambda: users_text(rows))
-        return 0
+        return
     if args.what == "list" or not args.name:
         raise BadInput("users", args.what, "expected a name", hint="users add|limit|remove NAME")
     answer: dict[str, Any] = {"user": args.name, "what": args.what}
@@ -309,16 +303,9 @@ def _users(args: argparse.Namespace) -> int:
         remove_user(farm, args.name)
         message = f"{args.name} removed"
     _show(args, answer, lambda: message)
-    return 0
 
 
-def _audit(args: argparse.Namespace) -> int:
-    rows = farm_of(args).users.changes(args.last)
-    _show(args, rows, lambda: changes_text(rows))
-    return 0
-
-
-def _recover(args: argparse.Namespace) -> int:
+def _recover(args: argparse.Namespace) -> None:
     farm = farm_of(args)
 
     def progress(line: str) -> None:
@@ -327,7 +314,6 @@ def _recover(args: argparse.Namespace) -> int:
     getattr(farm, args.what)(args.job, progress)
     status = farm.status(args.job)
     _show(args, status, lambda: status_text(status))
-    return 0
 
 
 def _coordinator(_args: argparse.Namespace) -> int:

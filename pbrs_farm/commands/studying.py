@@ -161,7 +161,7 @@ def _need_torch() -> None:
         raise MachineFailed("the study needs torch", hint=install_command("study"))
 
 
-def _train(args: argparse.Namespace) -> int:
+def _train(args: argparse.Namespace) -> None:
     _need_torch()
     from pbrs_farm.study.judging.judged_places import judge_of_places, open_judged_places
     from pbrs_farm.study.judging.packed_weights import shipped_run
@@ -237,7 +237,6 @@ def _train(args: argparse.Namespace) -> int:
         _print_run(args.out)
         if args.export:
             _EXPORTS[args.export](args.out)
-    return 0
 
 
 def _stop_on(name: str, places: list[str], plan: TrainingPlan) -> str:
@@ -278,7 +277,7 @@ def _print_run(out: Path) -> None:
     echo("\n".join([figures_table(run, []), "", *notes(run, []), str(out)]))
 
 
-def _evaluate(args: argparse.Namespace) -> int:
+def _evaluate(args: argparse.Namespace) -> None:
     _need_torch()
     from pbrs_farm.study.judging.evaluation import evaluate, evaluation_text, open_run, report
     from pbrs_farm.study.judging.judged_places import open_judged_places
@@ -321,7 +320,6 @@ def _evaluate(args: argparse.Namespace) -> int:
         page = write_evaluation(out, run, evaluations)
         if not args.json:
             echo(str(page))
-    return 0
 
 
 def _judged_run(args: argparse.Namespace) -> Path:
@@ -388,7 +386,7 @@ def _predict(args: argparse.Namespace) -> int:
     return int(n_failed > 0)
 
 
-def _ablation(args: argparse.Namespace) -> int:
+def _ablation(args: argparse.Namespace) -> None:
     _need_torch()
     from pbrs_farm.study.judging.ablation import (
         Comparison,
@@ -425,10 +423,9 @@ def _ablation(args: argparse.Namespace) -> int:
     (args.out / "table.md").write_text(text, "utf-8")
     (args.out / "ablation.json").write_text(json.dumps(result, indent=1) + "\n", "utf-8")
     echo(f"\n{text}\n{args.out / 'table.md'}")
-    return 0
 
 
-def _compare(args: argparse.Namespace) -> int:
+def _compare(args: argparse.Namespace) -> None:
     _need_torch()
     from pbrs_farm.study.comparing.compare_page import write_comparison
     from pbrs_farm.study.comparing.compared_pictures import (
@@ -452,7 +449,7 @@ def _compare(args: argparse.Namespace) -> int:
     path = write_comparison(args.out, comparison)
     if args.json:
         echo_json(comparison.report)
-        return 0
+        return
     appearance, histograms = comparison.report["appearance"], comparison.report["histograms"]
     value, low, high = (appearance["kernel_distance"][key] for key in ("value", "low", "high"))
     sizes = (
@@ -466,4 +463,3 @@ def _compare(args: argparse.Namespace) -> int:
         halves = "" if row["halves"] is None else f"; halves of the photographs {row['halves']:.3f}"
         echo(f"{row['title']}: {value:.3f} [{low:.3f}, {high:.3f}] shared{halves}")
     echo(str(path))
-    return 0

@@ -8,7 +8,17 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pbrs_farm.commands.arguments import VIEW, Verb, at_least, echo, echo_json, warn
+from pbrs_farm.commands.arguments import (
+    VIEW,
+    Verb,
+    at_least,
+    echo,
+    echo_json,
+    folder_of,
+    put_files,
+    store_of,
+    warn,
+)
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.shown_text import shown
 
@@ -54,69 +64,55 @@ def add_verbs(verb: Verb) -> None:
     p.add_argument("--out", type=Path, required=True, help="the folder")
 
 
-def _pull(args: argparse.Namespace) -> int:
+def _pull(args: argparse.Namespace) -> None:
     from pbrs_farm.progress import counting_bar
     from pbrs_farm.run.output_root import pull
-    from pbrs_farm.settings import settings_from_environment
-    from pbrs_farm.store import store_from_url
 
-    if "://" not in args.root and not Path(args.root).is_dir():
-        raise BadInput(
-            args.root, "", "no such folder", hint="the folder of --out, or a store's URL"
-        )
-    store = store_from_url(args.root, settings_from_environment().store)
+    store = store_of(args.root)
     with counting_bar("files") as tell:
         n_copied, n_there = pull(store, args.out, tell)
     echo(f"{args.out}: {n_copied} files copied, {n_there} were there")
-    return 0
 
 
-def _sheet(args: argparse.Namespace) -> int:
+def _sheet(args: argparse.Namespace) -> None:
     write_sheets(args.folder, args.views)
     if args.video:
         _write_films(args.folder)
-    return 0
 
 
 def _write_films(folder: Path) -> None:
-    """Write the films of every sequence in an output folder and say where they are."""
+    """Write the films of every sequence in an output folder and print their paths."""
     from pbrs_farm.formats.output_folder import views_of
     from pbrs_farm.gallery.walk_video import films_of, sequences_of
-    from pbrs_farm.store.folder import FolderStore
 
     sequences = sequences_of(views_of(folder))
     if not sequences:
         hint = "pbrs-farm run HOME --cameras walk"
         raise BadInput(folder, "", "no view is a frame of a sequence", hint=hint)
-    store = FolderStore(folder)
     for house, frames in sequences.items():
-        for what, data in films_of(frames).items():
-            name = f"{house}.mp4" if what == "picture" else f"{house}_{what}.mp4"
-            store.put(name, data)
+        for kind, data in films_of(frames).items():
+            name = f"{house}.mp4" if kind == "picture" else f"{house}_{kind}.mp4"
+            put_files(folder, {name: data})
             echo(str(folder / name))
 
 
 def write_sheets(folder: Path, max_views: int, parts: SheetParts | None = None) -> None:
-    """Write sheet.png and index.html into an output folder and say where they are.
+    """Write sheet.png and index.html into an output folder and print their paths.
 
-    parts: what was made of them while the views were.
+    parts: tiles and cards that were made while the views were.
     """
     from pbrs_farm.gallery.contact_sheet import contact_sheet
     from pbrs_farm.gallery.gallery_page import gallery_pages
-    from pbrs_farm.store.folder import FolderStore
 
-    store = FolderStore(folder)
     tiles, cards = (parts.tiles(), parts.cards()) if parts else (None, None)
-    store.put("sheet.png", contact_sheet(folder, max_views=max_views, made=tiles))
-    names = []
-    for name, html in gallery_pages(folder, cards):
-        store.put(name, html.encode())
-        names.append(name)
-    # Pages of an earlier, larger gallery would show views that are gone.
+    put_files(folder, {"sheet.png": contact_sheet(folder, max_views=max_views, made=tiles)})
+    pages = {name: html.encode() for name, html in gallery_pages(folder, cards)}
+    put_files(folder, pages)
+    # Remove the pages of an earlier, larger gallery.
     for stale in folder.glob("index-*.html"):
-        if stale.name not in names and stale.stem.removeprefix("index-").isdigit():
+        if stale.name not in pages and stale.stem.removeprefix("index-").isdigit():
             stale.unlink()
-    more = f" ({len(names)} pages)" if len(names) > 1 else ""
+    more = f" ({len(pages)} pages)" if len(pages) > 1 else ""
     echo(f"{folder / 'sheet.png'}\n{folder / 'index.html'}{more}")
 
 
@@ -131,13 +127,10 @@ def _verify(args: argparse.Namespace) -> int:
 def _verify_folder(args: argparse.Namespace) -> int:
     from pbrs_farm.check import verify
     from pbrs_farm.progress import counting_bar
-    from pbrs_farm.run.output_root import as_files
-    from pbrs_farm.settings import settings_from_environment
 
     if args.sample is not None:
         at_least("--sample", args.sample, 1)
-    settings = settings_from_environment().store
-    with as_files(args.folder, settings) as folder, counting_bar("views") as tell:
+    with folder_of(args.folder) as folder, counting_bar("views") as tell:
         certificate = verify(folder, sample=args.sample, all_pixels=args.all, tell=tell)
     if args.json:
         echo_json(certificate.model_dump(mode="json"))
@@ -192,7 +185,6 @@ def _relight(args: argparse.Namespace) -> int:
 
 def _relight_view(args: argparse.Namespace, view: Path) -> int:
     from pbrs_farm.run.relight import relit, unlit_lamps
-    from pbrs_farm.store.folder import FolderStore
 
     # Factors scale radiance: none may be negative.
     expected = "expected F or R,G,B, numbers that are finite and not negative"
@@ -202,8 +194,8 @@ def _relight_view(args: argparse.Namespace, view: Path) -> int:
     lamps = [_lamp_factor(argument) for argument in args.lamp]
     denoise = not args.no_denoise
     png = relit(view, indoor=indoor, outdoor=outdoor, denoise=denoise, lamps=lamps)
-    FolderStore(out.parent).put(out.name, png)
-    # A factor of a lamp that the view does not see changes nothing: say so.
+    put_files(out.parent, {out.name: png})
+    # A factor has no effect on lamps that the view does not see.
     for row in unlit_lamps(view, lamps) if lamps else ():
         warn(f"lamp {row['number']} ({row['item']}) brings no light to this view")
     echo(str(out))

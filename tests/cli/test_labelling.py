@@ -22,7 +22,7 @@ def run(*words: str) -> int:
     labelling.add_verbs(verb)
     name, *rest = words
     args = verbs.choices[name].parse_args(rest)
-    return int(args.handler(args))
+    return int(args.handler(args) or 0)
 
 
 @pytest.fixture(scope="module")
