@@ -145,7 +145,7 @@ def test_a_wrong_item_on_a_surface_of_its_own_still_fails(root):
     assert verify(root, all_pixels=True).coincident == ()
 
 
-@pytest.mark.quick(1)
+@pytest.mark.long
 @pytest.mark.parametrize(("by_m", "coincide"), [(0.0, True), (5e-4, False)])
 def test_parts_of_one_thing_in_one_plane_and_two_colours_are_told(tmp_path, by_m, coincide):
     home = builtin_home()

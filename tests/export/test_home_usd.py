@@ -39,7 +39,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     return {form: folder / f"{home.house.id}.{form}" for form in ("usdc", "usdz")}
 
 
-@pytest.mark.quick(1)
+@pytest.mark.long
 @pytest.mark.parametrize("form", ["usdc", "usdz"])
 def test_a_written_home_is_read_back_equal(written: dict[str, Path], form: str) -> None:
     got = read_house(resolve(str(written[form])), ReadFields())

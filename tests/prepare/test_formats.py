@@ -103,7 +103,7 @@ def test_a_file_travels_to_a_farm_or_is_left_in_place(tmp_path: Path, title: str
         assert store.get(placed.location) == path.read_bytes()
 
 
-@pytest.mark.quick(6)
+@pytest.mark.quick(3)
 @each_format
 def test_run_and_a_worker_of_a_farm_make_the_house_of_a_file(
     tmp_path: Path, title: str, monkeypatch: pytest.MonkeyPatch

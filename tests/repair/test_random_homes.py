@@ -18,7 +18,7 @@ from tests.repair.shells import unpaired_edges
 RECIPE = recipe_from_name("preview")
 
 
-@pytest.mark.quick(12)
+@pytest.mark.quick(8)
 @pytest.mark.parametrize("seed", range(60))
 def test_a_strangers_home_is_repaired_without_losing_a_wall(seed: int, tmp_path: Path) -> None:
     name, data = random_home(seed)

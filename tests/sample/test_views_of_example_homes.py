@@ -29,7 +29,7 @@ def repaired(name: str) -> House:
     )[0]
 
 
-@pytest.mark.quick(1)
+@pytest.mark.long
 @pytest.mark.parametrize(
     "name",
     [

@@ -83,6 +83,7 @@ def test_what_is_saved_twice_has_the_files_of_both(home: pf.Home, tmp_path: Path
     assert verify(tmp_path).is_clean
 
 
+@pytest.mark.long
 def test_frames_of_cameras_of_ones_own_share_a_folder(home: pf.Home, tmp_path: Path) -> None:
     for x in (2.0, 3.0):
         camera = pf.Camera.look_at((x, 1.5, 3.5), (2, 0.8, 1), size=(64, 48))

@@ -169,6 +169,7 @@ def test_a_denoiser_that_does_not_load_is_told_in_one_line(
     assert wheels.picture_or_fault(tmp_path) == str(fault.value)
 
 
+@pytest.mark.long
 def test_the_cut_denoiser_makes_the_same_bits_and_refuses_what_was_cut(
     wheels: ModuleType, tmp_path: Path
 ) -> None:

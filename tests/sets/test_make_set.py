@@ -98,6 +98,7 @@ def test_a_file_that_is_gone_is_made_again(file: Path, made: Path, tmp_path: Pat
     assert digests(out) == digests(made)
 
 
+@pytest.mark.long
 def test_killed_three_times_it_has_the_bytes_of_a_run_that_was_not(
     file: Path, made: Path, tmp_path: Path
 ) -> None:
@@ -120,6 +121,7 @@ def test_killed_three_times_it_has_the_bytes_of_a_run_that_was_not(
     assert digests(out) == digests(made)
 
 
+@pytest.mark.long
 def test_two_shards_are_the_whole(file: Path, made: Path, tmp_path: Path) -> None:
     """Rendered in folders of their own, with other numbers of processes, copied into one."""
     out = tmp_path / "small"
@@ -167,6 +169,7 @@ def test_a_view_that_is_none_of_the_set_s_is_named(
     assert f"{house.name}/9_9_9: is none of the set's views" in capsys.readouterr().err
 
 
+@pytest.mark.long
 def test_a_home_that_fails_leaves_the_set_unwritten(
     file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

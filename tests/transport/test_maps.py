@@ -141,7 +141,7 @@ def mapped_room(**changes: object) -> tuple[House, Camera]:
 MAPS = {"n": waves(0.35), "r": np.tile(np.linspace(60, 255, 32).astype(np.uint8)[:, None, None], (1, 32, 3))}  # fmt: skip
 
 
-@pytest.mark.quick(1)
+@pytest.mark.long
 @pytest.mark.parametrize("group", list(Group))
 def test_bumpy_matte_walls_agree_with_mitsubas_normalmap(group: Group) -> None:
     # Significance: 16 blocks, |z| < 4.5 each is missed by chance once in 9000 runs. Two segments:

@@ -106,6 +106,7 @@ def test_a_home_that_has_a_radiator_gets_none() -> None:
     assert not wants_radiators(MutableHouse(house.with_items((*house.items, drawn)), 3))
 
 
+@pytest.mark.long
 def test_coats_hang_free_of_the_floor() -> None:
     coats = [i for mutable in _houses() for i in _named(mutable, "Coat rack")]
     assert coats

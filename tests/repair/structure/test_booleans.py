@@ -53,6 +53,7 @@ def test_a_flat_fan_is_no_solid_and_never_reaches_the_library(
     assert solid_from_patches([_fan(n, seed)], TagTable()) is None
 
 
+@pytest.mark.quick(2)
 @pytest.mark.parametrize("seed", SEEDS_THAT_KILLED)
 def test_a_room_of_seven_corners_under_flat_sheets_is_repaired(
     seed: int, no_open_mesh: None

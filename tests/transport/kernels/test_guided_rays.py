@@ -79,6 +79,7 @@ def test_an_unguided_view_is_as_one_without_guiding(monkeypatch: pytest.MonkeyPa
     )
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize(
     ("room", "pays"), [(hard_rooms.open_shade, True), (lambda: rooms.window_room(lumen=800), False)]
 )

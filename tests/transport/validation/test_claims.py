@@ -65,6 +65,7 @@ FAULTS = [
 ]
 
 
+@pytest.mark.quick(4)
 @needs_kernels
 @pytest.mark.parametrize(("prove", "fault"), FAULTS)
 def test_a_claim_holds_and_fails_on_a_renderer_that_is_wrong(
