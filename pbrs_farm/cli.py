@@ -30,7 +30,7 @@ MODULES: Final = {
 }
 _OF_THE_FARM: Final = ("submitting", "steering")  # modules that need celery and redis
 # Modules whose verbs read files of others: the command runs them in a process that may die.
-_OF_STRANGERS: Final = (
+OF_STRANGERS: Final = (
     "making",
     "data_sets",
     "scattering",
@@ -48,7 +48,7 @@ def command() -> int:
     A library that dies over a stranger's file ends the child alone: the parent says so in a line.
     """
     words = _verb_first(sys.argv[1:])
-    if _module_of(words) not in _OF_STRANGERS:
+    if _module_of(words) not in OF_STRANGERS:
         return main(words)
     from pbrs_farm.run.processes.verb_process import run_watched
 
@@ -77,7 +77,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return command()
     words = _verb_first(argv)
     verb, module = words[0] if words else "", _module_of(words)
-    if module in _OF_THE_FARM and not _has_farm():
+    if module in _OF_THE_FARM and not has_farm():
         warn(f"{verb} needs celery and redis: {install_command('workers')}")
         return 1
     if verb and module is None and not verb.startswith("-"):
@@ -170,7 +170,7 @@ def build_parser(module: str | None = None, words: Sequence[str] | None = None) 
         return sub
 
     for name in [module] if module else MODULES:
-        if name not in _OF_THE_FARM or _has_farm():
+        if name not in _OF_THE_FARM or has_farm():
             import_module(f"pbrs_farm.commands.{name}").add_verbs(verb)
     for name, sub in parser.verbs().items():
         if sub.options_by_words is not None and (words is None or name in words):
@@ -182,7 +182,7 @@ def first_screen() -> Parser:
     """The parser of a command without a verb: it knows their names and help, and imports none of them."""
     parser, add_parser = _bare_parser()
     for row in VERBS.values():
-        if row.module not in _OF_THE_FARM or _has_farm():
+        if row.module not in _OF_THE_FARM or has_farm():
             add_parser(row.verb, help=row.help, add_help=False)
     return parser
 
@@ -198,7 +198,7 @@ def _bare_parser() -> tuple[Parser, Callable[..., argparse.ArgumentParser]]:
     )
     parser.set_defaults(debug=False, every_verb=build_parser)
     # A base installation has no verb of the farm, and says how to get them.
-    if not _has_farm():
+    if not has_farm():
         farm = "submit, status, workers and the other verbs of a farm need celery and redis"
         parser.epilog = f"{farm}: {install_command('workers')}"
     return parser, parser.add_subparsers(title="verbs", metavar="VERB").add_parser
@@ -212,7 +212,7 @@ class _Version(argparse.Action):
         parser.exit()
 
 
-def _has_farm() -> bool:
+def has_farm() -> bool:
     return all(find_spec(package) is not None for package in ("celery", "redis"))
 
 

@@ -33,7 +33,7 @@ GL: Final = "GL"
 _EXCEPTION: Final = re.compile(r"^(pbrs_farm\.[\w.]+|\w+Error): ")  # before a traceback's last text
 
 # fmt: off
-_PACKAGES: Final = (
+PACKAGES: Final = (
     "numpy", "pydantic", "mitsuba", "drjit", "moderngl", "trimesh", "manifold3d", "pyoidn",
     "OpenImageIO", "shapely",
 )
@@ -74,14 +74,14 @@ def examine(store_url: str = "", redis_url: str = "") -> list[Finding]:
     again = install_command()
     return [
         _python(),
-        _packages(),
-        _llvm(),
+        packages(),
+        llvm(),
         *_variants(),
-        _probe(GL, check_gl, _gl_remedy(), state="degraded"),
-        _probe("denoiser", check_denoiser, again, needed=True),
-        _probe("pictures", check_pictures, again, needed=True),
+        probe(GL, check_gl, _gl_remedy(), state="degraded"),
+        probe("denoiser", check_denoiser, again, needed=True),
+        probe("pictures", check_pictures, again, needed=True),
         _extras(),
-        _redis(redis_url),
+        redis(redis_url),
         _store(store_url),
     ]
 
@@ -99,9 +99,9 @@ def _python() -> Finding:
     return Finding("python", state, sys.version.split()[0], "Python 3.11+", True)
 
 
-def _packages() -> Finding:
+def packages() -> Finding:
     found, missing = [], []
-    for package in _PACKAGES:
+    for package in PACKAGES:
         try:
             found.append(f"{package} {version(package)}")
         except PackageNotFoundError:
@@ -123,7 +123,7 @@ def _extras() -> Finding:
     return Finding("extras", "degraded", f"not installed: {given}", install_command(*missing))
 
 
-def _llvm() -> Finding:
+def llvm() -> Finding:
     from pbrs_farm.raycast.variant import MIN_LLVM, find_llvm, llvm_libraries
 
     library = find_llvm()
@@ -138,7 +138,7 @@ def _llvm() -> Finding:
 
 def _variants() -> list[Finding]:
     findings = [
-        _probe(f"mitsuba {n}", check_variant, _variant_remedy(n), argument=n, state="degraded")
+        probe(f"mitsuba {n}", check_variant, _variant_remedy(n), argument=n, state="degraded")
         for n in _VARIANTS
     ]
     # One variant is enough; without any nothing can be rendered.
@@ -159,10 +159,10 @@ def _gl_remedy() -> str:
     return system_command("gl") if is_installed("moderngl") else install_command()
 
 
-def _redis(url: str) -> Finding:
+def redis(url: str) -> Finding:
     if url:
         remedy = "is it running? PBRS_REDIS_URL names it"
-        return _probe("redis", check_redis, remedy, argument=url, state="degraded")
+        return probe("redis", check_redis, remedy, argument=url, state="degraded")
     server = shutil.which("redis-server")
     if server is not None:
         return Finding("redis", "ok", f"{server} (only the farm needs it)")
@@ -174,10 +174,10 @@ def _store(url: str) -> Finding:
     if not url:
         return Finding("store", "ok", "folders (no --out or PBRS_STORE given)")
     remedy = "check the path, endpoint and credentials"
-    return _probe("store", check_store, remedy, argument=url, needed=True)
+    return probe("store", check_store, remedy, argument=url, needed=True)
 
 
-def _probe(
+def probe(
     part: str,
     check: Callable[[str], str],
     remedy: str,

@@ -237,14 +237,14 @@ def _cameras(args: argparse.Namespace) -> None:
     if args.out is not None:
         put_files(args.out.parent, {args.out.name: json_bytes(document)})
     if args.map is not None:
-        _write_map(args.map, house, sampling)
+        write_map(args.map, house, sampling)
     if args.json:
         echo_json(document)
     else:
         _echo_report(sampling.report)
 
 
-def _write_map(path: Path, house: House, sampling: Sampling) -> None:
+def write_map(path: Path, house: House, sampling: Sampling) -> None:
     """Write the floor plan with the candidates as PNG and as SVG."""
     from pbrs_farm.images import png_from_array
     from pbrs_farm.sample.camera_map import camera_map_rgb, camera_map_svg

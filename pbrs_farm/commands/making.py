@@ -99,9 +99,9 @@ def _run(args: argparse.Namespace) -> int:
         hint = "a file, an example home's name, or builtin"
         raise BadInput("run", "", "no home given", hint=hint)
     if args.out is not None:
-        return _run_homes(args, homes)
+        return run_homes(args, homes)
     args.out = _folder_of(homes[0])
-    code = _run_homes(args, homes)
+    code = run_homes(args, homes)
     if code == 0 and not args.json:
         echo(f"in {args.out}; look at it: pbrs-farm sheet {args.out}")
     return code
@@ -114,7 +114,7 @@ def _folder_of(home: str) -> str:
     return f"out/{plain or 'home'}"
 
 
-def _run_homes(
+def run_homes(
     args: argparse.Namespace,
     homes: list[str],
     sources: Sequence[SourceRef] = (),
@@ -297,7 +297,7 @@ def _demo(args: argparse.Namespace) -> int:
                 whole.add(event.view_id)
                 parts.make(event.house_id, event.view_id)
 
-        code = _run_homes(args, [home], observe=observe)
+        code = run_homes(args, [home], observe=observe)
         # A demo that made nothing says why; what lies in its folder is an older one's.
         if not whole - failed:
             return code or 1
@@ -379,7 +379,7 @@ def _objects(args: argparse.Namespace) -> int:
     files = SourceFiles()
     chosen = pick_models(models, categories, args.count, recipe_of(args).seed)
     sources = [object_source(model, files) for model in chosen]
-    return _run_homes(args, [], sources, refused)
+    return run_homes(args, [], sources, refused)
 
 
 def _models_at(paths: Sequence[Path]) -> tuple[list[ObjectModel], list[tuple[str, str]]]:

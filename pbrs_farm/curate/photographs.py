@@ -167,7 +167,7 @@ def photo_from_pair(pair: PhotoFiles, *, depth_scale: float | None, sun_rgbd: bo
     of another size than depth, in the same form, is brought to depth's (ScanNet's are).
     """
     rgb = images.decode_photo(read_given(pair.rgb), str(pair.rgb))
-    stored = _stored_depth(pair.depth)
+    stored = stored_depth(pair.depth)
     if stored.ndim != 2:
         raise BadInput(pair.depth, "", f"expected one channel of depth, got {stored.shape}")
     if stored.shape != rgb.shape[:2] and is_same_form(stored.shape, rgb.shape):
@@ -196,7 +196,7 @@ def is_same_form(one: tuple[int, ...], other: tuple[int, ...]) -> bool:
     return abs(across - down) <= _SAME_FORM * down
 
 
-def _stored_depth(path: Path) -> NDArray[Any]:
+def stored_depth(path: Path) -> NDArray[Any]:
     if path.suffix.lower() == ".png":
         return images.array_from_png(read_given(path), str(path))
     if path.suffix.lower() == ".exr":

@@ -96,7 +96,7 @@ def summary_of(
         depth_quartiles=_quartiles(depth),
         yield_both=tuple(yield_curve(np.minimum(*good_scores(judged)), judged.num_rows)),
         houses=_tallies(judged, "house"),
-        room_types=_tallies(_with_types(judged), "room_type"),
+        room_types=_tallies(with_types(judged), "room_type"),
     )
 
 
@@ -135,7 +135,7 @@ def _quartiles(scores: np.ndarray[Any, np.dtype[np.float64]]) -> tuple[float, ..
     return tuple(round(float(q), 6) for q in np.percentile(scores, (0, 25, 50, 75, 100)))
 
 
-def _with_types(judged: Any) -> Any:
+def with_types(judged: Any) -> Any:
     """The table with types of rooms for their names: "Bedroom 2" and "Chambre" are bedrooms."""
     names = judged["room_type"].to_pylist()
     kinds = {name: named_kind(name or "") for name in set(names)}

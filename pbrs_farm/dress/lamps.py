@@ -42,7 +42,7 @@ def stand_by_sofas(
     sofas = [n for n in room.items if house.items[n].nyu40 == SOFA]
     if has_one or not sofas or rng.random() >= _BY_SOFA:
         return
-    piece, shape = _draw_lamp(house, catalogue, "floor_lamp", rng) or floor_lamp(rng, style)
+    piece, shape = draw_lamp(house, catalogue, "floor_lamp", rng) or floor_lamp(rng, style)
     radius = float(np.abs(shape.bounds[:, [0, 2]]).max())
     for number in sofas:
         # Try each end; take the lamp away again where it closes a way.
@@ -66,7 +66,7 @@ def stand_by_beds(
     stands = [n for n in room.items if house.items[n].nyu40 == NIGHT_STAND]
     if not stands or rng.random() >= _BY_BED:
         return
-    piece, shape = _draw_lamp(house, catalogue, "table_lamp", rng) or table_lamp(rng, style)
+    piece, shape = draw_lamp(house, catalogue, "table_lamp", rng) or table_lamp(rng, style)
     for number in stands:
         low, high = space.bounds[number]
         middle = ((low + high) / 2)[[0, 2]]
@@ -80,7 +80,7 @@ def stand_by_beds(
         )
 
 
-def _draw_lamp(
+def draw_lamp(
     house: MutableHouse, catalogue: Catalogue, group: str, rng: np.random.Generator
 ) -> tuple[Piece, Shape] | None:
     """A catalogue lamp with a light, of a size for furniture; None = generate one."""

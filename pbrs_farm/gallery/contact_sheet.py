@@ -57,7 +57,7 @@ def contact_sheet(
     rendered = {t.kind for _view, tiles in rows for t in tiles if t.missing != NOT_RENDERED}
     kinds = [kind for kind in TILES if kind in rendered]
     rows = [(view, [t for t in tiles if t.kind in rendered]) for view, tiles in rows]
-    heights = [_row_height(tiles) for _view, tiles in rows]
+    heights = [row_height(tiles) for _view, tiles in rows]
     classes = _classes_shown([tiles for _view, tiles in rows])
     credits = _sheet_credits(everything)
 
@@ -108,7 +108,7 @@ def _in_turn(lists: Iterable[Sequence[ViewEntry]]) -> list[ViewEntry]:
     return [x[i] for i in range(longest) for x in columns if i < len(x)]
 
 
-def _row_height(tiles: Sequence[Tile]) -> int:
+def row_height(tiles: Sequence[Tile]) -> int:
     heights = [TILE_PX * 3 // 4 if t.pixels is None else t.pixels.shape[0] for t in tiles]
     return 34 + max(heights) + 12  # title above, gap below
 
@@ -139,14 +139,14 @@ def _draw_header(
     part = "" if n_shown == len(views) else f"{n_shown} of "
     text = (
         f"{part}{len(views)} view{'s'[: len(views) != 1]}, "
-        f"{n_houses} house{'s'[: n_houses != 1]}: {_modes_text(kinds)}labels of the same pixels"
+        f"{n_houses} house{'s'[: n_houses != 1]}: {modes_text(kinds)}labels of the same pixels"
     )
     draw.text((_MARGIN_PX + 172, 34), text, _FAINT, _font(16))
     for i, kind in enumerate(kinds):
         draw.text((_MARGIN_PX + i * (TILE_PX + _GAP_PX), 80), kind.shown_title, INK, _font(15))
 
 
-def _modes_text(kinds: Sequence[Layer]) -> str:
+def modes_text(kinds: Sequence[Layer]) -> str:
     """ "two lighting modes, " of the columns; "" where there is none."""
     n_modes = sum(kind.name in {mode.value for mode in ALL_MODES} for kind in kinds)
     number = ("", "one", "two", "three", "four")[n_modes]

@@ -53,14 +53,14 @@ def draw_line(
         return float(draw.textlength(text, _own(size)))
     # Letters of several fonts share a baseline, not a top.
     base = y + _own_ascent(size)
-    for name, part in _runs_of_one_font(text):
+    for name, part in runs_of_one_font(text):
         font = _font_of_script(name, size)
         draw.text((x, base), part, fill, font, anchor="ls")
         x += float(draw.textlength(part, font))
     return x - at[0]
 
 
-def _runs_of_one_font(text: str) -> Iterator[tuple[str, str]]:
+def runs_of_one_font(text: str) -> Iterator[tuple[str, str]]:
     """(font file, "" for Pillow's own, and the letters to draw in it), from left to right."""
     name, part = "", ""
     for c in text:

@@ -39,7 +39,7 @@ def formats() -> Iterator[Format]:
 
     A generator, because importing a format takes time and the first ones serve most words.
     """
-    yield from _formats_of_packages()
+    yield from formats_of_packages()
     yield from _formats_of_plans()
 
 
@@ -148,7 +148,7 @@ class _Look:
 
 
 @cache
-def _formats_of_packages() -> tuple[Format, ...]:
+def formats_of_packages() -> tuple[Format, ...]:
     names = [module.name for module in pkgutil.iter_modules(read.__path__) if module.ispkg]
     packages = [import_module(f"{read.__name__}.{name}") for name in names]
     entries = [p.FORMAT for p in packages if isinstance(getattr(p, "FORMAT", None), Format)]

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from pbrs_farm.dress.report import DressReport
     from pbrs_farm.repair import RepairReport
 
-_PLANS_VERSION: Final = 1
+PLANS_VERSION: Final = 1
 """Of what reads floor plans, beside that of reading: raised, it makes no other homes anew."""
 _MAX_ROUNDS: Final = 3  # of repairing a dressed house and hanging anew what lost its wall
 _FURNISH_VERSION: Final = 3  # of furnish_rooms.py, beside that of what furnishes generated homes
@@ -155,7 +155,7 @@ def _float_seed(source: SourceRef, recipe: Recipe) -> int:
 
 def _read_depends(source: SourceRef, recipe: Recipe) -> list[object]:
     if source.kind == PLAN:
-        return [_PLANS_VERSION]
+        return [PLANS_VERSION]
     kind = HOME_KIND.get(source.kind)
     if kind is None or kind.finish is None:
         return []
@@ -342,7 +342,7 @@ def versions_of_passes() -> dict[str, int]:
 
     Installations with equal versions make the same house from the same source.
     """
-    return {p.name: p.version for p in PASSES} | {"plans": _PLANS_VERSION}
+    return {p.name: p.version for p in PASSES} | {"plans": PLANS_VERSION}
 
 
 def cache_key(source: SourceRef, recipe: Recipe) -> str:

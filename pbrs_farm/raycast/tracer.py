@@ -20,7 +20,7 @@ from pbrs_farm.raycast.mitsuba_mesh import mitsuba_mesh
 from pbrs_farm.raycast.variant import mitsuba
 
 MESH_NAME: Final = "house"  # of the one mesh of each scene
-_RAYS_PER_LAUNCH: Final = 1 << 22  # both bound the memory of one kernel launch
+RAYS_PER_LAUNCH: Final = 1 << 22  # both bound the memory of one kernel launch
 _COUNTS_PER_LAUNCH: Final = 1 << 24  # cameras x labels
 _TILE: Final = 4  # px, edge of the tiles in which a packet of rays walks the picture
 _D0, _DU, _DV, _EYE, _RAY_FLOATS = 0, 3, 6, 9, 12  # columns of _ray_table
@@ -117,8 +117,8 @@ class JitTracer:
     def first_hit(self, origins: F32, directions: F32, max_distance: F32) -> tuple[F32, I32]:
         distance = np.full(len(origins), np.inf, np.float32)
         face = np.full(len(origins), -1, np.int32)
-        for start in range(0, len(origins), _RAYS_PER_LAUNCH):
-            part = slice(start, start + _RAYS_PER_LAUNCH)
+        for start in range(0, len(origins), RAYS_PER_LAUNCH):
+            part = slice(start, start + RAYS_PER_LAUNCH)
             distance[part], face[part] = self._trace(
                 origins[part], directions[part], max_distance[part], coherent=False
             )
@@ -136,7 +136,7 @@ class JitTracer:
                     counts[k] = counted_labels(face, face_label, n_labels)
                 continue
             n_pixels = intrinsics.width_px * intrinsics.height_px
-            most = max(1, min(_RAYS_PER_LAUNCH // n_pixels, _COUNTS_PER_LAUNCH // n_labels))
+            most = max(1, min(RAYS_PER_LAUNCH // n_pixels, _COUNTS_PER_LAUNCH // n_labels))
             for start in range(0, len(members), most):
                 part = members[start : start + most]
                 counts[part] = self._count([cameras[i] for i in part], face_label, n_labels)

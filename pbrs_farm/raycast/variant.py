@@ -22,7 +22,7 @@ from pbrs_farm.core.errors import MachineFailed
 from pbrs_farm.installation import mitsuba_command
 
 MIN_LLVM: Final = 17  # older ones (14 to 16) crash inside Dr.Jit's first compilation
-_LIBRARY_PLACES: Final = (
+LIBRARY_PLACES: Final = (
     # Debian and Ubuntu: the library itself, and a version's own folder.
     "/usr/lib/*-linux-gnu/libLLVM*.so*",
     "/usr/lib/llvm-*/lib/libLLVM*.so*",
@@ -71,7 +71,7 @@ def llvm_libraries() -> list[tuple[tuple[int, ...], Path]]:
     DRJIT_LIBLLVM_PATH is `find_llvm`'s affair.
     """
     of_python = (sys.prefix, site.getuserbase())
-    patterns = (*_LIBRARY_PLACES, *(f"{folder}/lib/libLLVM*.so*" for folder in of_python))
+    patterns = (*LIBRARY_PLACES, *(f"{folder}/lib/libLLVM*.so*" for folder in of_python))
     libraries: dict[Path, tuple[int, ...]] = {}
     for pattern in patterns:
         root = Path(Path(pattern).anchor)

@@ -160,13 +160,13 @@ def _sensor_shot(
     earlier = now.earlier_frames(_LAGS * fields.lag_s)
     denoise = work.recipe.light.denoise
     exposures = tuple(
-        wanted_exposures(_glance(work, now.house, view), tone, denoise=denoise, wraps=_wraps(work))
+        wanted_exposures(glance(work, now.house, view), tone, denoise=denoise, wraps=_wraps(work))
         for _time_s, view in earlier
     )
     return SensorShot(fields, seed, exposures, tuple(time_s for time_s, _view in earlier))
 
 
-def _glance(work: Work, house: CachedHouse, view: View) -> LinearAovs:
+def glance(work: Work, house: CachedHouse, view: View) -> LinearAovs:
     """A small picture of a frame, the same whether its own light is rendered yet or not."""
     fields = work.recipe.light.model_copy(
         update={

@@ -16,7 +16,7 @@ from pbrs_farm.store.object_store import Store, get_or_none
 from pbrs_farm.transport.render_checkpoint import Arrays
 
 KEEP_EVERY_S: Final = 60.0
-_TELL_EVERY_S: Final = 5.0
+TELL_EVERY_S: Final = 5.0
 _MAX_BYTES: Final = 2**30  # larger states are not kept
 
 
@@ -61,7 +61,7 @@ class LightCheckpoint:
         """
         self._states[part] = state
         now = self._clock()
-        if now - self._told_s >= _TELL_EVERY_S:
+        if now - self._told_s >= TELL_EVERY_S:
             self._told_s = now
             self._tell(share)
         if now - self._kept_s >= KEEP_EVERY_S:

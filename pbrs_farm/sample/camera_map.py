@@ -91,7 +91,7 @@ def _levels_to_draw(
         x0, z0, x1, z1 = shapely.total_bounds(shapes)
         scale = min(_PX_PER_M, _MAX_PX / max(x1 - x0, z1 - z0, 1e-6))
         panel = _Panel(right - scale * x0, 2 * _MARGIN - scale * z0, scale)
-        marks.append(_text_mark(right, _MARGIN, shown(level.name) or f"Level {level.id}", 14.0))
+        marks.append(text_mark(right, _MARGIN, shown(level.name) or f"Level {level.id}", 14.0))
         marks += _level_marks(house, views, traces, level.id, panel, is_plan)
         right += scale * (x1 - x0) + 2 * _MARGIN
         bottom = max(bottom, 2 * _MARGIN + scale * (z1 - z0))
@@ -136,7 +136,7 @@ def _level_marks(
                     point = panel(eye[0], eye[2])
                     marks.append(Mark("dot", (point,), COLOURS[kind], 1.4, title=kind.label))
     marks += [
-        _text_mark(*panel(*_middle(room.polygon)), f"{room.id} {shown(room.name)}", _LETTERS)
+        text_mark(*panel(*_middle(room.polygon)), f"{room.id} {shown(room.name)}", _LETTERS)
         for room in rooms.values()
         if len(room.polygon)
     ]
@@ -164,7 +164,7 @@ def _walk(frames: list[View], panel: _Panel) -> list[Mark]:
         marks += [Mark("line", line, gaze, 1.5, title=title), Mark("dot", line[:1], gaze, 2.0)]
     for view, place, text in ((frames[0], places[0], "start"), (frames[-1], places[-1], "end")):
         marks.append(Mark("dot", (panel(*place),), colour, 5.0, title=view.id))
-        marks.append(_text_mark(panel(*place)[0] + 8, panel(*place)[1], text, _LETTERS, colour))
+        marks.append(text_mark(panel(*place)[0] + 8, panel(*place)[1], text, _LETTERS, colour))
     return marks
 
 
@@ -217,7 +217,7 @@ def _winner(view: View, panel: _Panel) -> list[Mark]:
     return [
         Mark("line", (*wedge, wedge[0]), colour, 2.0, title=title),
         Mark("dot", (wedge[0],), colour, 4.0, title=title),
-        _text_mark(*label, view.id.removeprefix(f"{view.room_id}_"), _LETTERS, colour),
+        text_mark(*label, view.id.removeprefix(f"{view.room_id}_"), _LETTERS, colour),
     ]
 
 
@@ -241,7 +241,7 @@ def _notes(sampling: Sampling) -> list[Mark]:
         y = _MARGIN + k * _ROW
         if colour:
             marks.append(Mark("dot", ((6.0, y),), colour, 4.0))
-        marks.append(_text_mark(16.0 if colour else 0.0, y, text, _LETTERS))
+        marks.append(text_mark(16.0 if colour else 0.0, y, text, _LETTERS))
     return marks
 
 
@@ -261,7 +261,7 @@ def _middle(polygon: F64) -> tuple[float, float]:
     return float(x) - 0.4, float(z)
 
 
-def _text_mark(x: float, y: float, text: str, size: float = _LETTERS, colour: str = _INK) -> Mark:
+def text_mark(x: float, y: float, text: str, size: float = _LETTERS, colour: str = _INK) -> Mark:
     # Ids are strangers' words, too, and a line end stops the drawing.
     return Mark("text", ((x, y),), colour, size, text=shown(text, _MOST_LETTERS))
 

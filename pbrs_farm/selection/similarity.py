@@ -16,7 +16,7 @@ from pbrs_farm.core.arrays import F32, F64, I64
 
 Shares = F32  # (n, bins), rows sum to 1, or to 0 where nothing was counted
 _BLOCK: Final = 32  # queries of numpy's search at once
-_CACHE_BYTES: Final = 512 * 1024  # references that are searched at once
+CACHE_BYTES: Final = 512 * 1024  # references that are searched at once
 
 
 def intersection(a: NDArray[np.floating], b: NDArray[np.floating]) -> F64:
@@ -77,7 +77,7 @@ def _faiss_nearest(q: Shares, r: Shares, leave_out_self: bool) -> I64:
         return np.asarray(np.where(first_is_self, index[:, 1], index[:, 0]), np.int64)
 
     # Take the references in blocks that stay in the cache: each is read once for every query.
-    n_rows = max(_CACHE_BYTES // (4 * r.shape[1]), 1)
+    n_rows = max(CACHE_BYTES // (4 * r.shape[1]), 1)
     nearest = np.zeros(len(q), np.int64)
     least = np.full(len(q), np.inf, np.float32)
     for start in range(0, len(r), n_rows):

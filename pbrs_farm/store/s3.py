@@ -44,7 +44,7 @@ class S3Settings:
 
 
 @dataclass(slots=True)
-class _ForkGuard:
+class ForkGuard:
     """Which process may talk to S3: the first one that did, never its children."""
 
     first_pid: int = 0  # the process that called first, 0 = none yet
@@ -63,7 +63,7 @@ class _ForkGuard:
         self.first_pid = pid
 
 
-_guard = _ForkGuard()
+_guard = ForkGuard()
 
 
 def forbid_in_this_process() -> None:

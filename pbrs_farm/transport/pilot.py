@@ -39,8 +39,8 @@ _MAX_LANES: Final = 1 << 17  # of the pilot: it halves its size where there are 
 # plain one's, and the part of the mean light below which a pixel's noise counts less.
 _TRIAL_SIZE: Final = (64, 48)
 _TRIAL_SPP: Final = 8
-_MIN_SAMPLES: Final = 1 << 22
-_GUIDING_COST: Final = 1.1
+MIN_SAMPLES: Final = 1 << 22
+GUIDING_COST: Final = 1.1
 _DARK: Final = 0.1
 _NEIGHBOURS: Final = 5  # px, edge of the window whose median is the level of a pixel
 
@@ -137,17 +137,17 @@ def trial_weights(
     of few samples is guided without a trial, which would cost as much as it saves.
     """
     i = camera.intrinsics
-    if i.width_px * i.height_px * fields.spp < _MIN_SAMPLES:
+    if i.width_px * i.height_px * fields.spp < MIN_SAMPLES:
         return weights
     width, height = _TRIAL_SIZE
     lanes = Lanes(width, height, 0, _TRIAL_SPP, seed, is_trial=True)
     sums = trace(scene, emitters, camera.with_size(width, height), lanes, fields)
     assert sums.arrivals is not None
     rates = arrival_rates(sums.arrivals, emitters.arrival.grid)
-    return replace(weights, is_guided=_pays(sums, (2, height, width)), arrival_rates=rates)
+    return replace(weights, is_guided=pays(sums, (2, height, width)), arrival_rates=rates)
 
 
-def _pays(sums: SampleSums, shape: tuple[int, int, int]) -> bool:
+def pays(sums: SampleSums, shape: tuple[int, int, int]) -> bool:
     """Whether guided rays cut the noise of a trial by more than they cost. shape: plain and guided."""
     # Judge noise by a pixel's surroundings: a firefly must not be its own reference.
     _plain, guided = _luminance(sums.outdoor + sums.indoor).reshape(shape)
@@ -158,7 +158,7 @@ def _pays(sums: SampleSums, shape: tuple[int, int, int]) -> bool:
     halves = (sums.outdoor, sums.outdoor_even), (sums.indoor, sums.indoor_even)
     outdoor, indoor = ((_apart(*h).reshape(shape) / level) ** 2 for h in halves)
     daylight, (plain_lamps, guided_lamps) = outdoor.mean(), indoor.mean((1, 2))
-    return bool(daylight + plain_lamps > _GUIDING_COST * (daylight + guided_lamps))
+    return bool(daylight + plain_lamps > GUIDING_COST * (daylight + guided_lamps))
 
 
 def _luminance(rgb: F32) -> F64:

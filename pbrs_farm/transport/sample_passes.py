@@ -23,7 +23,7 @@ from pbrs_farm.transport.time_budget import TimeBudget
 
 MOST_PARTS: Final = 16
 """Number of instants in a motion-blurred picture."""
-_SAMPLES_PER_LAUNCH: Final = 1 << 26  # bounds how long one kernel runs
+SAMPLES_PER_LAUNCH: Final = 1 << 26  # bounds how long one kernel runs
 _SPP: Final = "spp"  # key in stored states: samples of each pixel so far
 
 
@@ -111,7 +111,7 @@ def _traced(
     """Sums over n samples of every pixel, from the first on."""
     i = view.camera.intrinsics
     total: SampleSums | None = None
-    for start, count, camera in _parts_of_shutter(view, first, n):
+    for start, count, camera in parts_of_shutter(view, first, n):
         lanes = Lanes(
             i.width_px,
             i.height_px,
@@ -128,7 +128,7 @@ def _traced(
     return total
 
 
-def _parts_of_shutter(view: SampledView, first: int, n: int) -> Iterator[tuple[int, int, Camera]]:
+def parts_of_shutter(view: SampledView, first: int, n: int) -> Iterator[tuple[int, int, Camera]]:
     """(first sample, number, camera) of launches without motion inside; moves items before each.
 
     Without motions there is one. Otherwise a pass of fields.spp samples is divided among parts of the
@@ -183,4 +183,4 @@ def _state_of(total: SampleSums, spp: int) -> Callable[[], Arrays]:
 
 def samples_per_launch(n_pixels: int) -> int:
     """Samples of every pixel that fit into the memory of one launch."""
-    return max(_SAMPLES_PER_LAUNCH // n_pixels, 1)
+    return max(SAMPLES_PER_LAUNCH // n_pixels, 1)

@@ -52,7 +52,7 @@ def test_memory_is_told_by_psutil_where_there_is_no_proc() -> None:
 def test_no_process_starts_whose_log_could_not_be_moved() -> None:
     code = (
         "from pbrs_farm import cli; from pbrs_farm.run.processes import early_start, limits; "
-        "limits.is_room_for_two = lambda: True; cli._start_early(['demo']); print(early_start._STARTED)"
+        "limits.is_room_for_two = lambda: True; cli._start_early(['demo']); print(early_start.STARTED)"
     )
     assert _said(python_without_posix(["-c", code])) == "{}\n"
 

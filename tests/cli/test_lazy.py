@@ -54,7 +54,7 @@ print("last:", sorted(heavy & set(sys.modules)), "pathlib" in after_import)
 
 
 def test_the_help_says_what_the_farms_verbs_need(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("pbrs_farm.cli._has_farm", lambda: False)
+    monkeypatch.setattr("pbrs_farm.cli.has_farm", lambda: False)
     text = " ".join(build_parser().format_help().split())
     assert "the other verbs of a farm need celery and redis: " in text
     assert "[workers]" in text

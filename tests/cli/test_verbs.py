@@ -83,9 +83,9 @@ def test_a_machine_without_opengl_alone_can_render_by_path_tracing(monkeypatch, 
 
 
 def test_a_check_that_crashes_or_exits_is_a_finding():
-    crashed = doctor._probe("x", doctor.check_variant, "do this", argument="no_such_variant")
+    crashed = doctor.probe("x", doctor.check_variant, "do this", argument="no_such_variant")
     assert (crashed.state, crashed.remedy) == ("missing", "do this")
-    unknown = doctor._probe("store", doctor.check_store, "look", argument="ftp://x", needed=True)
+    unknown = doctor.probe("store", doctor.check_store, "look", argument="ftp://x", needed=True)
     assert "not a store" in unknown.text
     assert "errors." not in unknown.text
     assert not doctor.can_run([unknown])
@@ -93,16 +93,16 @@ def test_a_check_that_crashes_or_exits_is_a_finding():
 
 def test_a_machine_without_variants_llvm_or_redis_is_told(monkeypatch):
     broken = doctor.Finding("x", "degraded", "does not work")
-    monkeypatch.setattr(doctor, "_probe", lambda *_args, **_kwargs: broken)
+    monkeypatch.setattr(doctor, "probe", lambda *_args, **_kwargs: broken)
     assert [f.needed for f in doctor._variants()] == [False, False, True]
     monkeypatch.setattr("pbrs_farm.raycast.variant.find_llvm", lambda: None)
     old = [((15, 0, 6), Path("libLLVM-15.so"))]
     monkeypatch.setattr("pbrs_farm.raycast.variant.llvm_libraries", lambda: old)
-    assert "only 15.0.6" in doctor._llvm().text
+    assert "only 15.0.6" in doctor.llvm().text
     monkeypatch.setattr("shutil.which", lambda _name: None)
-    assert doctor._redis("").state == "degraded"
-    monkeypatch.setattr(doctor, "_PACKAGES", ("numpy", "no-such-package"))
-    assert doctor._packages().text == "not installed: no-such-package"
+    assert doctor.redis("").state == "degraded"
+    monkeypatch.setattr(doctor, "PACKAGES", ("numpy", "no-such-package"))
+    assert doctor.packages().text == "not installed: no-such-package"
 
 
 def test_homes_lists_the_nine_homes_and_how_to_fetch_them(tmp_path, monkeypatch, capsys):
@@ -217,7 +217,7 @@ def test_the_map_has_the_name_that_was_given(given, name, tmp_path):
     report = CameraReport(
         preset="photo", source="sampled", n_views=0, n_candidates=0, refused={}, rooms=()
     )
-    explaining._write_map(tmp_path / given, builtin_home(), Sampling((), report, ()))
+    explaining.write_map(tmp_path / given, builtin_home(), Sampling((), report, ()))
     assert {p.name for p in tmp_path.iterdir() if p.is_file()} == {f"{name}.png", f"{name}.svg"}
 
 
@@ -350,7 +350,7 @@ def test_the_layers_on_a_terminal_are_columns_that_fit_it() -> None:
 
 def test_a_demo_that_made_nothing_does_not_show_an_older_one(tmp_path, monkeypatch, capsys):
     (tmp_path / "sheet.png").write_bytes(b"older")
-    monkeypatch.setattr(making, "_run_homes", lambda *_, **__: 1)
+    monkeypatch.setattr(making, "run_homes", lambda *_, **__: 1)
     assert main(["demo", "--home", "builtin", "--bare", "--out", str(tmp_path)]) == 1
     assert capsys.readouterr().out == ""
     assert (tmp_path / "sheet.png").read_bytes() == b"older"
@@ -365,7 +365,7 @@ def test_a_demo_without_a_network_says_what_it_cannot_fetch_and_shows_the_built_
     shown: list[list[str]] = []
     monkeypatch.setenv("PBRS_CACHE", str(tmp_path / "cache"))
     monkeypatch.setattr("pbrs_farm.assets.debian._fetch", refuse)
-    monkeypatch.setattr(making, "_run_homes", lambda _args, homes, **_: shown.append(homes) or 1)
+    monkeypatch.setattr(making, "run_homes", lambda _args, homes, **_: shown.append(homes) or 1)
     main(["demo", "--out", str(tmp_path / "out")])
     assert shown == [["builtin"]]
     told = capsys.readouterr().err.splitlines()

@@ -15,7 +15,7 @@ import pbrs_farm as pf
 from pbrs_farm.core.file_kinds import kind_of, wrong_kind
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.core.recipe_fields import CameraFields
-from pbrs_farm.curate.photographs import _stored_depth
+from pbrs_farm.curate.photographs import stored_depth
 from pbrs_farm.formats.bop_camera import camera_of_bop
 from pbrs_farm.formats.class_map import class_map
 from pbrs_farm.images import decode_photo, decode_radiance
@@ -68,7 +68,7 @@ TAKEN: list[tuple[str, Take]] = [
     *((f"model{suffix}", pf.model) for suffix in (".glb", ".gltf", ".obj", ".ply", ".stl", ".off")),
     ("sky.hdr", lambda path: decode_radiance(path.read_bytes(), path.name)),
     ("photo.jpg", lambda path: decode_photo(path.read_bytes(), path.name)),
-    ("depth.npy", _stored_depth),
+    ("depth.npy", stored_depth),
     ("recipe.toml", lambda path: pf.load("builtin", path)),
     ("classes.csv", class_map),
     ("camera.json", camera_of_bop),

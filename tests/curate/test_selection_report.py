@@ -18,7 +18,7 @@ from pbrs_farm.core.recipe import SelectionFields
 from pbrs_farm.curate import selection_run as selecting
 from pbrs_farm.curate.charts import distribution, joint, yields
 from pbrs_farm.curate.selection_report import bin_colours, selection_report
-from pbrs_farm.curate.selection_summary import _with_types
+from pbrs_farm.curate.selection_summary import with_types
 from pbrs_farm.store import MemoryStore
 from tests.selection.histogram_sets import record, reference
 
@@ -138,5 +138,5 @@ def test_what_was_refused_is_not_drawn_in_the_colour_of_what_was_kept() -> None:
 
 def test_room_types_are_types_whatever_rooms_are_called() -> None:
     names = ["Bedroom 2", "Chambre", "Kitchen", "Room 7", None]
-    table = _with_types(pa.table({"room_type": pa.array(names, pa.string())}))
+    table = with_types(pa.table({"room_type": pa.array(names, pa.string())}))
     assert table["room_type"].to_pylist() == ["bedroom", "bedroom", "kitchen", "", ""]

@@ -11,7 +11,7 @@ from pbrs_farm.core.catalogue import EMPTY, Catalogue
 from pbrs_farm.core.house import House, Item, ItemKind
 from pbrs_farm.core.lighting import flux_lm
 from pbrs_farm.dress import made_lamps as made
-from pbrs_farm.dress.lamps import _draw_lamp, add_lamps
+from pbrs_farm.dress.lamps import add_lamps, draw_lamp
 from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.space import house_space
 from pbrs_farm.dress.style import style_for
@@ -110,7 +110,7 @@ def test_a_lamp_of_the_catalogue_is_of_one_s_own_library_by_its_share() -> None:
     catalogue = Catalogue(pieces, lambda _piece: shape, "test", own=frozenset({"T#7"}))
     for share, least, most in ((1.0, 200, 200), (0.5, 70, 130), (0.0, 0, 20)):
         mutable, rng = MutableHouse(_dark(), 1, own_share=share), np.random.default_rng(5)
-        drawn = [_draw_lamp(mutable, catalogue, "table_lamp", rng) for _ in range(400)]
+        drawn = [draw_lamp(mutable, catalogue, "table_lamp", rng) for _ in range(400)]
         ids = [lamp[0].id for lamp in drawn if lamp is not None][:200]
         assert least <= ids.count("T#7") <= most, share
 

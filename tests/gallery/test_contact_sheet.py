@@ -50,10 +50,8 @@ def test_a_sheet_leaves_out_the_columns_that_no_view_has(tmp_path: Path) -> None
     wide = images.array_from_png(sheet.contact_sheet(tmp_path))
     # One view has OpenGL's indoor mode, none the other: one column less.
     assert wide.shape[1] - narrow.shape[1] == sheet.TILE_PX + 6
-    assert (
-        sheet._modes_text([t for t in TILES if t.name != "opengl_dl"]) == "three lighting modes, "
-    )
-    assert sheet._modes_text(TILES[4:]) == ""
+    assert sheet.modes_text([t for t in TILES if t.name != "opengl_dl"]) == "three lighting modes, "
+    assert sheet.modes_text(TILES[4:]) == ""
 
 
 def test_sheet_shows_the_classes_colours(root: Path) -> None:
@@ -230,18 +228,18 @@ def test_a_line_end_in_any_text_of_a_sheet_is_a_space() -> None:
         for text in ("one\ntwo", "one two", "é\r\nb")
     ]
     assert lengths[0] == lengths[1]
-    assert camera_map._text_mark(0, 0, "Level 1\n2").text == "Level 1 2"
+    assert camera_map.text_mark(0, 0, "Level 1\n2").text == "Level 1 2"
 
 
 def test_names_are_drawn_in_the_script_they_are_written_in(tmp_path: Path) -> None:
     write_house(tmp_path, "a", ("0_0_1",), "Modèle d’Élise – Спальня")
     assert sheet.contact_sheet(tmp_path)
     assert "Modèle d’Élise – Спальня" in gallery(tmp_path)
-    assert not any("?" in part for _font, part in sheet_text._runs_of_one_font("Modèle d’Élise –"))
+    assert not any("?" in part for _font, part in sheet_text.runs_of_one_font("Modèle d’Élise –"))
 
 
 def test_a_letter_that_no_font_has_is_a_question_mark() -> None:
-    assert "".join(part for _font, part in sheet_text._runs_of_one_font("a\u0378b\ufe0f")) == "a?b"
+    assert "".join(part for _font, part in sheet_text.runs_of_one_font("a\u0378b\ufe0f")) == "a?b"
 
 
 def test_gallery_shows_what_selection_kept_and_rejected(root: Path) -> None:
@@ -265,8 +263,8 @@ def test_gallery_shows_what_selection_kept_and_rejected(root: Path) -> None:
 
 def test_the_frame_of_a_missing_tile_stays_in_its_row():
     small = Tile(TILES[0], np.zeros((60, 80, 3), np.uint8))
-    assert sheet._row_height([small]) < sheet._row_height([small, Tile(TILES[1], None, "gone")])
-    assert sheet._row_height([Tile(TILES[1], None)]) == sheet._row_height(
+    assert sheet.row_height([small]) < sheet.row_height([small, Tile(TILES[1], None, "gone")])
+    assert sheet.row_height([Tile(TILES[1], None)]) == sheet.row_height(
         [small, Tile(TILES[1], None)]
     )
 

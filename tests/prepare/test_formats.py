@@ -276,9 +276,9 @@ def with_lidar(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None
     (tmp_path / "packages/lidar").mkdir(parents=True)
     (tmp_path / "packages/lidar/__init__.py").write_text(_LIDAR)
     monkeypatch.setattr(read, "__path__", [*read.__path__, str(tmp_path / "packages")])
-    table._formats_of_packages.cache_clear()
+    table.formats_of_packages.cache_clear()
     yield
-    table._formats_of_packages.cache_clear()
+    table.formats_of_packages.cache_clear()
     sys.modules.pop("pbrs_farm.read.lidar", None)
 
 

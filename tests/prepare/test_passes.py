@@ -122,7 +122,7 @@ def test_the_version_of_what_reads_plans_is_one_of_plans_alone(
     built_in, recipe = resolve("builtin"), Recipe()
     sources = (built_in, built_in.model_copy(update={"kind": "plan"}))
     before = [step_depends(source, recipe) for source in sources]
-    monkeypatch.setattr(passes_module, "_PLANS_VERSION", 99)
+    monkeypatch.setattr(passes_module, "PLANS_VERSION", 99)
     assert [step_depends(s, recipe) == b for s, b in zip(sources, before, strict=True)] == [
         True,
         False,

@@ -102,7 +102,7 @@ def test_counts_do_not_depend_on_how_cameras_are_batched(monkeypatch: pytest.Mon
     caster = Caster(soup(50, seed=4))
     views = [camera(20, 15, eye=(0, 0, 0.3 * k)) for k in range(9)]
     whole = caster.item_counts(views)
-    monkeypatch.setattr("pbrs_farm.raycast.tracer._RAYS_PER_LAUNCH", 700)
+    monkeypatch.setattr("pbrs_farm.raycast.tracer.RAYS_PER_LAUNCH", 700)
     np.testing.assert_array_equal(caster.item_counts(views), whole)
 
 

@@ -35,7 +35,7 @@ def test_the_newest_library_wins_over_an_old_one_named_by_the_environment(
 ) -> None:
     for name in ("libLLVM-14.so.1", "libLLVM.so.18.1", "libLLVM.so.19.1"):
         (tmp_path / name).touch()
-    monkeypatch.setattr(variant, "_LIBRARY_PLACES", (str(tmp_path / "libLLVM*.so*"),))
+    monkeypatch.setattr(variant, "LIBRARY_PLACES", (str(tmp_path / "libLLVM*.so*"),))
     monkeypatch.setattr("sys.prefix", str(tmp_path / "none"))
     monkeypatch.setattr("site.getuserbase", lambda: str(tmp_path / "none"))
     monkeypatch.setenv("DRJIT_LIBLLVM_PATH", str(tmp_path / "libLLVM-14.so.1"))
@@ -49,7 +49,7 @@ def test_versions_that_crash_are_never_taken(
 ) -> None:
     for name in ("libLLVM-14.so.1", "libLLVM-16.so.1"):
         (tmp_path / name).touch()
-    monkeypatch.setattr(variant, "_LIBRARY_PLACES", (str(tmp_path / "libLLVM*.so*"),))
+    monkeypatch.setattr(variant, "LIBRARY_PLACES", (str(tmp_path / "libLLVM*.so*"),))
     monkeypatch.setattr("sys.prefix", str(tmp_path / "none"))
     monkeypatch.setattr("site.getuserbase", lambda: str(tmp_path / "none"))
     monkeypatch.delenv("DRJIT_LIBLLVM_PATH", raising=False)
@@ -62,7 +62,7 @@ def test_the_library_of_a_wheel_is_found_in_the_environment_and_in_the_users_pac
 ) -> None:
     (tmp_path / "lib").mkdir()
     (tmp_path / "lib/libLLVM.so.23.1").touch()
-    monkeypatch.setattr(variant, "_LIBRARY_PLACES", ())
+    monkeypatch.setattr(variant, "LIBRARY_PLACES", ())
     monkeypatch.setattr("sys.prefix", str(tmp_path / "none"))
     monkeypatch.setattr("site.getuserbase", lambda: str(tmp_path / "none"))
     monkeypatch.delenv("DRJIT_LIBLLVM_PATH", raising=False)

@@ -57,8 +57,8 @@ def test_a_piece_that_stands_twice_is_a_duplicate() -> None:
 
 
 def test_a_crowd_is_audited_in_part_and_the_rest_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(furniture_audit_module, "_MAX_PIECES", 4)
-    monkeypatch.setattr(furniture_audit_module, "_MAX_PAIRS", 2)
+    monkeypatch.setattr(furniture_audit_module, "MAX_PIECES", 4)
+    monkeypatch.setattr(furniture_audit_module, "MAX_PAIRS", 2)
     crowd = [_piece(f"p{k}", (1 + 0.01 * k, 0.25, 1)) for k in range(9)]
     audit = furniture_audit(_furnished(*crowd))
     assert len(audit.overlaps) == 2

@@ -49,7 +49,7 @@ def test_a_panorama_is_exposed_alike_wherever_earlier_frames_are_cut(
 
     def exposure(lens: dict[str, str], shift: int) -> float:
         rolled = LinearAovs(*(np.roll(getattr(small, n), shift, 1) for n in names))
-        monkeypatch.setattr(develop_step, "_glance", lambda *_args: rolled)
+        monkeypatch.setattr(develop_step, "glance", lambda *_args: rolled)
         work = Work(
             store, recipe_from_name("fast", LAG | lens), "home", HouseCache(), view_id="now"
         )

@@ -25,7 +25,7 @@ def _said(child: ChildProcess, word: str) -> bytes | None:
 
 def test_the_run_takes_the_process_that_was_started_early_once(tmp_path: Path) -> None:
     start_early(TARGET)
-    early, early_log = early_start._STARTED[TARGET][0], early_start._STARTED[TARGET][0]._log
+    early, early_log = early_start.STARTED[TARGET][0], early_start.STARTED[TARGET][0]._log
     first, second = (child_of(TARGET, tmp_path / name) for name in ("first", "second"))
     try:
         assert first is early
@@ -43,7 +43,7 @@ def test_the_run_takes_the_process_that_was_started_early_once(tmp_path: Path) -
 
 def test_a_process_that_died_is_not_taken(tmp_path: Path) -> None:
     start_early(TARGET)
-    early, _folder = early_start._STARTED[TARGET]
+    early, _folder = early_start.STARTED[TARGET]
     early.kill()
     child = child_of(TARGET, tmp_path / "log")
     try:
@@ -60,7 +60,7 @@ def started(monkeypatch: pytest.MonkeyPatch) -> list[tuple[int, Path]]:
 
     def start(_target: str) -> None:
         start_early(TARGET)
-        child, folder = early_start._STARTED[TARGET]
+        child, folder = early_start.STARTED[TARGET]
         places.append((child._process.pid, Path(folder.name)))
 
     monkeypatch.setattr(early_start, "start_early", start)
@@ -105,7 +105,7 @@ def test_a_command_goes_on_where_no_process_can_start_early(
 def test_an_interrupt_before_the_options_are_read_is_told_in_one_line(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    def interrupted(_module: str | None) -> None:
+    def interrupted(*_words: object) -> None:
         raise KeyboardInterrupt
 
     monkeypatch.setattr(cli, "build_parser", interrupted)

@@ -131,7 +131,7 @@ def test_a_killed_view_goes_on_and_leaves_nothing_behind(monkeypatch: pytest.Mon
 
     # Kill the render where it tells its share for the third time, each time right after a write.
     monkeypatch.setattr("pbrs_farm.run.light_checkpoint.KEEP_EVERY_S", 0.0)
-    monkeypatch.setattr("pbrs_farm.run.light_checkpoint._TELL_EVERY_S", 0.0)
+    monkeypatch.setattr("pbrs_farm.run.light_checkpoint.TELL_EVERY_S", 0.0)
     told: list[float] = []
 
     def tell(share: float) -> None:

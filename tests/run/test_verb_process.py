@@ -124,6 +124,6 @@ def test_no_library_takes_a_verb_that_reads_files_with_it(
 
 
 def test_the_table_of_watched_modules_names_modules() -> None:
-    from pbrs_farm.cli import _OF_STRANGERS
+    from pbrs_farm.cli import OF_STRANGERS
 
-    assert set(_OF_STRANGERS) < set(MODULES)
+    assert set(OF_STRANGERS) < set(MODULES)

@@ -89,7 +89,7 @@ def test_blocks_of_references_do_not_change_the_best(monkeypatch: pytest.MonkeyP
     rng = np.random.default_rng(0)
     q, r = (normalised(rng.integers(0, 9, (k, 24))) for k in (50, 40))
     whole = best_match(q, r, library="faiss")
-    monkeypatch.setattr("pbrs_farm.selection.similarity._CACHE_BYTES", 7 * 4 * 24)
+    monkeypatch.setattr("pbrs_farm.selection.similarity.CACHE_BYTES", 7 * 4 * 24)
     blocks = best_match(q, r, library="faiss")
     assert np.array_equal(whole[0], blocks[0])
 

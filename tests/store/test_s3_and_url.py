@@ -12,7 +12,7 @@ from pbrs_farm.core.errors import BadInput, StoreFailed, StoreUnavailable
 from pbrs_farm.store import MemoryStore, StoreSettings, store_from_url
 from pbrs_farm.store.folder import FolderStore
 from pbrs_farm.store.object_store import content_type
-from pbrs_farm.store.s3 import S3Settings, _ForkGuard
+from pbrs_farm.store.s3 import ForkGuard, S3Settings
 from pbrs_farm.store.secret import Secret
 
 DEAD = StoreSettings(
@@ -50,7 +50,7 @@ def test_an_unreachable_gateway_is_one_line_without_the_secret() -> None:
 
 
 def test_a_process_that_may_fork_is_refused() -> None:
-    guard = _ForkGuard(forbidden_pid=os.getpid())
+    guard = ForkGuard(forbidden_pid=os.getpid())
     with pytest.raises(StoreFailed, match="not to be used in this process"):
         guard.enter("k")
 

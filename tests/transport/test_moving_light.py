@@ -17,7 +17,7 @@ from pbrs_farm.geometry.moving import house_at
 from pbrs_farm.raycast.variant import choose_variant
 from pbrs_farm.read.builtin.builtin_home import builtin_home
 from pbrs_farm.transport.light_scene import LightScene
-from pbrs_farm.transport.sample_passes import MOST_PARTS, SampledView, _parts_of_shutter
+from pbrs_farm.transport.sample_passes import MOST_PARTS, SampledView, parts_of_shutter
 from pbrs_farm.transport.scene_tables.sky import sky_for_house, uniform_sky
 from pbrs_farm.transport.validation import known_rooms as rooms
 
@@ -141,7 +141,7 @@ def test_samples_are_spread_over_the_shutters_time_whatever_their_number(spp: in
     fields = RECIPE.light.model_copy(update={"spp": spp})
     camera = replace(panel_that_moves()[1], blur=CameraBlur())
     view = SampledView(None, None, camera, fields, 1, move=moved.append)  # type: ignore[arg-type]
-    whole = list(_parts_of_shutter(view, 0, spp))
+    whole = list(parts_of_shutter(view, 0, spp))
     assert sum(n for _first, n, _camera in whole) == spp
     assert len(whole) <= MOST_PARTS
     # Each part is as long as it has samples, and things stand in its middle.
@@ -155,7 +155,7 @@ def test_samples_are_spread_over_the_shutters_time_whatever_their_number(spp: in
     np.testing.assert_allclose([p[0] for p in parts], ends - [0.5 * p[1] for p in parts])
     # Launches of other sizes give each sample the same part.
     moved_before, moved[:] = list(moved), []
-    pieces = [p for k in range(0, spp, 3) for p in _parts_of_shutter(view, k, min(3, spp - k))]
+    pieces = [p for k in range(0, spp, 3) for p in parts_of_shutter(view, k, min(3, spp - k))]
     by_sample = [m for m, (_f, n, _c) in zip(moved, pieces, strict=True) for _ in range(n)]
     expected = [m for m, (_f, n, _c) in zip(moved_before, whole, strict=True) for _ in range(n)]
     assert by_sample == expected

@@ -40,7 +40,7 @@ def test_a_firefly_that_guided_rays_lack_chooses_them_unless_it_is_daylight(
     bright: str, pays: bool
 ) -> None:
     from pbrs_farm.transport.path_tracer import SampleSums
-    from pbrs_farm.transport.pilot import _pays
+    from pbrs_farm.transport.pilot import pays
 
     height, width = 8, 12
     n = 2 * height * width
@@ -52,7 +52,7 @@ def test_a_firefly_that_guided_rays_lack_chooses_them_unless_it_is_daylight(
             plus[firefly][7] = 50
         light = {name: odd + even + x for name, x in plus.items()}
         halves = {f"{name}_even": even + x for name, x in plus.items()}
-        return _pays(
+        return pays(
             SampleSums(**light, **halves, albedo=odd, normal=odd, n_bad=0), (2, height, width)
         )
 

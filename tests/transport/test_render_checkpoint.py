@@ -84,7 +84,7 @@ def gone_on(fields: LightFields, n: int, *, is_sunny: bool = False) -> LightResu
 
 @pytest.fixture
 def _short_launches(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("pbrs_farm.transport.sample_passes._SAMPLES_PER_LAUNCH", 4 * PIXELS)
+    monkeypatch.setattr("pbrs_farm.transport.sample_passes.SAMPLES_PER_LAUNCH", 4 * PIXELS)
     one_round = METROPOLIS.chains
     monkeypatch.setattr(f"{METROPOLIS_VIEW}.chain_rounds_per_launch", lambda: one_round)
 

@@ -127,7 +127,7 @@ def test_a_worker_that_left_can_be_asked_back_before_it_is_there(farm: Farm) -> 
 def test_a_drained_worker_that_is_started_again_waits_until_it_is_asked_back(
     farm: Farm, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    monkeypatch.setattr(supervisor, "_DRAINED_POLL_S", 0.1)
+    monkeypatch.setattr(supervisor, "DRAINED_POLL_S", 0.1)
     monkeypatch.setattr(supervisor, "_POLL_S", 0.02)
     config = replace(farm.config, scratch=tmp_path)
     farm.registry.heartbeat()
@@ -135,10 +135,10 @@ def test_a_drained_worker_that_is_started_again_waits_until_it_is_asked_back(
     farm.registry.leave()
     answers: list[bool] = []
 
-    orders = supervisor._Orders()
+    orders = supervisor.Orders()
 
     def wait() -> None:
-        answers.append(supervisor._wait_while_drained(config, orders))
+        answers.append(supervisor.wait_while_drained(config, orders))
 
     thread = threading.Thread(target=wait)
     thread.start()
@@ -160,8 +160,8 @@ def test_a_drained_worker_that_is_started_again_waits_until_it_is_asked_back(
 def test_a_drained_worker_that_waits_ends_when_it_is_told_to(farm: Farm, tmp_path: Path) -> None:
     farm.registry.heartbeat()
     farm.drain("w1")
-    orders = supervisor._Orders(leave_at=1.0)
-    assert not supervisor._wait_while_drained(replace(farm.config, scratch=tmp_path), orders)
+    orders = supervisor.Orders(leave_at=1.0)
+    assert not supervisor.wait_while_drained(replace(farm.config, scratch=tmp_path), orders)
     assert farm.workers() == []
 
 

@@ -36,7 +36,7 @@ _log = logging.getLogger("pbrs.supervisor")
 _PREEMPT_S: Final = 20.0  # what giving everything back may take
 _POLL_S: Final = 0.2
 _SEEN_EVERY_S: Final = 10.0  # heartbeat of a worker that is finishing its tasks
-_DRAINED_POLL_S: Final = 5.0  # between two looks of a drained worker whether it is wanted again
+DRAINED_POLL_S: Final = 5.0  # between two looks of a drained worker whether it is wanted again
 _ASK_EVERY_S: Final = 10.0  # whether a job has work
 _STORE_S: Final = 5.0  # how long the store may take to say which it is
 # On scratch when a signal made the worker leave: deploy/slurm/worker.sbatch asks for it.
@@ -44,7 +44,7 @@ PREEMPTED_NOTE: Final = "preempted"
 
 
 @dataclass(slots=True)
-class _Orders:
+class Orders:
     """Requests by signals."""
 
     leave_at: float | None = None  # when leaving began
@@ -131,14 +131,14 @@ def supervise(
     job had work for this many seconds. preempted_code: the status instead of Celery's after a signal, for
     schedulers that treat 0 as the end.
     """
-    orders = _Orders()
+    orders = Orders()
     for number in (signal.SIGTERM, signal.SIGINT, signal.SIGQUIT):
         signal.signal(number, orders.on_signal)
     began = time.monotonic()
     seen_at = 0.0  # as one that leaves
     ledger = RedisLedger(config)
     registry, idleness = Registry(ledger), Idleness(ledger)
-    if not _wait_while_drained(config, orders):
+    if not wait_while_drained(config, orders):
         return 0
     # Celery's parent process never touches storage: name the store in its environment.
     celery = subprocess.Popen(
@@ -194,7 +194,7 @@ class Idleness:
         return now - self._since
 
 
-def _wait_while_drained(config: FarmConfig, orders: _Orders) -> bool:
+def wait_while_drained(config: FarmConfig, orders: Orders) -> bool:
     """Take no work while this worker is drained; False when a signal asks it to end meanwhile.
 
     A container that ends is started again by Compose or Kubernetes under the same name: it stays,
@@ -203,7 +203,7 @@ def _wait_while_drained(config: FarmConfig, orders: _Orders) -> bool:
     registry, due, is_logged = Registry(RedisLedger(config)), 0.0, False
     while orders.leave_at is None:
         if time.monotonic() >= due:
-            due = time.monotonic() + _DRAINED_POLL_S
+            due = time.monotonic() + DRAINED_POLL_S
             # The liveness probe must see a drained worker as alive.
             touch(config.heartbeat_file)
             try:
@@ -234,7 +234,7 @@ def _with_store_id(config: FarmConfig) -> FarmConfig:
 
 
 def _leave(
-    config: FarmConfig, celery: subprocess.Popen[bytes], orders: _Orders, since_s: float
+    config: FarmConfig, celery: subprocess.Popen[bytes], orders: Orders, since_s: float
 ) -> None:
     """The next step of the shutdown, each once."""
     # Name, seconds after leaving began, what to do.

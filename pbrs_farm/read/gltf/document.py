@@ -182,7 +182,7 @@ def placed_nodes(gltf: Gltf) -> Iterator[Placed]:
             text = f"more than {MAX_NODES} nodes or {MAX_DEPTH} levels"
             raise BadHouse(gltf.file, f"nodes[{top.index}]", text)
         node = entry(gltf, "nodes", top.index)
-        world = top.world_from_node @ _parent_from_node(gltf, node, top.index)
+        world = top.world_from_node @ parent_from_node(gltf, node, top.index)
         yield Placed(top.index, top.path, world)
         for child in reversed(_indices(gltf, node, f"nodes[{top.index}]", "children")):
             if child in top.path:
@@ -199,7 +199,7 @@ def _indices(gltf: Gltf, holder: dict[str, Any], place: str, key: str) -> list[i
     return value
 
 
-def _parent_from_node(gltf: Gltf, node: dict[str, Any], index: int) -> F64:
+def parent_from_node(gltf: Gltf, node: dict[str, Any], index: int) -> F64:
     place = f"nodes[{index}]"
     if not _MOVES & node.keys():
         return np.eye(4)

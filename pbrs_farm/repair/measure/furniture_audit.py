@@ -19,8 +19,8 @@ _SAME_M = 0.001  # maximum difference between boxes at the same place, metres
 _MIN_VOLUME_M3 = 1e-4  # a decilitre
 _MIN_SHARE = 0.01  # of the smaller piece
 _MAX_FACES = 60_000  # beyond it the boolean takes too long
-_MAX_PIECES = 2_000  # audited; a home has some hundred
-_MAX_PAIRS = 4_000  # of pieces whose boxes meet, intersected; a home has some hundred
+MAX_PIECES = 2_000  # audited; a home has some hundred
+MAX_PAIRS = 4_000  # of pieces whose boxes meet, intersected; a home has some hundred
 
 
 def furniture_audit(house: House) -> FurnitureAudit:
@@ -32,15 +32,15 @@ def furniture_audit(house: House) -> FurnitureAudit:
     remainder is counted.
     """
     everything = [i for i in house.items if _is_furniture(i)]
-    pieces = everything[:_MAX_PIECES]
+    pieces = everything[:MAX_PIECES]
     boxes = np.array([i.bounds for i in pieces]).reshape(-1, 2, 3)
-    pairs = list(islice(_pairs_of_boxes(boxes, -_SAME_M), _MAX_PAIRS + 1))
+    pairs = list(islice(_pairs_of_boxes(boxes, -_SAME_M), MAX_PAIRS + 1))
     return FurnitureAudit(
-        overlaps=tuple(_find_overlaps(pieces, boxes, pairs[:_MAX_PAIRS])),
+        overlaps=tuple(_find_overlaps(pieces, boxes, pairs[:MAX_PAIRS])),
         floating=tuple(_floating(house, pieces, boxes)),
-        duplicates=tuple(islice(_duplicates(pieces, boxes), _MAX_PAIRS)),
+        duplicates=tuple(islice(_duplicates(pieces, boxes), MAX_PAIRS)),
         n_unaudited=len(everything) - len(pieces),
-        n_unmeasured=len(pairs) - len(pairs[:_MAX_PAIRS]),
+        n_unmeasured=len(pairs) - len(pairs[:MAX_PAIRS]),
     )
 
 

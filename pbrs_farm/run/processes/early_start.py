@@ -16,7 +16,7 @@ FINISHING_HANDLER: Final = "pbrs_farm.run.run_task:make_finishing_handler"
 """Factory of the handler that makes houses and finishes views."""
 
 # Target -> a process that nobody has taken, and the folder of its log.
-_STARTED: Final[dict[str, tuple[ChildProcess, tempfile.TemporaryDirectory[str]]]] = {}
+STARTED: Final[dict[str, tuple[ChildProcess, tempfile.TemporaryDirectory[str]]]] = {}
 
 
 def start_early(target: str) -> None:
@@ -25,13 +25,13 @@ def start_early(target: str) -> None:
     Call it once per target, and `end_untaken` at the end of the caller.
     """
     folder = tempfile.TemporaryDirectory(prefix="pbrs-farm-")
-    _STARTED[target] = (ChildProcess(target, Path(folder.name) / "early.log"), folder)
+    STARTED[target] = (ChildProcess(target, Path(folder.name) / "early.log"), folder)
 
 
 def end_untaken() -> None:
     """End the processes that nobody has taken; they are gone afterwards."""
-    while _STARTED:
-        child, folder = _STARTED.popitem()[1]
+    while STARTED:
+        child, folder = STARTED.popitem()[1]
         child.kill()
         folder.cleanup()
 
@@ -41,9 +41,9 @@ def child_of(target: str, log: Path) -> ChildProcess:
 
     log: its log file from now on, in the file system of temporary files.
     """
-    if target not in _STARTED:
+    if target not in STARTED:
         return ChildProcess(target, log)
-    child, folder = _STARTED.pop(target)
+    child, folder = STARTED.pop(target)
     is_alive = child.exit_code() is None
     if is_alive:
         child.move_log(log)

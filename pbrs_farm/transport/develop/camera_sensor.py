@@ -133,7 +133,7 @@ def take_by_sensor(
     # Veiling glare is from the lens, so it precedes noise and saturation.
     light = apply_lens(add_veil(radiance.astype(np.float64) * exposure.factor, fields), sensor)
     light = light * float(gains.min())
-    raw = _electrons_read(mosaic(light) if sensor.mosaic else light, exposure.iso, sensor, rng)
+    raw = electrons_read(mosaic(light) if sensor.mosaic else light, exposure.iso, sensor, rng)
     rgb = demosaic(raw) if sensor.mosaic else raw
     # Balance white, hold to what saturates, and let that be the curve's end.
     balanced = np.clip(rgb * scaled, 0, sensor.headroom)
@@ -203,7 +203,7 @@ def demosaic(raw: F64) -> F64:
     return rgb
 
 
-def _electrons_read(light: F64, iso: float, sensor: SensorFields, rng: np.random.Generator) -> F64:
+def electrons_read(light: F64, iso: float, sensor: SensorFields, rng: np.random.Generator) -> F64:
     """Sensor values of light (1 = the tone's white): shot noise, read noise, saturation, quantization.
 
     Noise may make dark values negative.

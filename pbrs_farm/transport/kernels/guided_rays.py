@@ -48,7 +48,7 @@ CONE_SHARE: Final = 0.3  # of the guided rays, into cones
 MAX_REFLECTED: Final = 0.5  # of the scattered rays that meet thin glass near a lamp
 
 # Factor on path survival: 5 if the only relevant lamp is 1 m away, 100 within 22 cm.
-_MAX_BOOST, _BOOST_M2 = 100.0, 5.0
+MAX_BOOST, _BOOST_M2 = 100.0, 5.0
 
 # Guiding has its full share where lamps send a quarter of their light out by their interiors.
 _FULL_GUIDING: Final = 4.0
@@ -96,7 +96,7 @@ def survival_boost(near: NearbyLamps) -> Any:
 
     1 in views without guiding.
     """
-    boost = dr.clip(_BOOST_M2 * near.closeness, 1, _MAX_BOOST)
+    boost = dr.clip(_BOOST_M2 * near.closeness, 1, MAX_BOOST)
     return dr.select(near.is_guided, boost, 1)
 
 

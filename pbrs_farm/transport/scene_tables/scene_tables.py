@@ -35,7 +35,7 @@ UV0, DUV1, DUV2 = [3, 7], [11, 12], [13, 14]  # uv of the first corner, steps to
 NORMALS = slice(16, 19), slice(20, 23), slice(24, 27)  # of the corners
 FRONT_PDF, BACK_PDF, TARGET_EMITTER = 19, 23, 27  # filled by guiding; column 15 is free
 NO_LAMP: Final = 0xFFFF  # upper half of a face's tag that does not emit
-_FACES_AT_ONCE: Final = 1 << 13  # in the making of rows, against memory
+FACES_AT_ONCE: Final = 1 << 13  # in the making of rows, against memory
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,7 +75,7 @@ def tables_from_house(
     out, with a note. Raises BadHouse when no surface is left.
     """
     geometry = geometry_from_house(house, with_panes=False)
-    keep = _solid_faces(geometry)
+    keep = solid_faces(geometry)
     if not keep.any():
         raise BadHouse(house.source.file, house.id, "no surface that light could meet")
     n_left_out = int((~keep).sum())
@@ -133,7 +133,7 @@ def moved_rows(geometry: Geometry, tables: SceneTables, faces: I64) -> F32:
     return _face_rows(geometry, tables.faces[faces])
 
 
-def _solid_faces(geometry: Geometry) -> Bools:
+def solid_faces(geometry: Geometry) -> Bools:
     """(F,) bool: finite corners and an area that defines the face's plane."""
     keep = np.empty(len(geometry.faces), np.bool_)
     for part in _chunks_of_faces(len(keep)):
@@ -152,8 +152,8 @@ def _face_rows(geometry: Geometry, faces: I32) -> F32:
 
 def _chunks_of_faces(n_faces: int) -> Iterator[slice]:
     """Slices of n_faces that stay in the cache."""
-    for start in range(0, n_faces, _FACES_AT_ONCE):
-        yield slice(start, start + _FACES_AT_ONCE)
+    for start in range(0, n_faces, FACES_AT_ONCE):
+        yield slice(start, start + FACES_AT_ONCE)
 
 
 def _fill_rows(rows: F32, geometry: Geometry, faces: I32) -> None:

@@ -105,7 +105,7 @@ def test_too_many_nodes_are_refused_before_one_of_them_is_read(
 ) -> None:
     read_nodes: list[int] = []
     monkeypatch.setattr(
-        "pbrs_farm.read.gltf.document._parent_from_node",
+        "pbrs_farm.read.gltf.document.parent_from_node",
         lambda _gltf, _node, index: read_nodes.append(index) or np.eye(4),
     )
     many = [1] * (MAX_NODES + 1)

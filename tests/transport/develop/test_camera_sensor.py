@@ -10,11 +10,11 @@ import pytest
 from pbrs_farm.core.recipe import SensorFields, ToneFields, recipe_from_name
 from pbrs_farm.transport.develop.camera_sensor import (
     Exposure,
-    _electrons_read,
     apply_lens,
     choose_exposure,
     compress_as_jpeg,
     demosaic,
+    electrons_read,
     lag_exposure,
     mosaic,
     take_by_sensor,
@@ -143,7 +143,7 @@ def test_dark_pixels_are_right_in_the_mean_above_a_black_level() -> None:
     fields = PLAIN.model_copy(update={"read_noise_e": 12.0, "full_well_e": 1000.0, "headroom": 1.0})
     light = np.full((256, 256), 2 / 1000)
     kept, cut = (
-        _electrons_read(
+        electrons_read(
             light, 100.0, fields.model_copy(update={"black_level": b}), np.random.default_rng(1)
         )
         for b in (1 / 16, 0.0)

@@ -44,7 +44,7 @@ def tried(monkeypatch: pytest.MonkeyPatch) -> tuple[LightScene, Camera]:
     """The room, where even a small view has a trial."""
     from pbrs_farm.transport import pilot
 
-    monkeypatch.setattr(pilot, "_MIN_SAMPLES", 0)
+    monkeypatch.setattr(pilot, "MIN_SAMPLES", 0)
     house, camera = three_lamps()
     return LightScene.load(house, {}, RECIPE, SKY), camera
 

@@ -37,7 +37,7 @@ def loaded(room: tuple[House, Camera]) -> tuple[LightScene, Camera]:
 def unguided(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(guide, "MAX_SHARE", 0.0)
     monkeypatch.setattr(guide, "MIN_SHARE", 0.0)
-    monkeypatch.setattr(guide, "_MAX_BOOST", 1.0)
+    monkeypatch.setattr(guide, "MAX_BOOST", 1.0)
 
 
 @pytest.mark.long

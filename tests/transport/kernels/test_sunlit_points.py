@@ -217,8 +217,8 @@ def test_light_of_lamps_and_a_trial_beside_sunlit_points_leave_the_mean_alone(
     house, camera = hard_rooms.open_shade()
     camera, scene = camera.with_size(32, 24), sunny(house)
     by_chance = renders_by_chance(scene, camera, FIELDS)
-    monkeypatch.setattr(pilot, "_MIN_SAMPLES", 0)  # small pictures are tried, too
-    monkeypatch.setattr(pilot, "_GUIDING_COST", 0)  # and guided: the sun's noise would say no
+    monkeypatch.setattr(pilot, "MIN_SAMPLES", 0)  # small pictures are tried, too
+    monkeypatch.setattr(pilot, "GUIDING_COST", 0)  # and guided: the sun's noise would say no
     by_points = renders(scene, camera, range(10, 18))
     assert all(r.facts["guided"] for r in by_points)
     for group in Group:

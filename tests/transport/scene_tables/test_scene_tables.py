@@ -67,8 +67,8 @@ def test_rows_and_refused_faces_do_not_depend_on_the_part_they_are_made_in(
     rng = np.random.default_rng(3)
     g = geometry(rng.normal(0, 1, (300, 3)), rng.normal(0, 9, (300, 2)))
     g.positions[rng.integers(0, 300, 20)] = np.nan
-    whole = scene_tables._face_rows(g, g.faces), scene_tables._solid_faces(g)
-    monkeypatch.setattr(scene_tables, "_FACES_AT_ONCE", 7)
-    parts = scene_tables._face_rows(g, g.faces), scene_tables._solid_faces(g)
+    whole = scene_tables._face_rows(g, g.faces), scene_tables.solid_faces(g)
+    monkeypatch.setattr(scene_tables, "FACES_AT_ONCE", 7)
+    parts = scene_tables._face_rows(g, g.faces), scene_tables.solid_faces(g)
     assert [a.tobytes() for a in parts] == [a.tobytes() for a in whole]
     assert 0 < whole[1].sum() < 100
