@@ -77,7 +77,7 @@ def test_a_shard_that_is_none_is_refused(word: str) -> None:
         ("views = 3", "views = 0", r"rooms.toml \[part.views\]: views: expected 1 or more"),
         ("views = 3", 'views = "x"', r"rooms.toml \[part.views\]: views: expected a whole number"),
         ("frames = 12", "frames = 1", r"rooms.toml: part.walks: cameras.walk_frames: "),
-        ('"walk"', '"wlak"', r"rooms.toml \[part.walks\]: cameras: wlak is none of them.*walk"),
+        ('"walk"', '"wlak"', r"rooms.toml: part.walks: cameras.source: no source 'wlak'.*walk"),
         ('"albedo"', '"albdo"', r"rooms.toml: part.views: .*albdo: no such layer.*albedo"),
         ("light.spp=9", "light.sp=9", r"rooms.toml: part.views: light.sp: .*light.spp"),
         ('"made:1..6"', '"made:6..1"', r"rooms.toml: part.views: .*runs downwards"),
