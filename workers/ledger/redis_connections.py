@@ -17,9 +17,7 @@ from typing import Any, Final
 
 import redis
 
-ANSWER_S: Final = (
-    10  # Redis that sends nothing for so long is away; above the longest blocking read
-)
+ANSWER_S: Final = 10  # s without an answer after which Redis is away; above any blocking read
 
 # From Redis' own list (createSharedObjects of server.c, script.c, cluster.c): refusals that say nothing of the command.
 # Not in it: what stays wrong (NOAUTH, NOPERM, WRONGTYPE, MOVED) and what redis-py answers itself (NOSCRIPT).
