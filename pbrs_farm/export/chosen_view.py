@@ -1,4 +1,4 @@
-"""What of a view is exported, and at which size: its layers as bytes and arrays, its table.
+"""The exported part of a view: layers as bytes and arrays, and its table, at the size of the export.
 
 Effects: reads the view.
 """
@@ -30,15 +30,15 @@ from pbrs_farm.formats.output_folder import OutputHouse, ViewEntry
 from pbrs_farm.images import png_from_array
 from pbrs_farm.regular_files import fault_of, read_regular
 
-# The picture of a view is the first of these it has.
+# the picture of a view is the first of these that it has
 PICTURES: Final = (Mode.MLT_IL_OL, Mode.MLT_OL, Mode.OPENGL_IL, Mode.OPENGL_DL)
 
 _MODES: Final = tuple(str(mode) for mode in Mode)
-_RADIANCE: Final = "radiance"  # nine tenths of a view's bytes: only when it is named
+_RADIANCE: Final = "radiance"  # nine tenths of a view's bytes: exported only by name
 _Options = TypeVar("_Options", bound=Record)
 _NEEDED: Final = ("width_px", "height_px", "instances")  # of view.json, by every export
-_CLASSES: Final = "semantic"  # the layer that a user's own classes replace
-# Classes of NYU40 that are parts of the building; all others are objects.
+_CLASSES: Final = "semantic"  # the layer that a user's classes replace
+# classes of NYU40 for parts of the building; all others are objects
 _STRUCTURE: Final = ("wall", "floor", "ceiling", "door", "window", "otherstructure")
 
 
@@ -88,16 +88,16 @@ class Choice:
 
     @property
     def class_names(self) -> dict[int, str]:
-        """Id -> name of the classes that are exported, by id: NYU40's, or those of the user's table.
+        """Id -> name of the exported classes, by id: NYU40's, or those of the user's table.
 
-        Ids may have gaps; class 0, nothing, is not among them.
+        Ids may have gaps; class 0, nothing, is not included.
         """
         if self.classes is not None:
             return self.classes.names
         return {k: name for k, name in enumerate(NYU40_NAMES) if k}
 
     def is_structure(self, class_id: int) -> bool:
-        """Whether a class is a part of the building, no object."""
+        """True if a class is a part of the building."""
         if self.classes is not None:
             return class_id in self.classes.structure
         return NYU40_NAMES[class_id] in _STRUCTURE
@@ -105,14 +105,14 @@ class Choice:
 
 @dataclass(frozen=True, eq=False)
 class ChosenView:
-    """A view as it is exported."""
+    """A view of an export."""
 
     entry: ViewEntry
     choice: Choice
 
     @property
     def house(self) -> OutputHouse:
-        """Whose view it is."""
+        """The view's house."""
         return self.entry.house
 
     @property
@@ -127,20 +127,19 @@ class ChosenView:
 
     @property
     def layers(self) -> tuple[Layer, ...]:
-        """The layers that are exported and that the view has, in the order of core/layers.py."""
+        """The exported layers of the view, in the order of core/layers.py."""
         return tuple(layer for layer in LAYERS if self.has(layer.name))
 
     @property
     def picture(self) -> str | None:
         """The mode of the view's picture, None without any.
 
-        Of several modes the first of PICTURES that is chosen and there, so that an export has one
-        picture a view.
+        Of several modes the first chosen one of PICTURES, so that an export has one picture a view.
         """
         return next((str(mode) for mode in PICTURES if self.has(mode)), None)
 
     def has(self, name: str) -> bool:
-        """Whether a layer is exported and there."""
+        """True if a layer is exported and the view has it."""
         return self.choice.takes(name) and self.entry.file(LAYER[name].file) is not None
 
     @cached_property
@@ -169,16 +168,15 @@ class ChosenView:
 
     @property
     def facts_json(self) -> bytes:
-        """facts as a file: the stored one where nothing is resized and classes are NYU40's."""
+        """facts as a file: the stored one unless it is resized or has classes of the user."""
         if self.choice.size is None and self.choice.classes is None:
             return _view_file(self.entry.folder / "view.json")
         return json.dumps(self.facts, separators=(",", ":")).encode()
 
     def data(self, name: str) -> bytes:
-        """The layer's file: as stored where nothing is resized; classes of the user as uint16.
+        """The layer's file: the stored bytes unless it is resized; classes of the user as uint16.
 
-        Byte for byte the stored file where nothing changes, which keeps its hash. BadInput where it
-        is damaged or gone.
+        BadInput if it is damaged or missing.
         """
         if name == _CLASSES and self.choice.classes is not None:
             return png_from_array(self.array(name))
@@ -187,9 +185,9 @@ class ChosenView:
         return layer_bytes(name, self.array(name), self.house.attribution)
 
     def array(self, name: str) -> NDArray[Any]:
-        """The layer's array (H, W) or (H, W, 3), also where it is not exported itself; BadInput.
+        """The layer's array (H, W) or (H, W, 3), exported or not; BadInput if it is missing.
 
-        "semantic" holds the user's classes (uint16) where there are such.
+        "semantic" holds the user's classes (uint16), if given.
         """
         if name == _CLASSES and self.choice.classes is not None:
             return self.choice.classes.label(self.array("instance"), self.facts["instances"])
@@ -225,28 +223,28 @@ def intrinsics_of(facts: dict[str, Any]) -> Intrinsics:
 
 
 def require_lens(view: ChosenView, form: str, *models: str) -> None:
-    """Raise BadInput for a view through a lens that a form has no words for.
+    """Raise BadInput for a view through a lens that a form cannot describe.
 
-    form: its name, for the message. models: lens models it knows beside "pinhole".
+    form: its name, for the message. models: supported lens models beside "pinhole".
     """
     model = view.facts.get("lens", {}).get("model", "pinhole")
     if model not in ("pinhole", *models):
-        what = f"lens.model {model}: this form knows {', '.join(('pinhole', *models))}"
-        raise BadInput(f"--to {form}", view.id, what, hint="another --to")
+        text = f"lens.model {model}: this form knows {', '.join(('pinhole', *models))}"
+        raise BadInput(f"--to {form}", view.id, text, hint="another --to")
 
 
 def k_of_whole_centres(k: list[list[float]]) -> list[list[float]]:
     """K (3 x 3) for pixels whose centres are whole numbers: the principal point moves by half a pixel.
 
-    Ours have centres at +0.5. For forms whose readers count pixels from their centres, as BOP's and
-    KITTI's; docs/formats/export.md has the convention of each form.
+    For forms whose readers count pixels from their centres, as BOP's and KITTI's; docs/formats/export.md
+    has the convention of each form.
     """
     (fx, skew, cx), (_zero, fy, cy), last = k
     return [[fx, skew, cx - 0.5], [0.0, fy, cy - 0.5], list(last)]
 
 
 def depth_within_png(view: ChosenView) -> NDArray[np.uint16]:
-    """(H, W) uint16 mm, 0 where there is nothing and where depth.png says 65.535 m or more.
+    """(H, W) uint16 mm, 0 for nothing and for 65.535 m or more.
 
     For forms whose readers take every value above 0 for a measured one.
     """
@@ -255,7 +253,7 @@ def depth_within_png(view: ChosenView) -> NDArray[np.uint16]:
 
 
 def opengl_normals(view: ChosenView, layer: str = "normal") -> NDArray[np.float32]:
-    """(H, W, 3) unit normals, camera x right, y up, z backward; (0, 0, 0) where there is none.
+    """(H, W, 3) unit normals, camera x right, y up, z backward; (0, 0, 0) for nothing.
 
     layer: "normal" or "normal_shading".
     """
@@ -267,16 +265,16 @@ def opengl_normals(view: ChosenView, layer: str = "normal") -> NDArray[np.float3
 
 
 def camera_facts(facts: dict[str, Any]) -> dict[str, Any]:
-    """A view's camera as an export repeats it: K, its lens where it is no pin-hole, its pose."""
+    """A view's camera in an export: K, its lens unless it is a pin-hole, its pose."""
     names = ("K", "lens", "depth", "world_from_camera_opencv")
     return {name: facts[name] for name in names if name in facts}
 
 
 def resize_layer(name: str, array: NDArray[Any], width: int, height: int) -> NDArray[Any]:
-    """A layer on another grid: as the table of layers says (Layer.resized).
+    """A layer on another grid, by the rule of the table of layers (Layer.resized).
 
-    name is that of core/layers.py, array (H, W, ...) as stored; values in px, as disparity and
-    flow, are scaled with the grid. Lines stay whole, the stronger value over the weaker one.
+    name: of core/layers.py; array: (H, W, ...) as stored. Values in px, as disparity and flow, are scaled
+    with the grid. Lines keep their continuity, and the stronger value wins.
     """
     layer = LAYER[name]
     if layer.resized == "area":
@@ -285,7 +283,6 @@ def resize_layer(name: str, array: NDArray[Any], width: int, height: int) -> NDA
         return _with_scaled_pixels(layer, resized_nearest(array, width, height), array.shape)
     if layer.resized == "nearest":
         return resized_nearest(array, width, height)
-    # A line's stronger value wins.
     lines = np.zeros((height, width), np.uint8)
     for value in np.unique(array[array > 0]):
         lines[resized_any(array == value, width, height)] = value
@@ -309,18 +306,18 @@ def _with_scaled_pixels(
 
 
 def _instances_in(instance: NDArray[Any], rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """The rows of those instances that the map (H, W) still shows, with their pixels and boxes."""
-    seen = []
+    """The rows of the instances in a map (H, W), with their pixels and boxes."""
+    visible = []
     for row in rows:
         mask = instance == row["id"]
         if not mask.any():
             continue
-        # Rows and columns that hold a pixel of it: their ends are the box, its high end exclusive.
+        # The box spans its rows and columns, the high end exclusive.
         y, x = np.nonzero(mask.any(1))[0], np.nonzero(mask.any(0))[0]
         box = [int(x[0]), int(y[0]), int(x[-1]) + 1, int(y[-1]) + 1]
         pixels = int(mask.sum())
-        seen.append(row | {"pixels": pixels, "fraction": pixels / mask.size, "box2d": box})
-    return seen
+        visible.append(row | {"pixels": pixels, "fraction": pixels / mask.size, "box2d": box})
+    return visible
 
 
 def _layout_row_at_size(row: dict[str, Any], x: float, y: float) -> dict[str, Any]:

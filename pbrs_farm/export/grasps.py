@@ -1,8 +1,7 @@
-"""Where two fingers can hold a home's small things: antipodal pairs of contacts; no effects.
+"""Grasps of small items for two fingers: antipodal pairs of contacts; no effects.
 
-A pair lies on one line through the thing, at its outermost places, and the line is within the cones
-of friction of both (Nguyen, Constructing force-closure grasps, 1988). Whether a hand gets there, past
-what stands around, is not asked.
+A pair is the outermost two points on a line through the item, and the line is within the cones of
+friction of both (Nguyen, Constructing force-closure grasps, 1988). Obstacles around the item are ignored.
 """
 
 from __future__ import annotations
@@ -22,19 +21,19 @@ from pbrs_farm.export.home_pieces import ExportedHome, Piece
 from pbrs_farm.geometry.surface_points import spread_points
 
 GRASPS: Final = "grasps.json"
-LARGEST_M: Final = 0.12  # of the second largest side of a thing, and of what fingers span
+LARGEST_M: Final = 0.12  # maximum of an item's second largest side, and of the fingers' span
 FRICTION: Final = 0.3
 _LEAST_M: Final = 0.002  # between fingers
-_MOST: Final = 32  # pairs of a thing
+_MOST: Final = 32  # maximum pairs of an item
 _TRIES: Final = 256
 _SPACING_M: Final = 0.004
-_PAIRS: Final = 2_000_000  # of line and triangle at once: bounds memory
+_PAIRS: Final = 2_000_000  # maximum pairs of line and triangle in memory
 _EDGE: Final = 1e-9
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Grasps:
-    """Pairs of contacts on a thing, metres."""
+    """Pairs of contacts on an item, metres."""
 
     points: F64  # (N, 2, 3)
     normals: F64  # (N, 2, 3) unit, outwards
@@ -46,10 +45,10 @@ class Grasps:
 
 
 def antipodal_pairs(triangles: F64, seed: int, *, most: int = _MOST) -> Grasps:
-    """Pairs of contacts by which two fingers hold a mesh (F, 3, 3), no more than 12 cm apart.
+    """Pairs of contacts by which two fingers hold a mesh (F, 3, 3), at most 12 cm apart.
 
-    From places drawn by the seed a line goes along the normal, or near it; its outermost crossings are
-    the pair.
+    Lines start at points drawn by the seed, along the normal or near it; the outermost crossings of a line
+    are a pair.
     """
     points, which = spread_points(triangles, _SPACING_M)
     if not len(points):
@@ -58,7 +57,7 @@ def antipodal_pairs(triangles: F64, seed: int, *, most: int = _MOST) -> Grasps:
     drawn = rng.permutation(len(points))[:_TRIES]
     normals = unit_normals(triangles)
     along = normals[which[drawn]]
-    # Every other line leans, within the cone of friction: what tapers is held so.
+    # Tilt every other line within the cone of friction, for tapered items.
     aside = np.cross(along, rng.normal(size=along.shape))
     aside /= np.maximum(lengths(aside), 1e-12)[:, None]
     along = along + (np.arange(len(along)) % 2 * FRICTION * rng.random(len(along)))[:, None] * aside
@@ -66,17 +65,17 @@ def antipodal_pairs(triangles: F64, seed: int, *, most: int = _MOST) -> Grasps:
     ways, faces = _outermost(points[drawn], along, triangles)
     width = ways[:, 1] - ways[:, 0]
     cosine = (normals[faces] * along[:, None]).sum(2)
-    # Outwards is away from the other contact, however a stranger's faces are wound.
+    # Outwards is away from the second contact, whatever the winding of the faces.
     outwards = normals[faces] * (np.sign(cosine) * [-1.0, 1.0])[..., None]
     holds = (np.abs(cosine) >= np.cos(np.arctan(FRICTION))).all(1)
     holds &= (width > _LEAST_M) & (width <= LARGEST_M)
-    kept = np.flatnonzero(holds)[:most]
-    pairs = points[drawn][kept, None] + ways[kept, :, None] * along[kept, None]
-    return Grasps(pairs, outwards[kept])
+    chosen = np.flatnonzero(holds)[:most]
+    pairs = points[drawn][chosen, None] + ways[chosen, :, None] * along[chosen, None]
+    return Grasps(pairs, outwards[chosen])
 
 
 def _outermost(points: F64, along: F64, triangles: F64) -> tuple[F64, I64]:
-    """(N, 2) metres from points along lines to the first and last triangle that they cross, and which."""
+    """(N, 2) metres from points along lines to the first and last crossed triangle, and their numbers."""
     a, u, v = triangles[:, 0], triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
     ways, faces = np.zeros((len(points), 2)), np.zeros((len(points), 2), np.int64)
     step = max(1, _PAIRS // len(triangles))
@@ -100,22 +99,22 @@ def _outermost(points: F64, along: F64, triangles: F64) -> tuple[F64, I64]:
 
 
 def grasps_json(home: ExportedHome, up: str) -> bytes:
-    """Pairs of every loose thing whose second largest side is below 12 cm, in its own frame.
+    """Pairs of every loose item whose second largest side is below 12 cm, in its frame.
 
-    up: "z" or "y", the axis that is up in the things' frames; the origin is the middle of the bottom
-    of a thing's box.
+    up: "z" or "y", the up axis of the items' frames; the origin is the middle of the bottom of an item's
+    box.
     """
     things = {}
     for piece in home.things:
         if piece.surfaces and not piece.is_fixed and np.sort(piece.size)[1] < LARGEST_M:
             things[piece.name] = _row(piece, up)
-    told = {"unit": "metres", "up": up, "friction": FRICTION, "things": things}
-    return json.dumps(told, indent=1, allow_nan=False).encode()
+    document = {"unit": "metres", "up": up, "friction": FRICTION, "things": things}
+    return json.dumps(document, indent=1, allow_nan=False).encode()
 
 
 def _row(piece: Piece, up: str) -> dict[str, Any]:
     triangles = corners_of_surfaces(piece.surfaces)
-    found = antipodal_pairs(triangles, keys.seed("grasps", piece.class_name))
+    grasps = antipodal_pairs(triangles, keys.seed("grasps", piece.class_name))
     turned = (lambda x: x) if up == "y" else z_up_points
     rows = [
         {
@@ -123,6 +122,8 @@ def _row(piece: Piece, up: str) -> dict[str, Any]:
             "normals": turned(normals).round(4).tolist(),
             "width_m": round(float(width), 5),
         }
-        for points, normals, width in zip(found.points, found.normals, found.widths_m, strict=True)
+        for points, normals, width in zip(
+            grasps.points, grasps.normals, grasps.widths_m, strict=True
+        )
     ]
     return {"class": piece.class_name, "grasps": rows}

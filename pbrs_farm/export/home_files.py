@@ -49,7 +49,7 @@ def convex_obj(points: F64) -> bytes:
 
 
 def digest_name(data: bytes) -> str:
-    """A name for a file by its content, so that equal things are written once.
+    """A name for a file by its content, so that equal meshes are written once.
 
     16 hex digits: enough for the pieces of one export, no proof of equality.
     """

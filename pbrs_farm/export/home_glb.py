@@ -39,7 +39,7 @@ def glb_of_pieces(
     item's name, so that equal things have equal bytes.
     """
     writer = GlbWriter()
-    # Number the materials and textures that are used.
+    # Number the used materials and textures.
     used = sorted({s.material for p in pieces for s in p.surfaces})
     number = {old: new for new, old in enumerate(used)}
     materials = [house.materials[k] for k in used]

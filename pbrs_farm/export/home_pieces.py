@@ -1,7 +1,7 @@
-"""A home as the forms of homes write it: its items as pieces; no effects.
+"""A home for the forms of homes: its items as pieces; no effects.
 
-Each piece has meshes in a frame of its own, a class, collision parts, mass, lamps and a name that
-files can have; the home says which floor can be walked.
+Each piece has a frame, meshes, a class, collision parts, mass, lamps and a name that is valid in files;
+the home has the outlines of its walkable floor.
 """
 
 from __future__ import annotations
@@ -29,15 +29,15 @@ from pbrs_farm.geometry.surface_points import surface_points
 COLLISION: Final = "convex parts within 5 mm, no more than 32"
 COLLIDES: Final = f"things collide as {COLLISION}"
 _MOST_KG: Final = 150.0
-_LARGE_M: Final = 0.5  # what opens and is larger stands still
-_RESTING_M: Final = 0.03  # between a thing and what it stands on
-_FOOT_M: Final = 0.01  # what of a thing is no higher is its feet
+_LARGE_M: Final = 0.5  # maximum size of a loose piece that opens
+_RESTING_M: Final = 0.03  # maximum gap between an item and its support
+_FOOT_M: Final = 0.01  # height of an item's feet
 WALKER_M: Final = 0.2  # radius of what moves on the navigable floor
-_HEAD_M: Final = 1.6  # the height of the walker: what hangs higher is walked under
-_STEP_M: Final = 0.05  # what is lower is stepped over: rugs
-_BORNE: Final = 0.25  # of its feet, of what stands on something
+_HEAD_M: Final = 1.6  # height of the walker
+_STEP_M: Final = 0.05  # maximum height of a step, as over rugs
+_BORNE: Final = 0.25  # minimum supported share of an item's feet
 
-# Kinds that are the building: they stand still and are met as they are.
+# kinds of the building: static, with their own mesh as collider
 BUILDING: Final = (
     ItemKind.WALL,
     ItemKind.FLOOR,
@@ -47,7 +47,7 @@ BUILDING: Final = (
     ItemKind.WINDOW,
     ItemKind.STAIRS,
 )
-# Classes that are screwed to the building.
+# classes fixed to the building
 # fmt: off
 _FIXED: Final = frozenset({
     classes.NYU40_NAMES.index(name)
@@ -61,10 +61,10 @@ _FIXED: Final = frozenset({
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Lamp:
-    """A light source of an item as other programs know one."""
+    """A light source of an item, for other programs."""
 
     position: F64  # (3,) world, metres
-    flux_lm: float  # what leaves the lamp
+    flux_lm: float  # leaving the lamp
     rgb_linear: tuple[float, float, float]  # largest 1
     radius_m: float
     is_coloured: bool  # the source gives a colour, even if it is white
@@ -82,8 +82,7 @@ class Lamp:
     def candela(self) -> float:
         """The intensity of a point, or within the cone of a spot.
 
-        As if the flux were even over the sphere, or over the cone of half angle `spot[1]`: glTF and
-        USD want an intensity, not a flux.
+        The flux is taken as even over the sphere, or over the cone of half angle `spot[1]`.
         """
         cutoff = self.spot[1] if self.spot else np.pi
         return float(self.flux_lm / (2 * np.pi * (1 - np.cos(cutoff))))
@@ -91,9 +90,9 @@ class Lamp:
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """An item in a frame of its own: the middle of its box's bottom, axes of its box (right-handed).
+    """An item in a local frame: the middle of its box's bottom, axes of its box (right-handed).
 
-    The frame of walls, floors and ceilings is the world's, so that no bit of them moves.
+    The frame of walls, floors and ceilings is the world's, so that their coordinates stay exact.
     """
 
     item: Item
@@ -102,7 +101,7 @@ class Piece:
     world_from_local: F64  # (4, 4) rigid
     surfaces: tuple[Surface, ...]  # local
     size: F64  # (3,) of its box, metres
-    is_fixed: bool  # part of the building, screwed to it, hung in the air, or without a thing below
+    is_fixed: bool  # part of the building, fixed to it, floating, or without support
     lamps: tuple[Lamp, ...]
     materials: tuple[Material, ...]  # of its house
 
@@ -154,7 +153,7 @@ class Piece:
 
 @dataclass(frozen=True, eq=False)
 class ExportedHome:
-    """A home as the forms write it."""
+    """A home in the frames of its items."""
 
     house: House
     pieces: tuple[Piece, ...]  # an item each, in the house's order
@@ -166,7 +165,7 @@ class ExportedHome:
 
     @property
     def things(self) -> tuple[Piece, ...]:
-        """Everything else that has a surface or a lamp."""
+        """All other pieces with a surface or a lamp."""
         return tuple(p for p in self.pieces if not p.is_building and (p.surfaces or p.lamps))
 
     @cached_property
@@ -176,27 +175,25 @@ class ExportedHome:
 
     @cached_property
     def navigable(self) -> dict[str, list[F64]]:
-        """Room id -> outlines (N, 2) in plan of the floor where a disc of WALKER_M can stand.
+        """Room id -> outlines (N, 2) in plan of the floor that is free for a disc of WALKER_M.
 
-        Metres, world x and z. Only outer outlines: what a ring encloses, as a table in the middle
-        of a room, is not cut out. A room without a place to stand has []. Things count by their
-        boxes, and doors do not join rooms here.
+        Metres, world x and z. Outer outlines only, without holes for a table in the middle of a room. A room
+        without free floor has []. Obstacles are boxes of items, and doors do not join rooms.
         """
         return {room.id: _walkable(room, self.pieces) for room in self.house.rooms}
 
     @property
     def credit(self) -> str:
-        """The line that the home's source asks every product to carry, or its author and licence."""
+        """The attribution that the home's source asks for, or its author and licence."""
         source = self.house.source
         return source.attribution or ", ".join(x for x in (source.author, source.licence) if x)
 
 
 def exported_home(house: House) -> ExportedHome:
-    """The home in the frames of its items, without what lies before its windows or was removed.
+    """The home in the frames of its items, without the outdoors and removed items.
 
-    Each item becomes a piece: its meshes in a frame of its own, a name that is unique and that files
-    can have, lamps in lumen, and whether it stands still. Collision parts, masses and the walkable
-    floor are computed when they are asked for.
+    Each item becomes a piece: local meshes, a unique name that is valid in files, lamps in lumen, fixed or
+    loose. Collision parts, masses and the walkable floor are computed at first use.
     """
     numbered = [
         (number, item)
@@ -206,25 +203,25 @@ def exported_home(house: House) -> ExportedHome:
     house = replace(house, items=tuple(item for _number, item in numbered))
     names = _unique_names(house.items)
     scene = SceneTriangles(house.items)
-    found = [
+    pieces = [
         _piece(item, house.materials, number, name, _rests(scene, k))
         for k, ((number, item), name) in enumerate(zip(numbered, names, strict=True))
     ]
-    return ExportedHome(house, tuple(found))
+    return ExportedHome(house, tuple(pieces))
 
 
 def _unique_names(items: Iterable[Item]) -> list[str]:
-    """A name for each item that every file system and every scene format takes."""
+    """A name for each item that is valid in all file systems and scene formats."""
     taken: set[str] = set()
-    found = []
+    names = []
     for item in items:
         word = re.sub(r"[^A-Za-z0-9]+", "_", item.name)[:40].strip("_") or item.kind.value
         name, k = (word if word[0].isalpha() else f"item_{word}"), 2
         while name.lower() in taken:
             name, k = f"{word}_{k}" if word[0].isalpha() else f"item_{word}_{k}", k + 1
         taken.add(name.lower())
-        found.append(name)
-    return found
+        names.append(name)
+    return names
 
 
 def _piece(
@@ -280,10 +277,10 @@ def _lamp(light: LightPart) -> Lamp:
 
 
 def _rests(scene: SceneTriangles, index: int) -> bool:
-    """Whether an item stands on what is truly below it: a floor, a top, a shelf, the bottom of a drawer.
+    """True if an item has a support: a floor, a top, a shelf, the bottom of a drawer.
 
-    What bears it lies within 3 cm below or above its lowest places, below a quarter of them, and on
-    both sides of its middle along x or along z.
+    The support is within 3 cm of its feet in height, below a quarter of them, and on both sides of its
+    middle along x or along z.
     """
     corners = scene.of_item(index)
     if not len(corners):
@@ -324,7 +321,7 @@ def _walkable(room: Room, pieces: Sequence[Piece]) -> list[F64]:
 
 
 def rooms_json(house: House) -> list[dict[str, Any]]:
-    """The rooms as the room file of a glTF scene has them."""
+    """The rooms in the form of the room file of a glTF scene."""
     return [
         {
             "name": room.name,

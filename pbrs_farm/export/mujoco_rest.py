@@ -1,7 +1,7 @@
-"""Where the loose bodies of a MuJoCo model come to rest: parted where they stand in each other, then let fall; no effects.
+"""Rest poses of the loose bodies of a MuJoCo model: overlapping bodies are moved apart, then all fall; no effects.
 
-A home's furniture may stand in each other by centimetres (a chair's leg in a table's): a simulation
-would throw such bodies about. Those are moved apart first, by as little as frees them.
+Furniture of a home may overlap by centimetres (a chair's leg and a table's), and a simulation would throw
+such bodies about. They are moved apart first, by the smallest distance that frees them.
 """
 
 from __future__ import annotations
@@ -14,32 +14,32 @@ import numpy as np
 
 from pbrs_farm.core.arrays import F64, Bools
 
-_DEEP_M: Final = 2e-3  # two bodies that penetrate deeper are moved apart
-_FREE_M: Final = 5e-4  # that a moved body may still penetrate
-_WAYS_M: Final = (0.005, 0.01, *np.arange(0.02, 0.16, 0.02))  # by which a body is moved
+_DEEP_M: Final = 2e-3  # maximum penetration of bodies that are not moved apart
+_FREE_M: Final = 5e-4  # maximum penetration of a moved body
+_WAYS_M: Final = (0.005, 0.01, *np.arange(0.02, 0.16, 0.02))  # distances by which a body is moved
 _MOST_PARTED: Final = 60
-_FALL_S: Final = 4.0  # that bodies have to come to rest
-_SLOW_S: Final = 0.6  # at first they sink slowly, so that what hovers does not jump
+_FALL_S: Final = 4.0  # time for coming to rest
+_SLOW_S: Final = 0.6  # time of slow sinking at first, so that hovering bodies do not jump
 _SLOW: Final = (0.2, 0.7)  # m/s, rad/s
 _LOOK_S: Final = 2.0
-_STILL_M: Final = 5e-4  # that a body at rest moves in _LOOK_S
-_LOST_M: Final = 0.25  # a body that goes farther had nothing to stand on
+_STILL_M: Final = 5e-4  # maximum motion of a body at rest in _LOOK_S
+_LOST_M: Final = 0.25  # maximum way of a body with a support
 _TIPPED_RAD: Final = 0.35
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rest:
-    """Where bodies are, and which of them found no rest."""
+    """Poses of bodies, and which of them found no rest."""
 
     poses: F64  # (N, 7) place and quaternion (w, x, y, z) of each body
     restless: Bools  # (N,)
 
 
 def rest_of(world: Any, names: Sequence[str], areas_m2: Sequence[float]) -> Rest:
-    """Where the free bodies of a model (an mjModel) come to rest.
+    """The rest poses of the free bodies of a model (an mjModel).
 
-    names: of their free joints. areas_m2: in plan; of two that stand in each other the smaller moves.
-    Restless is what stays in another body, still moves after 4 s, tips over or goes 25 cm.
+    names: of their free joints. areas_m2: in plan; of two overlapping bodies the smaller moves. A body is
+    restless if it stays in another one, still moves after 4 s, tips over or goes 25 cm.
     """
     from pbrs_farm.quiet_mujoco import mujoco
 
@@ -62,17 +62,14 @@ def rest_of(world: Any, names: Sequence[str], areas_m2: Sequence[float]) -> Rest
 
 
 def _poses(world: Any, state: Any, names: Sequence[str]) -> F64:
-    at = [int(world.joint(name).qposadr[0]) for name in names]
-    return np.array([state.qpos[k : k + 7] for k in at], np.float64).reshape(-1, 7)
-
-
-# Parting
+    starts = [int(world.joint(name).qposadr[0]) for name in names]
+    return np.array([state.qpos[k : k + 7] for k in starts], np.float64).reshape(-1, 7)
 
 
 def _move_apart(
     mujoco: Any, world: Any, state: Any, names: Sequence[str], areas_m2: Sequence[float]
 ) -> Bools:
-    """Move bodies until none stands in another; which of them no small move frees."""
+    """Move bodies until none overlap; returns the bodies that no small move frees."""
     body_of = {int(world.body(name).id): k for k, name in enumerate(names)}
     stuck = np.zeros(len(names), bool)
     for _ in range(_MOST_PARTED):
@@ -91,43 +88,40 @@ def _move_apart(
 
 
 def _depths(world: Any, state: Any) -> dict[tuple[int, int], float]:
-    """How deep the bodies of each pair that meets penetrate, metres."""
-    found: dict[tuple[int, int], float] = {}
+    """Penetration of the bodies of each touching pair, metres."""
+    depths: dict[tuple[int, int], float] = {}
     contact = state.contact
     for geoms, distance in zip(contact.geom, contact.dist, strict=True):
         low, high = sorted(int(world.geom_bodyid[g]) for g in geoms)
-        found[(low, high)] = max(found.get((low, high), 0.0), -float(distance))
-    return found
+        depths[(low, high)] = max(depths.get((low, high), 0.0), -float(distance))
+    return depths
 
 
 def _freed(mujoco: Any, world: Any, state: Any, name: str) -> bool:
-    """Move a body by the least way, level or up, on which it meets nothing; whether there is one."""
-    at, body = int(world.joint(name).qposadr[0]), int(world.body(name).id)
-    home = state.qpos[at : at + 3].copy()
+    """Move a body by the shortest way, level or up, to a free place; True if there is one."""
+    start, body = int(world.joint(name).qposadr[0]), int(world.body(name).id)
+    home = state.qpos[start : start + 3].copy()
     angles = np.arange(8) * np.pi / 4
     ways = [np.array([np.cos(a), np.sin(a), 0.0]) for a in angles] + [np.array([0.0, 0.0, 1.0])]
     for length in _WAYS_M:
         for way in ways:
-            state.qpos[at : at + 3] = home + length * way
+            state.qpos[start : start + 3] = home + length * way
             mujoco.mj_kinematics(world, state)
             mujoco.mj_collision(world, state)
             depths = _depths(world, state)
             if max((d for pair, d in depths.items() if body in pair), default=0.0) < _FREE_M:
                 return True
-    state.qpos[at : at + 3] = home
+    state.qpos[start : start + 3] = home
     mujoco.mj_kinematics(world, state)
     mujoco.mj_collision(world, state)
     return False
 
 
-# Falling
-
-
 def _fall(mujoco: Any, world: Any, state: Any) -> None:
-    """Step until all lie still."""
+    """Step until all bodies are at rest."""
     sleep = getattr(mujoco.mjtEnableBit, "mjENBL_SLEEP", None)
     if sleep is not None:
-        world.opt.enableflags |= int(sleep)  # what lies still costs nothing
+        world.opt.enableflags |= int(sleep)  # resting bodies cost nothing
     is_free = world.jnt_type == mujoco.mjtJoint.mjJNT_FREE
     first = world.jnt_dofadr[is_free]
     steps, slow = (int(s / world.opt.timestep) for s in (_FALL_S, _SLOW_S))

@@ -1,4 +1,4 @@
-"""What the things of a view are called in plain English, counted and listed; no effects."""
+"""Nouns for the items of a view in plain English, counted and listed; no effects."""
 
 from __future__ import annotations
 

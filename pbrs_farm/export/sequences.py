@@ -43,7 +43,7 @@ class SequenceFrame:
 
 
 def frames_by_house(views: Sequence[ChosenView]) -> dict[str, list[SequenceFrame]]:
-    """House id -> its moments: frames by number, then views that are no frames by id.
+    """House id -> its moments: frames by number, then other views by id.
 
     Views of other cameras of a rig are put beside its first one's; such a view alone is left out.
     """
@@ -72,7 +72,7 @@ def pose_opencv(view: ChosenView) -> F64:
 
 
 def required_picture(view: ChosenView, form: str) -> str:
-    """The mode of the view's picture; BadInput where it has none.
+    """The mode of the view's picture; BadInput if there is no picture.
 
     form is the name that the message uses.
     """

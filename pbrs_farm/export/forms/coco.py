@@ -24,7 +24,7 @@ def write_coco(views: list[ChosenView], out: Path, choice: Choice) -> None:
     """annotations.json, images/<house>/<view>.png and the panoptic form.
 
     Categories are NYU40's, or those of choice.classes; an instance without a class is left out. Masks are compressed run
-    lengths (as pycocotools reads them), iscrowd 0. Fields of our own: house, view, K, lens and
+    lengths (as pycocotools reads them), iscrowd 0. Additional fields: house, view, K, lens and
     depth (where no pin-hole), world_from_camera_opencv, instance_id, visible_fraction, truncated.
     """
     images: list[dict[str, Any]] = []
@@ -107,7 +107,7 @@ def _write_panoptic(
     """panoptic.json and panoptic/<house>/<view>.png.
 
     images, categories: those of the instances, view by view. A segment is an instance with a class,
-    its id the instance's, in a pixel R + 256 G + 65536 B; what has no class is 0.
+    its id the instance's, in a pixel R + 256 G + 65536 B; pixels without a class are 0.
     """
     annotations = []
     for view, image in zip(views, images, strict=True):

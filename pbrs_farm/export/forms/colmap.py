@@ -15,7 +15,7 @@ from pbrs_farm.export.form import Convention, ViewForm
 from pbrs_farm.export.sequences import pose_opencv, required_picture
 
 _STEP_PX: Final = 16  # between the pixels of a view that give points
-_NO_POINT: Final = ("0.5 0.5 -1",)  # what a view sees that sees no surface: a pixel of no point
+_NO_POINT: Final = ("0.5 0.5 -1",)  # points of a view without a surface: a pixel of no point
 
 
 def write_colmap(views: list[ChosenView], out: Path, _choice: Choice) -> None:
@@ -36,13 +36,13 @@ def write_colmap(views: list[ChosenView], out: Path, _choice: Choice) -> None:
         for number, view in enumerate(own, start=1):
             picture = required_picture(view, "colmap")
             (out / house / "images" / f"{view.id}.png").write_bytes(view.data(picture))
-            # Cameras of a rig are sensors of their own, also where they are alike.
+            # Each camera of a rig is a sensor, even if two are alike.
             key = view.shot.eye, _camera_line(view)
             camera = cameras.setdefault(key, len(cameras) + 1)
             sensors.append(camera)
             pixels, lines = _points_of(view, picture)
-            # A line of its pose and one of what it sees. That is never empty, as COLMAP would allow:
-            # readers of gsplat and pycolmap take a line without a word for the end of the file.
+            # A line of its pose and one of its points. COLMAP allows an empty one, but readers of gsplat
+            # and pycolmap take it for the end of the file.
             first = len(points) + 1
             seen = [f"{x:g} {y:g} {n}" for n, (x, y) in enumerate(pixels, start=first)]
             line = " ".join(seen or _NO_POINT)
@@ -114,7 +114,7 @@ def _motion_words(motion: F64) -> str:
 
 
 def _points_of(view: ChosenView, picture: str) -> tuple[list[list[float]], list[str]]:
-    """Of a grid of the view's pixels: where each lies in the picture, and its `x y z r g b`."""
+    """The pixels (x, y) of a grid over the view, and the line `x y z r g b` of each."""
     depth, rgb = view.array("depth"), view.array(picture)
     height, width = depth.shape
     grid = np.mgrid[_STEP_PX // 2 : height : _STEP_PX, _STEP_PX // 2 : width : _STEP_PX]
@@ -127,8 +127,8 @@ def _points_of(view: ChosenView, picture: str) -> tuple[list[list[float]], list[
     pose = pose_opencv(view)
     world = local @ pose[:3, :3].T + pose[:3, 3]
     colours = rgb[rows, columns]
-    found: list[list[float]] = pixels.tolist()
-    return found, [
+    rows_of_pixels: list[list[float]] = pixels.tolist()
+    return rows_of_pixels, [
         f"{x:.4f} {y:.4f} {z:.4f} {r} {g} {b}"
         for (x, y, z), (r, g, b) in zip(world.tolist(), colours.tolist(), strict=True)
     ]

@@ -78,7 +78,7 @@ def _blenderproc_normals(png: NDArray[Any], valid: NDArray[np.bool_]) -> NDArray
     # Published axes are x right, y forward, z up; OpenGL's are x right, y up, z backward.
     published = png * np.float32(2 / 65535) - np.float32(1)
     opengl = np.stack([published[..., 0], published[..., 2], -published[..., 1]], axis=-1)
-    # Bring -1..1 to 0..1, and what is nothing to 0.
+    # -1..1 to 0..1, and nothing to 0
     return np.where(valid[..., None], (opengl + 1) / 2, 0).astype(np.float32)
 
 

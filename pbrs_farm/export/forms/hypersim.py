@@ -93,7 +93,7 @@ def _scenes(views: Iterable[ChosenView]) -> list[list[ChosenView]]:
 
 
 def _trajectories(views: Iterable[ChosenView]) -> list[list[ChosenView]]:
-    """The views by camera: those that are no frames, frames of a walk; each camera of a rig apart."""
+    """The views by camera: single views, frames of a walk; each camera of a rig apart."""
     found: dict[tuple[bool, str], list[ChosenView]] = {}
     for view in views:
         key = ("frame" in view.facts, view.shot.eye)
@@ -144,7 +144,7 @@ def _trajectory(views: Sequence[ChosenView]) -> dict[str, NDArray[Any]]:
 
 
 def _boxes(views: Iterable[ChosenView]) -> dict[str, NDArray[Any]]:
-    """Boxes of what is seen, a row an instance id, NaN where there is none; z is the axis that is most upright."""
+    """Boxes of visible instances, a row an id, NaN for hidden ones; z is the most upright axis."""
     rows = {r["id"]: r["box3d"] for v in views for r in v.facts["instances"] if r.get("box3d")}
     n = max(rows, default=-1) + 1
     centre, size, turn = (

@@ -3,8 +3,8 @@
     img/<house>__<view>.png  label_cor/<house>__<view>.txt
 
 Effects: reads views, writes files. Pictures are turned upright and along the room's walls, as those
-programs want them; a label is the polygon of the room where the camera stands, at its floor and at
-its nominal ceiling.
+programs want them; a label is the polygon of the camera's room, at its floor and at its nominal
+ceiling.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from pbrs_farm.images import png_from_array
 
 WIDTH_PX: Final = 1024
 HEIGHT_PX: Final = 512
-_STRAIGHT_M: Final = 1e-3  # a corner that lies so near to the line of its neighbours is none
+_STRAIGHT_M: Final = 1e-3  # minimum distance of a corner from the line of its neighbours
 _FIT: Final = "panorama with a picture in a room that encloses it"
 
 
@@ -82,7 +82,7 @@ def _corners(view: ChosenView) -> F64:
 def aligned_axes(view: ChosenView) -> F64:
     """(3, 3) right, down and forward as columns, world: upright, forward along or across the longest wall.
 
-    Of the four such directions the one that is nearest to the camera's own.
+    Of the four such directions the nearest to the camera's.
     """
     plan = _corners(view)[:, 0][:, [0, 2]]
     walls = np.roll(plan, -1, axis=0) - plan

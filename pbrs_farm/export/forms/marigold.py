@@ -43,8 +43,7 @@ def write_marigold(views: list[ChosenView], out: Path, _choice: Choice) -> None:
 
     A line is a sample, its paths count from the list's folder. Depth is uint16 PNG, mm along the
     axis, 0 = nothing or 65.535 m and more. Normals are float32 (H, W, 3), unit, x right, y up,
-    z towards the camera, 0 where there is none; a view without `normal` stands in the list of depth
-    alone. A view with `albedo`, `shading` and `residual` is a sample of light, as Marigold has it of
+    z towards the camera, 0 for nothing; a view without `normal` is in the list of depth alone. A view with `albedo`, `shading` and `residual` is a sample of light, as Marigold has it of
     Hypersim: float32 (H, W, 3), linear, none negative. One with `albedo`, `roughness` and `metallic`
     is a sample of materials, as Marigold has it of InteriorVerse. Views without a picture are named
     in left_out.txt; BadInput where all are.

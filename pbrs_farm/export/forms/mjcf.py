@@ -2,7 +2,7 @@
 
 Metres, z up. Doors and drawers have limits, damping and friction. Bodies that a part only touches along
 its way do not collide with it, since clearances are smaller than the margin of convex parts. Loose
-things fall before the home is written, and are written where they came to rest (`mujoco_rest`).
+items fall first, and are written where they came to rest (`mujoco_rest`).
 """
 
 from __future__ import annotations

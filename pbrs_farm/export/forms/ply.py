@@ -97,7 +97,7 @@ def _seen_points(view: ChosenView) -> tuple[F64, Mask]:
 
 
 def _world_normals(view: ChosenView) -> F64:
-    """(H, W, 3) unit normals in the world, (0, 0, 0) where there is none."""
+    """(H, W, 3) unit normals in the world, (0, 0, 0) for nothing."""
     # Published axes are x right, y forward, z up; OpenCV's are x right, y down, z forward.
     published = view.array("normal") * (2 / 65535) - 1
     local = np.stack([published[..., 0], -published[..., 2], published[..., 1]], axis=-1)

@@ -22,10 +22,10 @@ _STEPS_PER_M: Final = 5000  # of TUM's depth
 def write_tum(views: list[ChosenView], out: Path, _choice: Choice) -> None:
     """<house>/rgb/, depth/, rgb.txt, depth.txt and groundtruth.txt.
 
-    groundtruth.txt has rows t x y z qx qy qz qw in the home's world (metres, y up), OpenCV axes:
-    what `--trajectory` reads. Depth is 5000 a metre, 0 = nothing or beyond 13.1 m. What other
-    cameras of a rig took has all five with `_<camera>` behind their names, `_right` of a stereo pair. Frames of a sequence alone: other views
-    are named in left_out.txt; BadInput where there is none.
+    groundtruth.txt has rows t x y z qx qy qz qw in the home's world (metres, y up), OpenCV axes, as
+    `--trajectory` reads them. Depth is 5000 a metre, 0 = nothing or beyond 13.1 m. Other cameras of a rig
+    have the five with `_<camera>` behind their names, `_right` of a stereo pair. Frames of a sequence
+    alone: other views are named in left_out.txt; BadInput if there are no frames.
     """
     written = set[tuple[str, str]]()
     for house, frames in frames_by_house(views).items():

@@ -231,7 +231,7 @@ class _Stage:
             st.Set(Vt.Vec2fArray.FromNumpy(np.ascontiguousarray(surface.uvs, np.float32)))
         UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(look)
         if self._home.house.materials[surface.material].kind is MaterialKind.BULB:
-            # A light stands in it, which it must not shade.
+            # The bulb must not shade the light in it.
             primvars = UsdGeom.PrimvarsAPI(mesh)
             primvars.CreatePrimvar("doNotCastShadows", Sdf.ValueTypeNames.Bool).Set(True)
         return mesh.GetPrim()

@@ -12,7 +12,7 @@ from pbrs_farm.core.house_split import SPLITS
 from pbrs_farm.export.chosen_view import Choice, ChosenView
 from pbrs_farm.export.form import Convention, ViewForm, name_left_out
 
-# What surrounds the whole picture is no object: it has no boxes.
+# classes without boxes: they surround the picture
 _NO_BOX: Final = (0, WALL, FLOOR, CEILING)
 
 
@@ -97,7 +97,7 @@ def names_lines(choice: Choice) -> list[str]:
 
 
 def write_yaml(out: Path, splits: tuple[str, ...], fields: list[str]) -> None:
-    """data.yaml: the folders of these splits, or of none, and lines of other fields.
+    """Write data.yaml: the folders of the splits, if any, and lines of other fields.
 
     Folders count from data.yaml's own. Ultralytics wants train and val: one that has no home is
     the other's, and a comment says so.

@@ -1,4 +1,4 @@
-"""YOLO with polygons of what is seen in place of boxes. Effects: reads views, writes files."""
+"""YOLO with polygons of visible items instead of boxes. Effects: reads views, writes files."""
 
 from __future__ import annotations
 

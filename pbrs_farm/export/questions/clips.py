@@ -1,4 +1,4 @@
-"""What questions are asked about: a picture, or a walk, with the things that a viewer sees in it.
+"""The subjects of questions: a picture or a walk, with its visible items.
 
 Effects: reads the house of a view and, on demand, its layers.
 """
@@ -30,14 +30,14 @@ LEAST_VISIBLE: Final = 0.3
 """Share of a thing from which it is seen: neither hidden by others nor beyond the picture's edges."""
 WHOLE: Final = 0.7
 """Share of a thing from which its size can be judged."""
-_GLIMPSED: Final = 1e-4  # share of a picture's pixels from which a thing may be noticed
+_GLIMPSED: Final = 1e-4  # minimum share of a picture's pixels of a noticeable item
 _SPACING_M: Final = 0.03  # of the points that find the nearest places of two things
 _POINTS_ALONG: Final = (
     16  # the longest side of a thing, where it is asked how much of it a picture holds
 )
 _STARTS: Final = 4  # pairs of points from which the nearest places are sought
 _STEPS: Final = 24  # from one thing to the other and back
-_BY_FLOOR_M: Final = 0.3  # between the floor and what stands on it
+_BY_FLOOR_M: Final = 0.3  # maximum gap between the floor and an item on it
 _WAY_M: Final = 0.5  # the width of a way between things
 _STEPPED_OVER_M: Final = 0.1
 _HEAD_M: Final = 1.8
