@@ -1,6 +1,6 @@
-"""A home that one holds in Python: what stands in it, changes as new homes, cameras, pictures.
+"""A home as a Python value: its items and rooms, edits that give new homes, cameras, pictures.
 
-Effects: reads what the home is made of when it is first looked at; renders when asked.
+Effects: reads the home's files at first use; renders on request.
 """
 
 from __future__ import annotations
@@ -88,16 +88,15 @@ def _are_keys(at: Mapping[float, float]) -> bool:
     return all(math.isfinite(t) and 0 <= share <= 1 for t, share in at.items())
 
 
-_WARM_WHITE_K = 3000.0  # of a bulb that is added
+_WARM_WHITE_K = 3000.0  # colour temperature of an added bulb
 
 
 @dataclass(frozen=True)
 class Home:
-    """A home as a value: each change gives a new one, and the old one stays as it was.
+    """A home as an immutable value: each change gives a new one.
 
-    It is read, dressed, repaired and edited when something of it is first asked for, by the same
-    steps as `pbrs-farm run`, and stays in memory for the next call. Its id names all that it is
-    made of: equal homes have equal ids on every machine.
+    It is read, dressed, repaired and edited at first use, by the same steps as `pbrs-farm run`, and stays
+    in memory for the next call. Its id covers all of its inputs: equal homes have equal ids on every machine.
 
         >>> home = pf.load("builtin", recipe="preview")
         >>> home.rooms["Living room"].name, len(home.items.near("dining table")) > 0
@@ -108,14 +107,14 @@ class Home:
 
     source: SourceRef
     base: Recipe
-    settings: tuple[tuple[str, Any], ...] = ()  # recipe fields that this home overrides
+    settings: tuple[tuple[str, Any], ...] = ()  # overridden recipe fields
 
     renderer: ClassVar[Renderer] = Renderer()
-    """Of this process, for all homes: Mitsuba, Dr.Jit and OpenGL keep state a process."""
+    """Shared by all homes of this process, since Mitsuba, Dr.Jit and OpenGL have state a process."""
 
     @property
     def id(self) -> str:
-        """Names the home in folders, tables and seeds.
+        """The home's name in folders, tables and seeds.
 
         >>> home.id == pf.load("builtin").id
         True
@@ -124,7 +123,7 @@ class Home:
 
     @cached_property
     def recipe(self) -> Recipe:
-        """The fields it is made and rendered with.
+        """The recipe for making and rendering it.
 
         >>> home.recipe.name
         'preview'
@@ -135,7 +134,7 @@ class Home:
     def house(self) -> House:
         """Its geometry, materials, lamps and rooms as frozen arrays (pbrs_farm.core.house).
 
-        This process keeps those of the last homes: a list of a thousand homes holds none.
+        The process keeps those of its last homes, so a list of a thousand homes fits in memory.
 
             >>> len(home.house.rooms) == len(home.rooms)
             True
@@ -144,7 +143,7 @@ class Home:
 
     @property
     def report(self) -> RepairReport:
-        """What repair changed and measured.
+        """Changes and measurements of repair.
 
         >>> type(home.report).__name__
         'RepairReport'
@@ -162,7 +161,7 @@ class Home:
 
     @property
     def items(self) -> Items:
-        """Everything in it as a table; home.items["table 2"], .near(name), .named("chair*").
+        """Its items as a table; home.items["table 2"], .near(name), .named("chair*").
 
         >>> len(home.items) > 10
         True
@@ -171,7 +170,7 @@ class Home:
 
     @property
     def joints(self) -> Joints:
-        """Its doors, drawers and lids as a table: what each is part of, how it moves, how far it is open.
+        """Its doors, drawers and lids as a table: item, kind of motion, state.
 
         >>> home.joints.columns[:4]
         ('item', 'name', 'part', 'kind')
@@ -180,7 +179,7 @@ class Home:
 
     @property
     def motions(self) -> Table:
-        """What of it moves with time as a table: the item, its name, part ("" = all of it), from when until when.
+        """Its motions over time as a table: item, name, part ("" = all of it), start, end.
 
         >>> len(home.motions)
         0
@@ -206,11 +205,11 @@ class Home:
     def _repr_html_(self) -> str:
         return f"<div><code>{html.escape(self.id)}</code><br>{self.plan()}</div>"
 
-    # What a home is made of: before its first edit.
+    # Changes before the first edit.
 
     @checked_call
     def dress(self, seed: Count, **fields: Any) -> Home:
-        """The home as people live in it: things, textiles, wear, by a seed (docs/dress.md).
+        """The home with the clutter, textiles and wear of daily life, by a seed (docs/dress.md).
 
         fields: of the recipe's group `dress`, such as clutter=0.5 or style="loft".
         Raises BadInput for seed 0 and for a home that has edits already.
@@ -227,9 +226,9 @@ class Home:
 
     @checked_call
     def repair(self, **fields: Any) -> Home:
-        """The home made watertight and lit, now; others are repaired when they are first looked at.
+        """The home made watertight and lit, now; other homes are repaired at first use.
 
-        fields: of the recipe's group `repair`, such as lamp_lx=150. The words are in `report`.
+        fields: of the recipe's group `repair`, such as lamp_lx=150. `report` has the changes.
 
             >>> home.repair(lamp_lx=150).recipe.repair.lamp_lx
             150.0
@@ -240,10 +239,10 @@ class Home:
 
     @checked_call
     def export(self, folder: str | Path, to: str = "gltf") -> Path:
-        """Write the home itself for another program: to = gltf, habitat, mjcf, sdf, urdf, usd or usdz.
+        """Write the home for another program: to = gltf, habitat, mjcf, sdf, urdf, usd or usdz.
 
-        Each thing is one node, prim or model with a collider and its lamps; docs/formats/simulators.md describes
-        the forms, and `pf.load` reads each of them but mjcf, sdf and urdf. Raises BadInput where the folder holds something.
+        Each item is one node, prim or model with a collider and its lamps; docs/formats/simulators.md describes
+        the forms, and `pf.load` reads all but mjcf, sdf and urdf. Raises BadInput if the folder is not empty.
 
             >>> home.export("as_gltf").is_dir()
             True
@@ -255,10 +254,10 @@ class Home:
 
     @checked_call
     def save(self, path: str | Path) -> Path:
-        """Write the home as a small file, <name>.home.json, which every command takes for a home.
+        """Write the home as a small file, <name>.home.json, which every command takes as a home.
 
-        It names the source, how the home is dressed and its edits, with all that moves; files by their
-        place on this machine. Fields of the recipe are the command's. Raises BadInput for another ending.
+        It has the source, seeds of dressing, edits and motions, and files by their path on this machine.
+        Fields of the recipe are the command's. Raises BadInput for another ending.
 
             >>> moving = home.open("door*", at={0: 0, 2: 1})
             >>> pf.load(moving.save("moving.home.json")).id == moving.id
@@ -277,7 +276,7 @@ class Home:
     def set(self, **fields: Any) -> Home:
         """The home under other recipe fields: home.set(**{"light.spp": 64}).
 
-        Raises BadRecipe for a field there is not, or a value that does not fit.
+        Raises BadRecipe for an unknown field or a value that does not fit.
 
             >>> home.set(**{"light.spp": 64}).recipe.light.spp
             64
@@ -325,15 +324,15 @@ class Home:
         seed: Whole = 0,
         name: str = "",
     ) -> Home:
-        """The home with one more thing.
+        """The home with one more item.
 
-        on: what it is put on where there is room for it, by the seed, upright, touching: an item, a
-        name that one or several items have, or a room's floor. pose: (4, 4) world_from_model
-        instead: metres, world y up, the model's own axes; or at: (3,) where the middle of its foot
-        stands, upright. name: of the new item, its model's id and a number without one.
+        on: the support, upright at a free place drawn by the seed: an item, a name that one or several
+        items have, or a room's floor. pose: (4, 4) world_from_model instead: metres, world y up, the
+        model's axes; or at: (3,) position of the middle of its foot, upright. name: of the new item
+        (default: its model's id and a number).
 
-        Raises BadInput where it fits nowhere, for a pose that is no rigid motion, a name that is
-        taken, an item there is not. What lies in no room is a warning.
+        Raises BadInput if there is no free place, for a pose that is no rigid motion, a name in use, or an
+        unknown item. A place in no room is a warning.
 
             >>> home.place(can, on="dining table", seed=1).items["can 1"].id
             'can 1'
@@ -363,15 +362,15 @@ class Home:
         physics: bool = False,
         floating: bool = False,
     ) -> Home:
-        """The home with n more things, models in turn by the seed.
+        """The home with n more items, models in turn by the seed.
 
-        on: an item or room whose surface takes them; in_: a room, on all its tables, shelves and
-        floor; else anywhere in the home. physics: they are dropped and come to rest against each other
-        and the home by rigid-body simulation (extra `physics`), and what falls off four times stays
-        where it fell; else each stands upright by itself. floating: they hang in the air of rooms at any
-        turn and touch nothing, to teach geometry; no fall moves them.
+        on: an item or room that supports them; in_: a room, on all its tables, shelves and floor; else
+        anywhere in the home. physics: they are dropped and come to rest against each other and the home by
+        rigid-body simulation (extra `physics`); after four falls off the support an item stays where it is.
+        Without it each is upright and by itself. floating: they hang in the air of rooms at any turn and
+        touch nothing, to teach geometry.
 
-        Raises BadInput where less than n fit, MachineFailed where the extra is not installed.
+        Raises BadInput if less than n fit, MachineFailed if the extra is not installed.
 
             >>> len(home.scatter([can], n=2, on="dining table").items) - len(home.items)
             2
@@ -411,7 +410,7 @@ class Home:
     def move(self, items: ItemLike, by: Vector = (0.0, 0.0, 0.0), turn_deg: float = 0.0) -> Home:
         """The home with items moved by (x, y, z) metres and turned about the vertical of their middle.
 
-        What leaves every room is a warning.
+        A place in no room is a warning.
 
         >>> moved = home.move("sofa", by=(0.1, 0, 0))
         >>> np.round(moved.items["sofa"].bounds - home.items["sofa"].bounds, 3)[0].tolist()
@@ -429,12 +428,11 @@ class Home:
     def open(
         self, items: ItemLike, share: Share = 1.0, part: str = "*", *, at: Keys | None = None
     ) -> Home:
-        """The home with doors, drawers and lids of items open by a share of their way; 0 shuts them.
+        """The home with doors, drawers and lids of items open by a share of their way; 0 closes them.
 
-        items: as of `without`; part: those of `home.joints` that are meant, "drawer*" for instance.
-        at: seconds -> share instead, {0: 0, 2: 1}: they move evenly between these times, which films
-        show. What a wall or a thing stands in the way of opens as far as it can, and is a warning.
-        Raises BadInput where nothing of the items opens.
+        items: as of `without`; part: name or pattern of parts in `home.joints`, as "drawer*". at: seconds ->
+        share instead, {0: 0, 2: 1}: linear motion between these times, for films. A blocked part opens as far
+        as it can, with a warning. Raises BadInput if no part of the items opens.
 
             >>> max(home.open("door*", 0.7).joints.column("open"))
             0.7
@@ -448,7 +446,7 @@ class Home:
         return self._opened(KeyJoints(joints=joints, keys=keys))
 
     def _joints_of(self, items: ItemLike, part: str) -> tuple[tuple[str, str], ...]:
-        """(item, part) of the joints that are meant; BadInput where there is none."""
+        """(item, part) of the matching joints; BadInput if there are none."""
         ids = frozenset(self._ids(items))
         joints = tuple(
             (item.id, joint.part)
@@ -474,7 +472,7 @@ class Home:
 
     @checked_call
     def at(self, time_s: float) -> Home:
-        """The home as it stands at a time, seconds: what moves is there, and moves no more.
+        """The home at a time, seconds, with all motions stopped there.
 
         >>> moving = home.open("door*", at={0: 0, 2: 1})
         >>> max(moving.at(1.0).joints.column("open"))
@@ -492,14 +490,14 @@ class Home:
         from_s: float = 0.0,
         seconds: Positive = 5.0,
     ) -> Home:
-        """The home in which items are let go at from_s: they fall, slide and come to rest, which films show.
+        """The home in which items fall from from_s on, slide and come to rest, for films.
 
-        By rigid-body simulation (extra `physics`), 60 keys a second; all else stands still. push: metres a
-        second that they have at first, spin: radians a second, both along the world's axes. A thing
-        without either that stands on something stays there: place it in the air, or push it.
+        By rigid-body simulation (extra `physics`), 60 keys a second; all other items are static. push: initial
+        velocity, m/s; spin: initial rad/s; both along the world's axes. An item with a support and without
+        either stays there: place it in the air, or push it.
 
-        Raises BadInput, naming the thing, where it begins inside of another, flies off, leaves the
-        home or still moves after so many seconds; MachineFailed where the extra is not installed.
+        Raises BadInput, naming the item, if it starts inside another, flies off, leaves the home or still
+        moves after so many seconds; MachineFailed if the extra is not installed.
 
             >>> falling = home.place(can, at=(2.0, 1.0, 2.0)).drop("can 1")
             >>> falling.motions[0]["part"] == "" and falling.motions[0]["keys"] > 20
@@ -552,9 +550,9 @@ class Home:
     def light(
         self, items: ItemLike, lm: Flux, kelvin: Kelvin | None = None, colour: Colour | None = None
     ) -> Home:
-        """The home with lamps of another flux in lumen, and another colour where one is given.
+        """The home with lamps of another flux in lumen, and of another colour if given.
 
-        kelvin: of a black body; or colour: "#ff9040", or sRGB in 0..1, whose brightness does not count.
+        kelvin: of a black body; or colour: "#ff9040", or sRGB in 0..1 without its brightness.
 
             >>> home.light("floor lamp", lm=800, kelvin=2700).id == home.id
             False
@@ -574,7 +572,7 @@ class Home:
         angle_deg: Angle = 60.0,
         name: str = "",
     ) -> Home:
-        """The home with one more bulb at (x, y, z), or a spot of a full angle where towards is given.
+        """The home with one more bulb at (x, y, z), or with towards a spot of a full angle.
 
         kelvin and colour as of light; 3000 kelvin without either. A bulb in no room is a warning.
 
@@ -597,12 +595,12 @@ class Home:
 
     def _edited(self, *edits: Edit) -> Home:
         home = replace(self, source=self.source.edited(*edits))
-        # What is wrong with an edit is an error where it is made.
+        # Load it now, so that a wrong edit raises here.
         self._warn_of_what_left(home.house, edits)
         return home
 
     def _warn_of_what_left(self, after: House, edits: Sequence[Edit]) -> None:
-        """Warn of what edits put or moved into no room, where the home has rooms."""
+        """Warn of items that edits put or moved into no room, if the home has rooms."""
         was_in = {item.id: item.room_id is not None for item in self.house.items}
         put: list[str] = []
         for edit in edits:
@@ -670,7 +668,7 @@ class Home:
     ) -> list[NDArray[np.uint8]]:
         """A small quick picture (H, W, 3) sRGB from each camera, edge_px along its longer edge.
 
-        By OpenGL; where the machine has none, its diffuse colours by rays.
+        By OpenGL, or its diffuse colours by rays on a machine without OpenGL.
 
         >>> home.sketches([camera], edge_px=32)[0].shape
         (24, 32, 3)
@@ -701,7 +699,7 @@ class Home:
         views = views_from_json(data, "cameras.json")
         rows = [(view.id, view.room_id, view.score) for view in views.values()]
         chosen = plan.chosen_views(rows, n or 0, home.recipe)
-        # They were scored in a small picture: hand them on at the size of the pictures to come.
+        # They were scored in a small picture: give them the size of the final pictures.
         size = home.recipe.image.width_px, home.recipe.image.height_px
         found = [
             Viewpoint(
@@ -729,9 +727,9 @@ class Home:
     ) -> Viewpoints:
         """n viewpoints that look at items each: at placed models where none are named.
 
-        distance_m and elevation_deg: between which they are drawn. min_visible: the share of the
-        item looked at that nothing may hide. size: of the pictures, that of the recipe for None. K: 3 x 3,
-        of the size given, instead of hfov_deg. Equal seeds give equal cameras. Raises BadInput where fewer are found.
+        distance_m and elevation_deg: ranges for drawing. min_visible: minimum visible share of the item. size:
+        of the pictures, that of the recipe for None. K: 3 x 3, for that size, instead of hfov_deg. Equal seeds
+        give equal cameras. Raises BadInput if fewer are found.
 
             >>> len(home.cameras_around("sofa", n=1))
             1
@@ -767,7 +765,7 @@ class Home:
 
     @checked_call
     def viewpoint(self, camera: Camera | Viewpoint) -> Viewpoint:
-        """A camera as a viewpoint of this home, with the room that it is in.
+        """A camera as a viewpoint of this home, with its room.
 
         >>> home.viewpoint(camera).room in {room.id for room in home.house.rooms}
         True
@@ -812,7 +810,7 @@ class Rooms(Table):
 
     @checked_call
     def has(self, name: str) -> bool:
-        """Whether a room has this id or name.
+        """True if a room has this id or name.
 
         >>> home.rooms.has("Living room"), home.rooms.has("Ballroom")
         (True, False)
@@ -821,10 +819,10 @@ class Rooms(Table):
 
 
 class Joints(Table):
-    """What of a home opens: rows of item id, its name, part, kind, value, upper limit, share that it is
-    open, mass; a row has the axis and a point on it (world, metres), lower limit and instance id, too.
+    """A home's doors, drawers and lids: rows of item id, its name, part, kind, value, upper limit, open
+    share, mass; a row has the axis and a point on it (world, metres), lower limit and instance id, too.
 
-    Values are radians (revolute) or metres (prismatic) from shut.
+    Values are radians (revolute) or metres (prismatic) from closed.
     """
 
     def __init__(self, house: House) -> None:
@@ -857,10 +855,7 @@ class Items(Table):
     """A home's items: rows of instance id, item id, name, class, room, size and middle in metres."""
 
     def __init__(self, house: House, items: Sequence[Item] | None = None) -> None:
-        """house: finished. items: some of its items; None: all but what lies before its windows.
-
-        What an edit removed is not there.
-        """
+        """house: finished. items: some of its items; None: all but the outdoors and removed ones."""
         self._house = house
         inside = (item for item in house.items if not item.is_outside and not item.is_removed)
         self._items = tuple(inside if items is None else items)
@@ -889,13 +884,13 @@ class Items(Table):
 
     @checked_call
     def named(self, pattern: str) -> tuple[Item, ...]:
-        """The items whose id, name or class matches, "chair*" for instance; BadInput where none does.
+        """The items whose id, name or class matches, as "chair*"; BadInput if there are none.
 
         >>> len(home.items.named("floor*")) > 0
         True
         """
         for key in (_ids, _words):
-            # A name may hold what a pattern means something by: "chair [2]".
+            # A name may contain characters of patterns: "chair [2]".
             found = tuple(
                 i
                 for i in self._items
@@ -911,7 +906,7 @@ class Items(Table):
 
     @checked_call
     def near(self, name: str, within_m: Positive = 1.5) -> Items:
-        """The items whose box lies within so many metres of an item's, nearest first.
+        """The items whose box is within a distance of an item's box, nearest first.
 
         >>> len(home.items.near("dining table")) > 0
         True
@@ -976,7 +971,7 @@ def _rgb(colour: str | Sequence[float]) -> tuple[float, float, float]:
 def _rgb_of_light(
     call: str, kelvin: float | None, colour: Colour | None
 ) -> tuple[float, float, float] | None:
-    """Linear RGB of a light, its largest 1; None where neither says one."""
+    """Linear RGB of a light, its largest 1; None if neither is given."""
     if colour is None:
         return None if kelvin is None else _rgb_of_kelvin(kelvin)
     if kelvin is not None:
@@ -1007,8 +1002,8 @@ def load(
     Holodeck names. recipe: preview, fast, paper, released, a .toml file or a Recipe.
     settings: recipe fields to override: pf.load("Studio", **{"light.spp": 64}).
 
-    Nothing but the file's digest is read before the home is looked at. Raises BadHouse for a word
-    that names no home, BadRecipe for a recipe or a field that is none.
+    Only the file's digest is read before the home's first use. Raises BadHouse for a word that names no
+    home, BadRecipe for an unknown recipe or field.
 
         >>> pf.load("builtin", "preview", **{"light.spp": 64}).recipe.light.spp
         64
@@ -1034,8 +1029,8 @@ def make(seed: Whole, rooms: str | int = "", **options: Any) -> Home:
 def recipe_of(recipe: str | Path | Recipe) -> Recipe:
     """A recipe by name, by .toml file, or itself. Raises BadRecipe.
 
-    A name is one of the presets; a path or text that ends in .toml is read from disk. What is
-    neither, a number for instance, raises BadRecipe as well.
+    A name is one of the presets; a path or text that ends in .toml is read from disk. Any other value
+    raises BadRecipe.
     """
     if isinstance(recipe, Recipe):
         return recipe

@@ -1,1 +1,1 @@
-"""Data sets as files: what a set's file asks for is rendered, split, exported and summed; what it costs."""
+"""Data sets from a file: rendering, splits, exports, checksums and estimates of cost."""

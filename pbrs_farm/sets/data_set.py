@@ -1,6 +1,6 @@
-"""What a set's file asks for: parts that are rendered, the forms they are written in, a card. No effects.
+"""A data set as described by its file: rendered parts, their forms, a card. No effects.
 
-A part is a run with one recipe, so an output root of its own. commands/set_file.py reads the file.
+A part is a run with one recipe, so each has an output root. commands/set_file.py reads the file.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from pbrs_farm.run.request import Wanted
 from pbrs_farm.views.packing.packing_plan import Packing
 
 SHIPPED: Final = Path(__file__).parent
-"""Where the sets lie that come with the package: indoor-1k.toml and others."""
+"""The folder of the package's sets: indoor-1k.toml and others."""
 
 WHOLE: Final = (1, 1)
 """The shard that is all homes."""
@@ -27,10 +27,9 @@ WHOLE: Final = (1, 1)
 
 @dataclass(frozen=True, slots=True)
 class SetPart:
-    """Homes that are rendered alike.
+    """Homes with the same rendering options.
 
-    homes: a word each, as `run` takes them. rules: of `select --by`, by which views are left out of
-    the forms. values: the entries of the file by option's name, for `submit`.
+    homes: a word each, as `run` takes them. rules: of `select --by`; they leave views out of the forms. values: the entries of the file by option's name, for `submit`.
     """
 
     name: str
@@ -44,7 +43,7 @@ class SetPart:
 
     @property
     def n_houses(self) -> int:
-        """Homes times the seeds that each is dressed by."""
+        """Number of homes times number of seeds of dressing."""
         return len(self.homes) * max(1, len(self.dress_seeds))
 
     def homes_of(self, shard: tuple[int, int]) -> tuple[str, ...]:
@@ -58,7 +57,7 @@ class SetPart:
 
 @dataclass(frozen=True, slots=True)
 class SetForm:
-    """A form in which parts are written: of `export`, or of `pack` where it has a packing."""
+    """A form of some parts: of `export`, or of `pack` if it has a packing."""
 
     name: str  # of its folder
     to: str
@@ -69,7 +68,7 @@ class SetForm:
 
 @dataclass(frozen=True, slots=True)
 class SetCard:
-    """What the file says of the set: its README's head."""
+    """The head of the set's README, from its file."""
 
     title: str
     text: str = ""
@@ -78,7 +77,7 @@ class SetCard:
 
 @dataclass(frozen=True, slots=True)
 class DataSet:
-    """A data set as its file describes it."""
+    """A data set."""
 
     name: str
     data: bytes  # of the file

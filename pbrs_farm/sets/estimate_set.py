@@ -1,6 +1,6 @@
-"""What a set costs before it is made: hours, bytes, and dollars on clouds by a table of prices. No effects.
+"""Estimated cost of a set: hours, bytes, and dollars on clouds by a table of prices. No effects.
 
-prices.csv has a row a price, with source and date. A cloud is its rows; a further one needs no code.
+prices.csv has a row a price, with source and date. A cloud is its rows; another one needs no code.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _HOUR_S: Final = 3600.0
 
 
 class Price(Record):
-    """A price of a cloud: dollars of the unit that `what` names."""
+    """A price of a cloud: dollars a unit of `what`."""
 
     cloud: str
     what: PriceName
@@ -43,14 +43,14 @@ def prices() -> Mapping[str, Mapping[PriceName, Price]]:
     >>> {"cpu_hour", "gb_month"} <= set(prices()["AWS"])
     True
     """
-    found: dict[str, dict[PriceName, Price]] = {}
+    by_cloud: dict[str, dict[PriceName, Price]] = {}
     for row in read_csv(Path(__file__).with_name("prices.csv"), Price):
-        found.setdefault(row.cloud, {})[row.what] = row
-    return found
+        by_cloud.setdefault(row.cloud, {})[row.what] = row
+    return by_cloud
 
 
 class CloudCost(Record):
-    """What a set costs on a cloud, in US dollars; None where a price is not known.
+    """Cost of a set on a cloud, in US dollars; None for an unknown price.
 
     on_demand, spot: of the CPU alone. gpu, gpu_spot: light on an H100, the rest on the CPU.
     """
@@ -66,18 +66,18 @@ class CloudCost(Record):
 
 
 class BillLine(Record):
-    """What is bought of a cloud: an amount at a price, in US dollars; None where the price is not known."""
+    """A line of a bill: an amount at a price, in US dollars; None for an unknown price."""
 
     what: str
     amount: float
     usd_each: float | None
     usd: float | None
     of: str  # machine, region
-    read_on: str  # "" where no price was read
+    read_on: str  # "" for an unknown price
 
 
 class SetEstimate(Record):
-    """What making a set takes: all parts and forms together, then by part, then in dollars."""
+    """Cost of making a set: all parts and forms together, then by part, then in dollars."""
 
     name: str
     houses: int
@@ -91,9 +91,9 @@ class SetEstimate(Record):
     clouds: tuple[CloudCost, ...]
 
     def bill(self, cloud: str) -> tuple[BillLine, ...]:
-        """What a set takes of a cloud, line by line: ways to get the light on lines of their own.
+        """The bill of a cloud, with a line for each way to compute the light.
 
-        GPU hours are those of light on an H100 as measured on one scene, not of a farm of them.
+        GPU hours are of light on one H100, as measured on one scene.
         """
         amounts: tuple[tuple[str, float, PriceName, int], ...] = (
             ("CPU hours", self.cpu_hours, "cpu_hour", 1),
@@ -111,9 +111,9 @@ class SetEstimate(Record):
 
 
 def estimate_set(data_set: DataSet) -> SetEstimate:
-    """What a set costs, by run/costs.csv and prices.csv.
+    """The cost of a set, by run/costs.csv and prices.csv.
 
-    Views that rules leave out are made and counted. Forms cost no CPU time here: seconds a view at most.
+    Views that rules leave out are counted. The CPU time of forms is neglected: at most seconds a view.
     """
     costs = {p.name: cost_of_run(p.recipe, p.want, p.n_houses) for p in data_set.parts}
     whole = sum(costs.values(), RunCost())
@@ -187,17 +187,17 @@ def _bill_line(what: str, amount: float, price: Price | None, per: int) -> BillL
 
 
 def clouds_of(names: Sequence[str]) -> list[str]:
-    """The clouds of the table that words name, whatever their case; BadInput for one that is not there."""
-    known = {cloud.casefold(): cloud for cloud in prices()}
+    """The clouds of the table by name, in any case; BadInput for an unknown one."""
+    clouds = {cloud.casefold(): cloud for cloud in prices()}
     for name in names:
-        if name.casefold() not in known:
-            hint = f"of {', '.join(known.values())}: prices.csv has a row a price"
+        if name.casefold() not in clouds:
+            hint = f"of {', '.join(clouds.values())}: prices.csv has a row a price"
             raise BadInput("--cloud", name, "no prices of this cloud", hint=hint)
-    return [known[name.casefold()] for name in names]
+    return [clouds[name.casefold()] for name in names]
 
 
 def bill_text(bill: Sequence[BillLine]) -> str:
-    """A bill for people, a line a thing bought; "-" where the table has no price."""
+    """A bill as a text table; "-" for an unknown price."""
     columns = ("what", "amount", "US dollars each", "US dollars", "of", "read on")
     rows = [
         (
@@ -214,7 +214,7 @@ def bill_text(bill: Sequence[BillLine]) -> str:
 
 
 def estimate_text(estimate: SetEstimate) -> str:
-    """An estimate for people: a line a part, the sum, a line a cloud, what the table does not know as "-"."""
+    """An estimate as text tables: a line a part, the sum, a line a cloud; "-" for an unknown price."""
     e = estimate
     sizes = ("part", "houses", "views", "CPU hours", "GB")
     rows = [(name, *p.values()) for name, p in e.parts.items()]

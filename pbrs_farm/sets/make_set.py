@@ -1,7 +1,7 @@
-"""A set's folder: what was rendered is selected, split, written in its forms, described and summed.
+"""A set's folder: selection, splits, forms, card and checksums of rendered parts.
 
 Effects: reads and writes the set's folder. A step is done when its marker `done/<name>.json` has the right
-digest and its files are there; the marker is written last, so that what was killed is made again.
+digest and its files exist; the marker is written last, so that a killed step is repeated.
 
     <set>.toml            the file, as it was given
     README.md             the card
@@ -49,29 +49,28 @@ _CARD: Final = "README.md"
 _ROOT_FILES: Final = (keys.RECIPE, keys.MANIFEST, keys.ATTRIBUTION)
 
 Planned = Mapping[str, Sequence[str]]
-"""House -> the views of it that a run makes."""
+"""House -> its planned views."""
 
 
 @dataclass(frozen=True, slots=True)
 class MadePart:
-    """A part that is rendered and judged."""
+    """A rendered part with the verdicts on its views."""
 
     part: SetPart
     root: Path
     verdicts: tuple[RuleVerdict, ...]  # by house and view
-    reasons: Mapping[str, int] = field(default_factory=dict)  # why left out -> views
+    reasons: Mapping[str, int] = field(default_factory=dict)  # reason -> number of views left out
 
     @property
     def kept(self) -> tuple[RuleVerdict, ...]:
-        """The views that the forms have."""
+        """The views of the forms."""
         return tuple(verdict for verdict in self.verdicts if not verdict.reason)
 
 
 def claim_folder(out: Path, data_set: DataSet) -> None:
-    """Say whose folder it is: write the set's file into it, where it holds nothing else.
+    """Claim a folder for a set: write the set's file into it, if it has no foreign files.
 
-    Rendered parts may lie there already, as a farm made them. Raises BadInput where the folder
-    holds another set, or something else.
+    It may have rendered parts, as a farm made them. Raises BadInput if it has another set or other files.
     """
     file = out / data_set.file
     if file.is_file():
@@ -95,7 +94,7 @@ def claim_folder(out: Path, data_set: DataSet) -> None:
 def part_run(
     part: SetPart, out: Path, shard: tuple[int, int], how: ProcessLimitOptions, store: StoreSettings
 ) -> Run:
-    """The run that renders a part of a set into its folder, or the homes of one shard."""
+    """The run of a part, or of one shard of its homes, into its folder."""
     return Run(
         homes=part.homes_of(shard),
         models=part.models,
@@ -113,7 +112,7 @@ def part_run(
 
 
 def root_of(part: SetPart, out: Path) -> Path:
-    """Where a part is rendered."""
+    """The output root of a part."""
     return out / _PARTS / part.name
 
 
@@ -123,11 +122,11 @@ def finish_set(
     planned: Mapping[str, Planned],
     tell: Callable[[str], None] = lambda _line: None,
 ) -> int:
-    """Select, write the forms, the index, the card and the checksums of a set that is rendered whole.
+    """Select views and write forms, index, card and checksums of a set whose parts are all rendered.
 
-    planned: part's name -> its views. What is done already is left alone. tell: called with a line
-    as something is made. Returns how many steps were made now. Raises BadInput for houses in a
-    part's folder that are none of the set's, and as export and pack do.
+    planned: part's name -> its views. Finished steps are skipped. tell: called with a line for each new
+    step. Returns the number of new steps. Raises BadInput for foreign houses in a part's folder, and as
+    export and pack.
     """
     steps = _Steps(out, tell)
     made = [_judged_part(data_set, part, out, planned[part.name], steps) for part in data_set.parts]
@@ -145,14 +144,14 @@ def finish_set(
     steps.sums[data_set.file] = keys.sha256(data_set.data)
     for of in made:
         steps.sums |= _root_sums(of, out)
-    # The order of the names, so that two lists can be compared line by line.
+    # in the order of names, to compare two lists line by line
     lines = (f"{digest}  {name}\n" for name, digest in sorted(steps.sums.items()))
     steps.write(SUMS, "".join(lines).encode())
     return steps.n_made
 
 
 class _Steps:
-    """The steps of one call, each made unless its marker says that it is done."""
+    """The steps of one call; finished ones, by their markers, are skipped."""
 
     def __init__(self, out: Path, tell: Callable[[str], None]) -> None:
         self.out = out
@@ -164,9 +163,9 @@ class _Steps:
     def unless_done(
         self, name: str, digest: str, make: Callable[[], object], files: Callable[[], Sequence[str]]
     ) -> None:
-        """Make a step of that name where its marker is of another digest or a file is gone.
+        """Make a step unless its marker has the digest and all its files exist.
 
-        files: what it wrote, below the set's folder.
+        files: its files, below the set's folder.
         """
         key = f"done/{name}.json"
         held = json.loads(get_or_none(self.store, key) or b"{}")
@@ -182,7 +181,7 @@ class _Steps:
         self.sums |= sums
 
     def write(self, file: str, data: bytes) -> None:
-        """Write a file of the set's folder where it is not there with these bytes."""
+        """Write a file of the set's folder unless it has these bytes."""
         if get_or_none(self.store, file) != data:
             self.store.put(file, data)
             self.n_made += 1
@@ -191,7 +190,7 @@ class _Steps:
 def _judged_part(
     data_set: DataSet, part: SetPart, out: Path, planned: Planned, steps: _Steps
 ) -> MadePart:
-    """Which views of a part the forms have, by its rules."""
+    """Choose the views of the forms by the part's rules."""
     root = root_of(part, out)
     _check_nothing_else(root, planned)
     files = [keys.SELECTION, keys.selection_key(data_set.name, "jsonl")]
@@ -214,7 +213,7 @@ def _judged_part(
 
 
 def _check_nothing_else(root: Path, planned: Planned) -> None:
-    """Raise BadInput where the root holds houses or views that the set does not name."""
+    """Raise BadInput if the root has houses or views that are not of the set."""
     folder = root / keys.FOLDERS[0]
     for house in sorted(folder.iterdir()) if folder.is_dir() else ():
         hint = "name a new folder, or remove it"
@@ -238,7 +237,7 @@ def _write_form(data_set: DataSet, form: SetForm, made: MadePart, out: Path, ste
     folder = out / _FORMS / form.name / made.part.name
 
     def write() -> None:
-        # What a killed call left.
+        # remains of a killed call
         shutil.rmtree(folder, ignore_errors=True)
         folder.parent.mkdir(parents=True, exist_ok=True)
         if form.packing is None:
@@ -283,11 +282,11 @@ def _index_text(data_set: DataSet, made: Sequence[MadePart]) -> str:
 
 
 def _root_sums(made: MadePart, out: Path) -> Iterator[tuple[str, str]]:
-    """(file, sha256) of what was rendered: by the manifest, whose files are not read again."""
+    """(file, sha256) of the rendered files, from the manifest."""
     below = made.root.relative_to(out).as_posix()
     manifest = FolderStore(made.root).get(keys.MANIFEST)
     for house, lines in lines_by_house(manifest):
-        # A home's manifest is its lines.
+        # the manifest of a home has these lines
         yield f"{below}/{keys.house_key(house, keys.MANIFEST)}", keys.sha256(lines)
         for key, digest in sha256_by_key(lines).items():
             yield f"{below}/{key}", digest

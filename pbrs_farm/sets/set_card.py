@@ -1,4 +1,4 @@
-"""README.md of a made set: what it is, how many views, how it was made, how to check it. Effects: reads roots."""
+"""README.md of a set: content, number of views, recipe, checks. Effects: reads roots."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from pbrs_farm.curate.teaching_rules import RuleVerdict
 from pbrs_farm.sets.data_set import DataSet, SetPart
 
 MadeViews = tuple[SetPart, Path, Sequence[RuleVerdict], Mapping[str, int]]
-"""A part, its root, the views that the forms have, and how many are left out for which reason."""
+"""A part, its root, the views of its forms, and reason -> number of views left out."""
 
 _COMMAND = """```sh
 pbrs-farm make {file} --out {name}   # the same files again: nothing is needed but this one
