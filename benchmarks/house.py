@@ -1,6 +1,6 @@
 """The state of the code itself: size, names, imports, cycles, docstrings, and the time and coverage of the tests.
 
-Effects: runs `make test`, then all tests under coverage (45 minutes on two cores), and writes out/bench/house.json.
+Effects: runs `make test`, then the tests of `make test-all` under coverage, and writes out/bench/house.json.
 `python -m benchmarks.house --quick [FOLDER...]` runs no tests, writes nothing and lists the places that count against
 a figure, of these folders alone if any are named.
 """
@@ -307,7 +307,7 @@ def minutes_of_tests() -> float:
 def coverage_percents() -> tuple[float, float]:
     """% of statements run by `make test`, and by it and `make test-all`. Raises if a test fails.
 
-    Without the tests of a browser and those that kill a farm: these measure no further line.
+    The tests of a browser and those that kill processes of a farm are left out.
     """
     folder = Path("out/bench/coverage").resolve()
     folder.mkdir(parents=True, exist_ok=True)
