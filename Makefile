@@ -23,6 +23,10 @@ define extra
 $(BIN)/python -c "import sys, importlib.util as u; sys.exit(not all(map(u.find_spec, sys.argv[1:])))" $(1) || $(BIN)/pip install -q --disable-pip-version-check --no-compile -e ".[$(2)]"
 endef
 
+define example-homes
+$(BIN)/pbrs-farm homes --fetch >/dev/null || echo "test: no example homes: tests of them are skipped (with CI=true they fail)" >&2
+endef
+
 define web-packages
 $(BIN)/python -c "import playwright" 2>/dev/null || $(BIN)/pip install -q playwright
 endef
@@ -63,13 +67,14 @@ check-fast: ## lint, import contracts and types of the files that differ from th
 	test -z "$$files" || $(BIN)/mypy $$files
 
 test: lint ## lint and the quick tests: six minutes on two cores; fetches the example homes for those that need them
-	@$(BIN)/pbrs-farm homes --fetch >/dev/null || echo "test: no example homes: tests of them are skipped (with CI=true they fail)" >&2
+	@$(example-homes)
 	$(BIN)/pytest -n 2 --dist worksteal -m "$(QUICK)"
 
 test-all: export PBRS_SETUP_ALSO := faketime chromium redis-server
 test-all: setup ## every other test for a machine without a GPU: long, slow, study, the farm beside them, then the board in a browser
 	@$(study-packages)
 	@$(web-packages)
+	@$(example-homes)
 	@mkdir -p out/test_all
 	@$(BIN)/pytest -n 4 -m chaos >out/test_all/farm.log 2>&1 & farm=$$!; \
 	$(BIN)/pytest -n 2 --dist loadfile --hypothesis-profile=long -m "$(REST)"; rest=$$?; \
@@ -77,6 +82,7 @@ test-all: setup ## every other test for a machine without a GPU: long, slow, stu
 	$(BIN)/pytest -n 2 --dist loadfile -m web tests/board/web
 
 test-long: setup ## what make test leaves out below a minute a test: long, and all examples of hypothesis
+	@$(example-homes)
 	$(BIN)/pytest -n 2 --dist loadfile --hypothesis-profile=long -m "$(LONG)"
 
 test-oldest: setup ## the quick tests with the lowest versions that pyproject.toml names: out/oldest-venv; NAME=tests/store for a part
@@ -86,6 +92,7 @@ test-newest: setup ## the quick tests with the newest Python here and the newest
 	@bash scripts/test_versions.sh newest "$(QUICK)" $(NAME)
 
 test-slow: setup ## the tests that take minutes
+	@$(example-homes)
 	$(BIN)/pytest -m slow
 
 test-farm: export PBRS_SETUP_ALSO := faketime
