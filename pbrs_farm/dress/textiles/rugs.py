@@ -26,7 +26,6 @@ from pbrs_farm.geometry.outlines import oval, rect
 from pbrs_farm.home.room_use import RoomKind
 
 # fmt: off
-
 PASS = "textiles"
 RUG_TAG = "rug"
 _FROM_WALL_M = 0.3

@@ -18,7 +18,6 @@ from pbrs_farm.furnishings.surroundings.scenery import (
 )
 
 # fmt: off
-
 STOREY_M: Final = 3.0
 
 _REVEAL_M: Final = 0.17  # that windows lie behind their front

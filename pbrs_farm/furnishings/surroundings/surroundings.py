@@ -44,7 +44,6 @@ from pbrs_farm.furnishings.surroundings.scenery import Drawn, Scenery, SceneryMa
 from pbrs_farm.home.room_use import RoomKind, named_kind
 
 # fmt: off
-
 LEAST_M: Final = 3.0
 """Nothing but ground and railings is nearer to a wall."""
 

@@ -26,8 +26,6 @@ from pbrs_farm.geometry.bodies import HALF_TURN
 from pbrs_farm.geometry.outlines import bent, rect, rings
 
 # fmt: off
-
-
 _DOOR_RAD: Final = radians(95)
 
 

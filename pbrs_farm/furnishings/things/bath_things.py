@@ -8,9 +8,8 @@ from pbrs_farm.dress.thing_materials import plain
 from pbrs_farm.furnishings.things.maker import Maker, thing
 from pbrs_farm.geometry.outlines import oval, rings, scaled
 
+
 # fmt: off
-
-
 @thing(group="bath_small")
 def toiletries(m: Maker) -> None:
     """One to four bottles, tubes, jars and cans of shampoo, cream and scent."""

@@ -32,8 +32,6 @@ from pbrs_farm.furnishings.things.shapes import row
 from pbrs_farm.geometry.outlines import bent, d_shape, oval, rect, rings
 
 # fmt: off
-
-
 _LID_RAD: Final = pi / 2  # of a toilet, close before its cistern
 
 

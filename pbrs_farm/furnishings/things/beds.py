@@ -19,8 +19,6 @@ from pbrs_farm.furnishings.things.shapes import Pair, row
 from pbrs_farm.geometry.outlines import bent
 
 # fmt: off
-
-
 Metres = Annotated[float, Range(0.005, 2.0)]
 
 _USUAL_DUVET = (0.17, 0.05, 0.02, 1.0)

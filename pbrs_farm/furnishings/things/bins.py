@@ -17,8 +17,6 @@ from pbrs_farm.furnishings.things.maker import Maker, Size, family, thing
 from pbrs_farm.geometry.outlines import bent, d_shape, oval, polar, rect, rings, scaled
 
 # fmt: off
-
-
 _FORMS = 17
 # width, depth and height of each form, per 2 r, 2 r and `tall`; the pair for sorting has a fixed
 # width

@@ -14,8 +14,6 @@ from pbrs_farm.dress.style import COLOURS, Rgb, Style, shade
 from pbrs_farm.dress.thing_materials import any_colour
 
 # fmt: off
-
-
 _EDGE_PX = 1024
 _COLUMNS, _ROWS = 30, 3
 _SPINE_W, _SPINE_H, _PAGES_H = 34, 180, 20

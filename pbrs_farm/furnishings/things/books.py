@@ -16,8 +16,6 @@ from pbrs_farm.furnishings.things.book_covers import N_CELLS, N_COVERS, Box4, Co
 from pbrs_farm.geometry.solids import box
 
 # fmt: off
-
-
 _BOARD_M = 0.0025
 _GAP_M = 0.0004  # between neighbours, so that no faces coincide
 

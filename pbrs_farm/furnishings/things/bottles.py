@@ -16,8 +16,6 @@ from pbrs_farm.geometry.bodies import sphere, stretched
 from pbrs_farm.geometry.outlines import bent, fluted, oval, rect, rings, scaled
 
 # fmt: off
-
-
 _Shape = tuple[tuple[float, float], ...]
 
 # Of each body: half its width and its height in metres, its outside up to the mouth in shares of these,

@@ -9,9 +9,8 @@ from pbrs_farm.furnishings.things.food import apple
 from pbrs_farm.furnishings.things.maker import Maker, thing
 from pbrs_farm.geometry.outlines import bent, fluted, oval, polar, rect, rings, scaled
 
+
 # fmt: off
-
-
 @thing(group="bowl")
 def bowl(m: Maker) -> None:
     """A bowl: on a foot, square, of wood, fluted, of wire, shallow, two of a set; some hold fruit."""

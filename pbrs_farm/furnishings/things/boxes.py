@@ -16,9 +16,8 @@ from pbrs_farm.furnishings.things.maker import Maker, thing
 from pbrs_farm.furnishings.things.shapes import row
 from pbrs_farm.geometry.outlines import bent, oval, polar, rect, ring_path, rings, scaled
 
+
 # fmt: off
-
-
 @thing(group="box", nyu40=BOX)
 def storage_box(m: Maker) -> None:
     """A box.

@@ -32,8 +32,6 @@ from pbrs_farm.furnishings.things.shapes import Pair
 from pbrs_farm.geometry.outlines import spaced
 
 # fmt: off
-
-
 _BOARD_M: Final = 0.018
 
 

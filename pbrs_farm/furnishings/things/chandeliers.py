@@ -23,8 +23,6 @@ from pbrs_farm.furnishings.things.maker import Maker, Size, family
 from pbrs_farm.geometry.outlines import bent, oval, polar
 
 # fmt: off
-
-
 # half the width of the light at the end of an arm
 _CUP_M: Final = {"candle": 0.034, "ball": 0.05, "shade": 0.065, "bell": 0.055}
 

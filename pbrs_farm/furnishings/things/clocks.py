@@ -10,9 +10,8 @@ from pbrs_farm.dress.thing_materials import glass, plain
 from pbrs_farm.furnishings.things.maker import Maker, thing
 from pbrs_farm.geometry.outlines import bent, rect, rings
 
+
 # fmt: off
-
-
 @thing(group="clock", called="alarm_clock")
 def clock(m: Maker) -> None:
     """A table clock: digital, round, with two bells, a wedge, for a mantel, under a glass dome."""

@@ -15,9 +15,8 @@ from pbrs_farm.furnishings.things.maker import Maker, thing
 from pbrs_farm.geometry.bodies import revolve, stretched
 from pbrs_farm.geometry.outlines import bent, oval, rect, rings, spaced
 
+
 # fmt: off
-
-
 @thing(group="shoes", nyu40=CLOTHES)
 def shoes(m: Maker) -> None:
     """A pair of shoes, toes to the front.

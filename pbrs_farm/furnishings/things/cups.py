@@ -12,9 +12,8 @@ from pbrs_farm.furnishings.things.maker import Maker, thing
 from pbrs_farm.geometry.bodies import smooth
 from pbrs_farm.geometry.outlines import bent, oval, rings
 
+
 # fmt: off
-
-
 @thing(group="cup")
 def cup(m: Maker) -> None:
     """A mug.

@@ -12,9 +12,8 @@ from pbrs_farm.dress.style import shade
 from pbrs_farm.dress.thing_materials import BLACK_GLASS, BLACK_STEEL, CHROME, STEEL, plain
 from pbrs_farm.furnishings.things.maker import Maker, thing
 
+
 # fmt: off
-
-
 @thing(group="monitor")
 def monitor(m: Maker) -> None:
     """A screen on its foot before a keyboard and a mouse."""

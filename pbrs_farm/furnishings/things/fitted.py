@@ -33,8 +33,6 @@ from pbrs_farm.furnishings.things.maker import Maker, Size, family
 from pbrs_farm.furnishings.things.shapes import Pair
 
 # fmt: off
-
-
 _BOARD_M: Final = 0.018
 _BACK_M: Final = 0.008
 

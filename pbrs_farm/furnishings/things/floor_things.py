@@ -10,9 +10,8 @@ from pbrs_farm.furnishings.things.maker import Maker, thing
 from pbrs_farm.geometry.bodies import bevelled
 from pbrs_farm.geometry.outlines import Triple, bent, polar
 
+
 # fmt: off
-
-
 @thing(group="cable", called="power_strip")
 def power_strip(m: Maker) -> None:
     """A strip of sockets with its cable in loops, a plug or two and chargers in it."""

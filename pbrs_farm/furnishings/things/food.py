@@ -12,9 +12,8 @@ from pbrs_farm.dress.thing_materials import glass, plain
 from pbrs_farm.furnishings.things.maker import Maker, thing
 from pbrs_farm.geometry.outlines import bent, polar
 
+
 # fmt: off
-
-
 @thing(group="food", called="food")
 def groceries(m: Maker) -> None:
     """Food.

@@ -15,9 +15,8 @@ from pbrs_farm.furnishings.things.maker import Maker, thing
 from pbrs_farm.furnishings.things.shapes import Pair
 from pbrs_farm.geometry.outlines import bent, rect, ring_path, rings
 
+
 # fmt: off
-
-
 @thing(group="picture_frame", nyu40=PICTURE)
 def table_frame(m: Maker) -> None:
     """A framed photograph on a table: many frames, one or several pictures."""

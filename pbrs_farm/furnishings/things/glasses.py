@@ -15,8 +15,6 @@ from pbrs_farm.geometry.bodies import bevelled, vessel
 from pbrs_farm.geometry.outlines import bent, fluted, oval, rings
 
 # fmt: off
-
-
 _Shape = tuple[tuple[float, float], ...]
 
 # Of each bowl: half its width and its height in metres, and its outside from the foot to the rim in

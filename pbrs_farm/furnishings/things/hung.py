@@ -28,8 +28,6 @@ from pbrs_farm.geometry.outlines import Profile, spaced
 from pbrs_farm.geometry.solids import lathe, quads_surface
 
 # fmt: off
-
-
 _STICKY: Final[tuple[Rgb, ...]] = ((0.95, 0.88, 0.35), (0.95, 0.6, 0.7), (0.6, 0.85, 0.6),
     (0.55, 0.8, 0.93))
 # turns an upright solid so that its top faces +z

@@ -16,8 +16,6 @@ from pbrs_farm.furnishings.things.shapes import Pair, row
 from pbrs_farm.geometry.outlines import Outline, bent, d_shape, rect, ring_path, rings
 
 # fmt: off
-
-
 _HEIGHTS: Final = {"door": 3.4, "low": 0.7}  # of fronts in one column, against a drawer's
 _FRONT_M: Final = 0.019  # thickness of a front
 _BOARD_M: Final = 0.016  # of a carcass

@@ -54,8 +54,6 @@ from pbrs_farm.geometry.bodies import creased
 from pbrs_farm.geometry.outlines import bent, d_shape, oval, rect, rings
 
 # fmt: off
-
-
 _OVEN: Final = glossy("oven enamel", (0.09, 0.09, 0.095), 0.35)
 CLEAR_PLASTIC: Final = glass((0.93, 0.96, 0.96), 0.25)
 _FALLING_RAD: Final = radians(88)  # of doors that fall open

@@ -26,9 +26,8 @@ from pbrs_farm.furnishings.things.maker import Maker, Size, family
 from pbrs_farm.furnishings.things.parameters import Choice, Range
 from pbrs_farm.geometry.outlines import bent, d_shape, fluted, oval, polar, rect, rings, scaled
 
+
 # fmt: off
-
-
 def lamp_shade(m: Maker, r0: float, r1: float, y0: float, y1: float, material: Material) -> None:
     """A shade of cloth or card r0 wide below, r1 above, from y0 to y1, its bulb in it."""
     m.revolve([(r0, y0), (r1, y1), (r1 - 0.003, y1), (r0 - 0.003, y0), (r0, y0)], n=28, of=material)

@@ -15,9 +15,8 @@ from pbrs_farm.furnishings.things.maker import Maker, thing
 from pbrs_farm.geometry.bodies import revolve
 from pbrs_farm.geometry.outlines import bent, oval, rect, ring_path, rings, scaled
 
+
 # fmt: off
-
-
 @thing(group="ornament")
 def ornament(m: Maker) -> None:
     """An ornament.

@@ -12,8 +12,6 @@ from pbrs_farm.furnishings.things.maker import Maker, thing
 from pbrs_farm.geometry.bodies import slab
 
 # fmt: off
-
-
 _INK = plain("print", (0.3, 0.3, 0.32), 0.8)
 
 

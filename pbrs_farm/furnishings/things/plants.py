@@ -22,8 +22,6 @@ from pbrs_farm.geometry.bodies import stretched
 from pbrs_farm.geometry.outlines import Triple, bent, fluted, polar, rect, rings, scaled
 
 # fmt: off
-
-
 _GREENS: Final = ((0.25, 0.43, 0.17), (0.32, 0.5, 0.22), (0.19, 0.35, 0.16), (0.41, 0.53, 0.26),
     (0.29, 0.42, 0.28))
 _BARK: Final = plain("bark", (0.36, 0.27, 0.19), 0.9)

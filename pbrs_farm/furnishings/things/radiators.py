@@ -12,9 +12,8 @@ from pbrs_farm.dress.thing_materials import CHROME, RUBBER, WHITE_STEEL, glossy,
 from pbrs_farm.furnishings.things.maker import Maker, Size, family, thing
 from pbrs_farm.geometry.outlines import bent
 
+
 # fmt: off
-
-
 @thing(group="radiator", place=Place.WALL)
 def towel_radiator(m: Maker) -> None:
     """A ladder of tubes that towels are dried on, in groups with gaps between."""

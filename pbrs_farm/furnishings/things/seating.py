@@ -31,9 +31,8 @@ from pbrs_farm.furnishings.things.shapes import Pair, on_side, row
 from pbrs_farm.geometry.bodies import frustum, sheared
 from pbrs_farm.geometry.outlines import bent, gathered, oval, rect, rings, spaced
 
+
 # fmt: off
-
-
 @thing(group="ottoman", nyu40=CHAIR, place=Place.FLOOR)
 def ottoman(m: Maker) -> None:
     """A square seat without a back: on feet, in a skirt, or a box; buttons on some."""

@@ -11,9 +11,8 @@ from pbrs_farm.dress.thing_materials import plain
 from pbrs_farm.furnishings.things.maker import Maker, thing
 from pbrs_farm.geometry.outlines import rect, scaled
 
+
 # fmt: off
-
-
 @thing(group="pillow", nyu40=PILLOW)
 def cushion(m: Maker) -> None:
     """A flat cushion for a sofa or a bed.

@@ -28,8 +28,6 @@ from pbrs_farm.furnishings.things.shapes import Pair, row
 from pbrs_farm.geometry.outlines import bent, oval, polar, rect
 
 # fmt: off
-
-
 _SPLIT_M = 0.95  # wider shelves get an upright in the middle
 
 

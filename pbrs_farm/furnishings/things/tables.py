@@ -28,9 +28,8 @@ from pbrs_farm.furnishings.things.parameters import Choice, Front, Legs, Pull, R
 from pbrs_farm.furnishings.things.shapes import on_side, row
 from pbrs_farm.geometry.outlines import bent, oval, polar, rect, rings
 
+
 # fmt: off
-
-
 def under_top(m: Maker, kind: str, w: float, d: float, high: float, material: Material,
     leg_kind: str, column: bool = True) -> None:
     """Support for a top w by d at `high`.

@@ -11,9 +11,8 @@ from pbrs_farm.furnishings.things.maker import Maker, thing
 from pbrs_farm.geometry.bodies import bevelled
 from pbrs_farm.geometry.outlines import fluted, oval, rect, rings
 
+
 # fmt: off
-
-
 @thing(group="plate")
 def plates(m: Maker) -> None:
     """A plate, or a few on top of each other."""

@@ -12,9 +12,8 @@ from pbrs_farm.dress.thing_materials import plain
 from pbrs_farm.furnishings.things.maker import Maker, thing
 from pbrs_farm.geometry.outlines import bent, oval, rect, rings, scaled
 
+
 # fmt: off
-
-
 @thing(group="toy")
 def toy(m: Maker) -> None:
     """A toy.

@@ -12,9 +12,8 @@ from pbrs_farm.furnishings.things.maker import Maker, thing
 from pbrs_farm.geometry.bodies import vessel
 from pbrs_farm.geometry.outlines import bent, fluted, oval, polar, rect, ring_path, rings, scaled
 
+
 # fmt: off
-
-
 @thing(group="vase")
 def vase(m: Maker) -> None:
     """A vase of one of many forms, empty or with dry twigs."""
