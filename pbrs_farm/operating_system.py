@@ -1,7 +1,7 @@
-"""What systems differ in, each with an answer where POSIX or Linux has the name and where it is lacking.
+"""Differences between operating systems, each with a substitute where POSIX or Linux names are missing.
 
-Processes, their memory and their ends, pipes that are waited for, files opened without waiting. No other module
-asks for such a name. Effects: those of each function. Where there is no /proc, psutil knows of processes.
+Processes, their memory, pipes and files. No other module uses such a name. Effects: those of
+each function. psutil is imported by the functions that need it, since the command line imports this module.
 """
 
 from __future__ import annotations
@@ -20,9 +20,6 @@ from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
 from pathlib import Path, PureWindowsPath
 from typing import IO, Any, Final, Protocol
-
-from pbrs_farm.core.errors import MachineFailed
-from pbrs_farm.installation import pip_command
 
 NOT_REGULAR: Final = "is no regular file (a device or a pipe)"
 _PR_SET_PDEATHSIG: Final = 1  # of linux/prctl.h
@@ -61,11 +58,12 @@ def end_tree(process: subprocess.Popen[bytes]) -> None:
         with contextlib.suppress(ProcessLookupError, PermissionError):
             os.killpg(process.pid, signal.SIGKILL)
         return
-    psutil = _psutil()
+    import psutil
+
     with contextlib.suppress(psutil.Error):
-        for below in psutil.Process(process.pid).children(recursive=True):
+        for child in psutil.Process(process.pid).children(recursive=True):
             with contextlib.suppress(psutil.Error):
-                below.kill()
+                child.kill()
     process.kill()
 
 
@@ -131,16 +129,10 @@ def _end_by(sign: int | None) -> None:
 
 
 def is_running(pid: int) -> bool:
-    """Whether a process of this number runs, or has ended and was not waited for."""
-    if not _POSIX:  # Windows ends the process that signal 0 is sent to
-        return bool(_psutil().pid_exists(pid))
-    try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
-        return False
-    except PermissionError:
-        return True
-    return True
+    """True while a process of this number runs, or has ended and was not waited for."""
+    import psutil
+
+    return psutil.pid_exists(pid)
 
 
 def after_fork(act: Callable[[], None]) -> None:
@@ -154,49 +146,33 @@ def after_fork(act: Callable[[], None]) -> None:
 
 def memory_bytes() -> int:
     """Memory of this machine, bytes."""
-    if hasattr(os, "sysconf"):
-        return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    return int(_psutil().virtual_memory().total)
+    import psutil
+
+    return int(psutil.virtual_memory().total)
 
 
 def resident_mb(pid: int) -> float:
     """Resident memory of a process in MiB, 0 when it is gone; pages shared with others count in full."""
-    if not _has_proc():
-        psutil = _psutil()
-        try:
-            return float(psutil.Process(pid).memory_info().rss) / 2**20
-        except psutil.Error:
-            return 0.0
+    import psutil
+
     try:
-        pages = int(Path(f"/proc/{pid}/statm").read_text("ascii").split()[1])
-    except (OSError, IndexError, ValueError):
+        return float(psutil.Process(pid).memory_info().rss) / 2**20
+    except psutil.Error:
         return 0.0
-    return pages * os.sysconf("SC_PAGE_SIZE") / 2**20
 
 
 def tree_mb(pid: int) -> float:
-    """Resident memory of a process and all it started, in MiB; pages they share count for each.
+    """Resident memory of a process and its descendants, in MiB; shared pages count for each process.
 
-    0 for a process that is gone. Pages shared between the processes make the sum larger than what
-    they take together.
+    0 if the process is gone.
     """
-    return resident_mb(pid) + sum(tree_mb(child) for child in _children(pid))
+    import psutil
 
-
-def _children(pid: int) -> list[int]:
-    """Numbers of the processes that one started; none where it is gone."""
-    if not _has_proc():
-        psutil = _psutil()
-        try:
-            return [child.pid for child in psutil.Process(pid).children()]
-        except psutil.Error:
-            return []
     try:
-        # Children are listed by the thread that started them.
-        files = Path(f"/proc/{pid}/task").glob("*/children")
-        return [int(child) for file in files for child in file.read_text("ascii").split()]
-    except OSError:
-        return []
+        children = psutil.Process(pid).children(recursive=True)
+    except psutil.Error:
+        return 0.0
+    return sum(resident_mb(pid) for pid in (pid, *(child.pid for child in children)))
 
 
 def peak_mb() -> float:
@@ -204,8 +180,10 @@ def peak_mb() -> float:
     try:
         resource = import_module("resource")
     except ImportError:
-        found = _psutil().Process().memory_info()
-        return float(getattr(found, "peak_wset", found.rss)) / 1e6
+        import psutil
+
+        memory = psutil.Process().memory_info()
+        return float(getattr(memory, "peak_wset", memory.rss)) / 1e6
     peak = float(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
     return peak / 1000 if _has_proc() else peak / 1e6  # Linux counts in KiB, macOS in bytes
 
@@ -370,12 +348,3 @@ def has_nvidia_driver() -> bool:
 def _has_proc() -> bool:
     """Whether this is Linux, whose processes are files."""
     return Path("/proc/self/statm").exists()
-
-
-def _psutil() -> Any:
-    """psutil, which is installed where there is no /proc."""
-    try:
-        return import_module("psutil")
-    except ImportError as error:
-        hint = f"{pip_command()} install psutil"
-        raise MachineFailed("this system tells of processes by psutil", hint=hint) from error

@@ -44,7 +44,7 @@ def test_our_modules_lack_the_names() -> None:
     assert _said(python_without_posix(["-c", _NAMES])) == "False False False\n"
 
 
-def test_memory_is_told_by_psutil_where_there_is_no_proc() -> None:
+def test_psutil_reports_memory_where_there_is_no_proc() -> None:
     code = "from pbrs_farm.operating_system import *; print(resident_mb(1), tree_mb(1), give_back_memory())"
     assert _said(python_without_posix(["-c", code], "proc")) == "100.0 100.0 None\n"
 
