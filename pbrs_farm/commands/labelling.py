@@ -21,7 +21,7 @@ from pbrs_farm.commands.arguments import (
 )
 from pbrs_farm.commands.options import add_options, request_from
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.export.form import HomeForm, ViewForm, form_names, form_of
+from pbrs_farm.export.form import HomeForm, form_names, form_of
 
 if TYPE_CHECKING:
     from pbrs_farm.core.house_split import SplitShares
@@ -79,10 +79,10 @@ def _add_form_options(p: argparse.ArgumentParser, words: Sequence[str] | None) -
 
     An option of other forms alone ends the command with an error that names them.
     """
-    from pbrs_farm.export.form import form_options, no_such_option, view_forms
+    from pbrs_farm.export.form import all_forms, form_options, no_such_option
 
     if words is None:
-        for form in view_forms():
+        for form in all_forms():
             if not any(f"--{name}" in p._option_string_actions for name in form_options(form)):
                 _add_options_of(p, form)
         return
@@ -99,19 +99,19 @@ def _add_form_options(p: argparse.ArgumentParser, words: Sequence[str] | None) -
     unknown = {word.partition("=")[0] for word in words if word.startswith("--")}
     for option in sorted(unknown - p._option_string_actions.keys()):
         field = option.removeprefix("--").replace("-", "_")
-        if any(field in form_options(other) for other in view_forms()):
+        if any(field in form_options(other) for other in all_forms()):
             p.error(str(no_such_option(form, field)))
 
 
 def _add_options_of(p: argparse.ArgumentParser, form: Form) -> None:
-    if isinstance(form, ViewForm) and form.options is not None:
+    if form.options is not None:
         add_options(p, form.options, group=f"{form.name} (--to {form.name})")
 
 
 def _export(args: argparse.Namespace) -> int:
     form = form_of(args.to)
     if isinstance(form, HomeForm):
-        return _export_homes(args)
+        return _export_homes(args, form)
     from pbrs_farm.core.house_split import shares_from_text
     from pbrs_farm.export.export_views import export, remarks_of
     from pbrs_farm.export.view_options import ViewOptions
@@ -145,17 +145,19 @@ def choice_of(options: ViewOptions) -> Choice:
     )
 
 
-def _export_homes(args: argparse.Namespace) -> int:
+def _export_homes(args: argparse.Namespace, form: HomeForm) -> int:
     from pbrs_farm.export.export_homes import export_homes
+    from pbrs_farm.export.form import form_options
 
-    options = {"--selection": args.selection, "--layers": args.layers, "--modes": args.modes}
-    options |= {"--size": args.size, "--classes": args.classes, "--split": args.split}
-    for option, value in options.items():
+    of_views = {"--selection": args.selection, "--layers": args.layers, "--modes": args.modes}
+    of_views |= {"--size": args.size, "--classes": args.classes, "--split": args.split}
+    for option, value in of_views.items():
         if value:
             raise BadInput(option, "", f"chooses of views; --to {args.to} writes homes")
     out = args.out or Path(f"{Path(args.folder).resolve().name}_{args.to}")
+    options = {name: getattr(args, name) for name in form_options(form)}
     with folder_of(args.folder) as folder:
-        n_homes, n_files, remarks = export_homes(folder, out, args.to)
+        n_homes, n_files, remarks = export_homes(folder, out, args.to, **options)
     echo(f"{out}: {counted(n_homes, 'home')}, {n_files} files")
     for remark in remarks:
         warn(remark)

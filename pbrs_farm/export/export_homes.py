@@ -6,41 +6,45 @@ Effects: reads house.glb and house.json of an output folder, writes a new folder
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house import House
-from pbrs_farm.export.form import HomeForm, form_names, form_of
+from pbrs_farm.export.form import HomeForm, form_names, form_of, options_from
 from pbrs_farm.export.grasps import GRASPS, grasps_json
 from pbrs_farm.export.home_pieces import ExportedHome, exported_home
 from pbrs_farm.formats.house_bundle import house_from_bundle
 from pbrs_farm.regular_files import MAX_SCENE_BYTES, fault_of, files_below, new_folder, read_regular
 
 
-def export_homes(folder: Path, out: Path, name: str) -> tuple[int, int, list[str]]:
+def export_homes(folder: Path, out: Path, name: str, **options: Any) -> tuple[int, int, list[str]]:
     """Write every home of folder to out in the form of that name: (homes, files, remarks for the user).
 
-    folder: an output folder, or one of `repair` or `dress` with house.glb. Each home gets a folder of
-    its id. Raises BadInput for a form of views, a folder without homes, or an out that is not empty.
+    folder: an output folder, or one of `repair` or `dress` with house.glb. Each home gets a folder of its
+    id. options: of the form. Raises BadInput for a form of views, an option that the form does not have,
+    a folder without homes, or an out that is not empty.
     """
     form, remarks = _home_form(name), []
+    form_options = options_from(form, options)
     folders = house_folders(folder)
     with new_folder(out) as scratch:
         for house_folder in folders:
-            home = exported_home(stored_house(house_folder))
+            home = exported_home(stored_house(house_folder), form_options)
             _write_home(home, scratch / home.house.id, form)
             if form.remark:
                 remarks.append(f"{home.house.id}: {form.remark}")
         return len(folders), len(files_below(scratch)), remarks
 
 
-def export_house(house: House, out: Path, name: str) -> int:
+def export_house(house: House, out: Path, name: str, **options: Any) -> int:
     """Write one house to a new folder in the form of that name; returns the number of files.
 
-    Raises BadInput for a form of views, or an out that is not empty.
+    options: of the form. Raises BadInput as export_homes.
     """
     form = _home_form(name)
+    home = exported_home(house, options_from(form, options))
     with new_folder(out) as scratch:
-        _write_home(exported_home(house), scratch, form)
+        _write_home(home, scratch, form)
         return len(files_below(scratch))
 
 

@@ -19,7 +19,7 @@ from pbrs_farm.core.checked_calls import as_words, checked_call
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house_split import SPLITS, SplitShares, split_of_house
 from pbrs_farm.export.chosen_view import Choice, ChosenView
-from pbrs_farm.export.form import LEFT_OUT, REMARKS, ViewForm, form_of, options_from, view_forms
+from pbrs_farm.export.form import LEFT_OUT, REMARKS, ViewForm, all_forms, form_of, options_from
 from pbrs_farm.formats.class_map import class_map
 from pbrs_farm.formats.output_folder import ViewEntry, views_of
 from pbrs_farm.regular_files import fault_of, files_below, new_folder, read_regular
@@ -62,7 +62,8 @@ def export(
     if options or choice.options is None:
         choice = replace(choice, options=options_from(form, options))
     if choice.classes is not None and not form.has_classes:
-        hint = f"--to {', '.join(form.name for form in view_forms() if form.has_classes)}"
+        owners = [f.name for f in all_forms() if isinstance(f, ViewForm) and f.has_classes]
+        hint = f"--to {', '.join(owners)}"
         raise BadInput("--classes", "", f"{name} has no classes of your own", hint=hint)
     entries = finished_entries(folder, selection)
     if views is not None:

@@ -89,9 +89,9 @@ class ViewForm:
 class HomeForm:
     """A form of homes, as scenes of other simulators; it is listed as a ViewForm is.
 
-    write: called with each home and its own empty folder. remark: a warning for each written home, ""
-    for none. up: the axis that is up in the frames of its bodies, "y" or "z", for the grasps.json
-    beside them; "" for no grasps.json.
+    write: called with each home and its own empty folder. options: as of a ViewForm; write reads them as
+    `home.of(MyOptions)`. remark: a warning for each written home, "" for none. up: the up axis in the
+    frames of its bodies, "y" or "z", for the grasps.json beside them; "" for no grasps.json.
     """
 
     of: ClassVar[str] = "homes"
@@ -99,6 +99,7 @@ class HomeForm:
     name: str
     write: WriteHome
     help: str
+    options: type[Record] | None = None
     remark: str = ""
     up: str = ""
 
@@ -130,14 +131,12 @@ def form_of(name: str) -> Form:
     return form
 
 
-def view_forms() -> Iterator[ViewForm]:
-    """Every form of views.
+def all_forms() -> Iterator[Form]:
+    """Every form.
 
-    Slow, since all forms are imported: for messages and completion, not to check one name.
+    Slow, since all are imported: for messages and completion, not to check one name.
     """
-    for name in form_names():
-        if isinstance(form := form_of(name), ViewForm):
-            yield form
+    return map(form_of, form_names())
 
 
 def form_options(form: Form) -> dict[str, str]:
@@ -146,16 +145,15 @@ def form_options(form: Form) -> dict[str, str]:
     >>> list(form_options(form_of("lidar")))
     ['scanner']
     """
-    model = form.options if isinstance(form, ViewForm) else None
-    if model is None:
+    if form.options is None:
         return {}
     return {
-        name: model.model_fields[field].description or ""
-        for name, (field, _shown) in options_of(model).items()
+        name: form.options.model_fields[field].description or ""
+        for name, (field, _shown) in options_of(form.options).items()
     }
 
 
-def options_from(form: ViewForm, values: Mapping[str, Any]) -> Record | None:
+def options_from(form: Form, values: Mapping[str, Any]) -> Record | None:
     """The form's options with these values, defaults for the others; None for a form without options.
 
     Raises BadInput for a value that does not fit, and for an option that the form does not have; it
@@ -169,7 +167,7 @@ def options_from(form: ViewForm, values: Mapping[str, Any]) -> Record | None:
 
 def no_such_option(form: Form, name: str) -> BadInput:
     """The error for an option that a form does not have; its hint names the forms that have it."""
-    owners = [other.name for other in view_forms() if name in form_options(other)]
+    owners = [other.name for other in all_forms() if name in form_options(other)]
     hint = f"--to {', '.join(owners)}" if owners else did_you_mean(name, form_options(form))
     return BadInput(flag(name), "", f"{form.name} has no such option", hint=hint)
 

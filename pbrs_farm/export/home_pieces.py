@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 import numpy as np
 import shapely
@@ -21,11 +21,13 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.frames import transform_points
 from pbrs_farm.core.house import House, Item, ItemKind, LightPart, Material, Room, Surface
 from pbrs_farm.core.lighting import LightForm, flux_lm
+from pbrs_farm.core.record import Record
 from pbrs_farm.export.home_bodies import Body, bodies_of, box_inertia
 from pbrs_farm.geometry.heights import highest_below
 from pbrs_farm.geometry.scene_triangles import SceneTriangles
 from pbrs_farm.geometry.surface_points import surface_points
 
+_Options = TypeVar("_Options", bound=Record)
 COLLISION: Final = "convex parts within 5 mm, no more than 32"
 COLLIDES: Final = f"things collide as {COLLISION}"
 _MOST_KG: Final = 150.0
@@ -157,6 +159,11 @@ class ExportedHome:
 
     house: House
     pieces: tuple[Piece, ...]  # an item each, in the house's order
+    options: Record | None = None  # of the form; None: its defaults
+
+    def of(self, kind: type[_Options]) -> _Options:
+        """The form's options, of the type that its FORM names."""
+        return self.options if isinstance(self.options, kind) else kind()
 
     @property
     def building(self) -> tuple[Piece, ...]:
@@ -189,7 +196,7 @@ class ExportedHome:
         return source.attribution or ", ".join(x for x in (source.author, source.licence) if x)
 
 
-def exported_home(house: House) -> ExportedHome:
+def exported_home(house: House, options: Record | None = None) -> ExportedHome:
     """The home in the frames of its items, without the outdoors and removed items.
 
     Each item becomes a piece: local meshes, a unique name that is valid in files, lamps in lumen, fixed or
@@ -207,7 +214,7 @@ def exported_home(house: House) -> ExportedHome:
         _piece(item, house.materials, number, name, _rests(scene, k))
         for k, ((number, item), name) in enumerate(zip(numbered, names, strict=True))
     ]
-    return ExportedHome(house, tuple(pieces))
+    return ExportedHome(house, tuple(pieces), options)
 
 
 def _unique_names(items: Iterable[Item]) -> list[str]:

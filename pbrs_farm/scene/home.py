@@ -238,18 +238,19 @@ class Home:
         return home
 
     @checked_call
-    def export(self, folder: str | Path, to: str = "gltf") -> Path:
+    def export(self, folder: str | Path, to: str = "gltf", **options: Any) -> Path:
         """Write the home for another program: to = gltf, habitat, mjcf, sdf, urdf, usd or usdz.
 
         Each item is one node, prim or model with a collider and its lamps; docs/formats/simulators.md describes
-        the forms, and `pf.load` reads all but mjcf, sdf and urdf. Raises BadInput if the folder is not empty.
+        the forms, and `pf.load` reads all but mjcf, sdf and urdf. options: of the form. Raises BadInput if the
+        folder is not empty, or for an option that the form does not have.
 
             >>> home.export("as_gltf").is_dir()
             True
         """
         from pbrs_farm.export.export_homes import export_house
 
-        export_house(self.house, Path(folder), to)
+        export_house(self.house, Path(folder), to, **options)
         return Path(folder)
 
     @checked_call

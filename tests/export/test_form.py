@@ -13,11 +13,13 @@ from pbrs_farm.commands.set_file import set_from_bytes
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.export import forms
 from pbrs_farm.export.chosen_view import Choice
-from pbrs_farm.export.export_homes import export_homes
+from pbrs_farm.export.export_homes import export_homes, export_house
 from pbrs_farm.export.export_views import export
 from pbrs_farm.export.form import conventions_table, form_names, form_of, forms_table
 from pbrs_farm.formats.class_map import class_map
+from pbrs_farm.formats.house_bundle import bundle_from_house
 from tests.check.roots import make_root
+from tests.export.homes import repaired_home
 
 DOCS = Path(__file__).parents[2] / "docs/formats"
 PAGES = {"views": DOCS / "export.md", "homes": DOCS / "simulators.md"}
@@ -141,6 +143,40 @@ def test_its_options_are_those_of_the_command_of_python_and_of_a_set(
     text = capsys.readouterr().out
     assert "--prefix WORD" in text
     assert "--scanner" not in text
+
+
+OF_HOMES = """
+from pbrs_farm.plugin import HomeForm, Record, option
+
+
+class CountOptions(Record):
+    unit: str = option("rooms", "what is counted", choices=("rooms", "items"))
+
+
+def write(home, folder):
+    (folder / "count.txt").write_text(str(len(getattr(home.house, home.of(CountOptions).unit))))
+
+
+FORM = HomeForm("my-count", write, "`count.txt`", options=CountOptions)
+"""
+
+
+@pytest.mark.kinds("form")
+def test_a_form_of_homes_has_options_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "forms").mkdir()
+    (tmp_path / "forms/my_count.py").write_text(OF_HOMES)
+    monkeypatch.setattr(forms, "__path__", [*forms.__path__, str(tmp_path / "forms")])
+    house = repaired_home()
+    files = zip(("house.glb", "house.json"), bundle_from_house(house), strict=True)
+    for name, data in files:
+        (tmp_path / name).write_bytes(data)
+    words = ["export", str(tmp_path), "--to", "my-count", "--unit", "items", "--out"]
+    assert main([*words, str(tmp_path / "out")]) == 0
+    assert (tmp_path / f"out/{house.id}/count.txt").read_text() == str(len(house.items))
+    export_house(house, tmp_path / "rooms", "my-count")
+    assert (tmp_path / "rooms/count.txt").read_text() == str(len(house.rooms))
+    with pytest.raises(BadInput, match=r"--unit: gltf has no such option \(--to my-count"):
+        export_house(house, tmp_path / "x", "gltf", unit="items")
 
 
 @pytest.mark.usefixtures("mine")
