@@ -39,14 +39,6 @@ class Board:
     ending: threading.Event  # set at the end of the board
     farm: LiveFarm | None = None  # None for a root without a farm
 
-    def start(self) -> None:
-        """Start to read the root."""
-        self.refresher.start()
-
-    def end(self) -> None:
-        """Stop the threads."""
-        self.refresher.end()
-
 
 def new_board(store: Store, options: BoardOptions, farm: LiveFarm | None = None) -> Board:
     """A board of an output root with its cache below options.cache, not started yet.

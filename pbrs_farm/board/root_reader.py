@@ -79,10 +79,6 @@ class RootReader:
             return {}
         return value if isinstance(value, dict) else {}
 
-    def list(self, prefix: str) -> Iterator[str]:
-        """Keys below the folder prefix."""
-        return self.store.list(prefix)
-
     def _size_within(self, key: str, most_bytes: int) -> int:
         self._check_inside(key)
         head = self.store.head(key)

@@ -39,11 +39,11 @@ def application(board: Board) -> ASGIApp:
     @asynccontextmanager
     async def lifespan(_app: Starlette) -> AsyncIterator[None]:
         anyio.to_thread.current_default_thread_limiter().total_tokens = _THREADS
-        board.start()
+        board.refresher.start()
         try:
             yield
         finally:
-            board.end()
+            board.refresher.end()
 
     app = Starlette(
         routes=_routes(),

@@ -57,10 +57,6 @@ class Sessions:
         with self._lock:
             self._open.pop(_digest(session), None)
 
-    def is_open(self, session: str) -> bool:
-        """True for the word of an open session."""
-        return self.user_of(session) is not None
-
     def user_of(self, session: str) -> str | None:
         """User of an open session, "" for the board's own token; else None."""
         with self._lock:

@@ -84,7 +84,7 @@ def light_images(lamps: int) -> dict[str, np.ndarray]:
 
 
 def view_facts(view: str, lamps: int) -> dict[str, Any]:
-    """What view.json says."""
+    """Content of view.json."""
     rows = [
         {"number": k + 1, "item": f"piece_{k}", "name": f"lamp {k}", "room": "0_0", "lm": 800.0,
          "share": 1 / lamps, "layer": f"lamp{k + 1}", "instance": k + 1}

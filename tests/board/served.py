@@ -1,4 +1,4 @@
-"""A board that is really served, on a free port of this machine, in a thread."""
+"""A served board on a free port of this machine, in a thread."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A farm's jobs and workers are shown as they are, changed only after a question, and each change is told."""
+"""Pages of a farm: live jobs and workers, changes after a confirmation, and the audit of changes."""
 
 from __future__ import annotations
 
@@ -65,8 +65,8 @@ def client(farm: Farm, drive: Drive, tmp_path: Path) -> Iterator[httpx.Client]:
 def do(client: httpx.Client, what: str, of: str, **more: str) -> httpx.Response:
     """Confirm a change as a person would, from its own page."""
     html = client.get("/farm/confirm", params={"what": what, "of": of, **more}).text
-    found = re.search(r'name="form_word" value="([0-9a-f]{64})"', html)
-    word = found[1] if found else ""
+    match = re.search(r'name="form_word" value="([0-9a-f]{64})"', html)
+    word = match[1] if match else ""
     return client.post("/farm/do", data={"form_word": word, "what": what, "of": of, **more})
 
 
@@ -82,11 +82,11 @@ def test_the_farm_says_which_homes_are_finished(farm: Farm) -> None:
     job = farm.submit(HOUSES, new_spec(recipe_from_name("preview"))).job_id
     drive, live = Drive(farm.ledger, farm.spec(job)), LiveFarm(farm)
     assert live.finished_houses() == set()
-    first, *others = drive.dispatch()
+    first, *rest = drive.dispatch()
     drive.run(first)
     drive.run_all()
     assert live.finished_houses() == {first.partition("/")[0]}
-    for task in others:
+    for task in rest:
         drive.run(task)
     drive.run_all()
     assert live.finished_houses() == {"h0", "h1", "h2"}
@@ -121,8 +121,8 @@ def test_a_change_is_asked_confirmed_done_and_written_down(
     assert do(client, "pause", job).status_code == 401
     assert farm.view(job).state == "running"
     log_in(client)
-    for what, state in (("pause", "paused"), ("resume", "running"), ("cancel", "cancelled")):
-        assert do(client, what, job).status_code == 303
+    for action, state in (("pause", "paused"), ("resume", "running"), ("cancel", "cancelled")):
+        assert do(client, action, job).status_code == 303
         assert farm.view(job).state == state
     (file,) = (tmp_path / "cache").glob("*/audit.jsonl")
     rows = [json.loads(line) for line in file.read_text().splitlines()]
@@ -198,8 +198,8 @@ def test_failed_tasks_are_retried(client: httpx.Client, farm: Farm, drive: Drive
 
 def test_a_worker_is_drained_and_asked_back(client: httpx.Client, farm: Farm) -> None:
     log_in(client)
-    for what, state in (("drain", "draining"), ("undrain", "alive")):
-        assert do(client, what, "w1").status_code == 303
+    for action, state in (("drain", "draining"), ("undrain", "alive")):
+        assert do(client, action, "w1").status_code == 303
         assert farm.workers()[0]["state"].startswith(state[:5])
     assert do(client, "drain", EVIL).status_code == 409
 
@@ -246,16 +246,16 @@ def test_pages_hear_of_what_changes(client: httpx.Client, drive: Drive) -> None:
 def test_ten_who_look_ask_redis_once(
     farm: Farm, drive: Drive, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    asked: list[str] = []
+    requests: list[str] = []
     live = LiveFarm(farm, clock=lambda: 0.0)
     whole = type(farm).workers
-    monkeypatch.setattr(type(farm), "workers", lambda self: asked.append("x") or whole(self))
+    monkeypatch.setattr(type(farm), "workers", lambda self: requests.append("x") or whole(self))
     for _ in range(10):
         live.now()
-    assert asked == ["x"]
+    assert requests == ["x"]
     live.forget()
     live.now()
-    assert asked == ["x", "x"]
+    assert requests == ["x", "x"]
 
 
 def test_a_farm_that_does_not_answer_is_told_and_the_root_is_shown(

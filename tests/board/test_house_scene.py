@@ -46,7 +46,7 @@ def test_a_scene_has_rooms_cameras_and_counts_and_leaves_out_what_is_damaged(
         scene = client.get("/homes/a-1/scene.json").json()
         assert [room["name"] for room in scene["rooms"]] == ["Kitchen", "Bath"]
         assert [camera["id"] for camera in scene["cameras"]] == ["0_0_1", "0_0_5"]
-        # The one that was rendered leads to its picture.
+        # The rendered one links to its picture.
         assert scene["cameras"][0]["url"] == "/homes/a-1/views/0_0_1"
         assert scene["cameras"][1]["url"] == ""
         assert scene["refused"] == report["refused"]
@@ -72,15 +72,15 @@ def test_the_candidates_are_those_that_the_run_refused() -> None:
     store.put("recipe.json", json_bytes(recipe))
     for name, data in zip(("house.glb", "house.json"), bundle_from_house(house), strict=True):
         store.put(f"houses/{house.id}/{name}", data)
-    found = candidates(store, house.id)
+    answer = candidates(store, house.id)
     caster = Caster(geometry_from_house(house))
     counters = caster.item_counts, caster.depth_pictures
     sampling = sample_cameras(house, recipe.cameras, camera_seed(house.id, recipe), *counters)
-    counted = Counter(found["verdicts"][row[3]] for row in found["rows"])
+    counted = Counter(answer["verdicts"][row[3]] for row in answer["rows"])
     refused = {k: n for k, n in counted.items() if k not in ("winner", "lower_score")}
     assert refused == {k: n for k, n in sampling.report.refused.items() if n}
     assert counted["winner"] == sampling.report.n_views
-    assert found["n"] == sampling.report.n_candidates
+    assert answer["n"] == sampling.report.n_candidates
 
 
 def test_an_object_was_not_sampled() -> None:

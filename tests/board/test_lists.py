@@ -124,7 +124,7 @@ def test_what_a_run_adds_or_removes_is_seen_at_the_next_look(tmp_path: Path) -> 
 
 
 class CountingStore(MemoryStore):
-    """A store in memory that counts what is listed of it."""
+    """A store in memory that counts its listings."""
 
     n_listings = 0
 
@@ -157,9 +157,9 @@ def test_a_store_with_a_manifest_or_a_farm_is_never_listed(tmp_path: Path) -> No
     finish("c-3", "0_0_7")
     finished.add("c-3")
     refresher.refresh()
-    found = queries.view("c-3", "0_0_7")
-    assert found is not None
-    assert found.has("depth")
+    entry = queries.view("c-3", "0_0_7")
+    assert entry is not None
+    assert entry.has("depth")
     # The merged manifest says of each house what its own says: nothing is read again.
     generation = index.generation
     store.put(keys.MANIFEST, b"".join(store.get(f"houses/{h}/manifest.jsonl") for h in HOMES))
@@ -207,11 +207,11 @@ def test_pages_cut_a_long_list_without_loss(tmp_path: Path) -> None:
     views = tuple(ViewRow(f"0_0_{k:04}", "Hall", 1, 2, ()) for k in range(130))
     index.enter([(HouseRow("a-1", "Home", "", 1, views), "x")])
     queries = Queries(index)
-    found = [queries.views(filter_from_query({"page": str(k)})) for k in (1, 2, 3, 99)]
-    assert [len(page.rows) for page in found] == [48, 48, 34, 34]
-    ids = [v.id for page in found[:3] for v in page.rows]
+    listed = [queries.views(filter_from_query({"page": str(k)})) for k in (1, 2, 3, 99)]
+    assert [len(page.rows) for page in listed] == [48, 48, 34, 34]
+    ids = [v.id for page in listed[:3] for v in page.rows]
     assert ids == [v.id for v in views]
-    assert found[3].number == 3
+    assert listed[3].number == 3
 
 
 @pytest.mark.parametrize("text", ["", "0", "-1", "x", "1e9", "99999999999", "²"])
@@ -268,12 +268,12 @@ def test_the_probes_packet_holds_the_labels_of_every_pixel(client: httpx.Client)
         ("normal", "<u2", 3 * n),
         ("semantic", "<u1", n),
     ]
-    at = 16
+    start = 16
     for name, dtype, count in planes:
-        plane = np.frombuffer(data, dtype, count, at)
+        plane = np.frombuffer(data, dtype, count, start)
         np.testing.assert_array_equal(plane, labels[name].reshape(-1))
-        at += plane.nbytes
-    assert at == len(data)
+        start += plane.nbytes
+    assert start == len(data)
 
 
 def test_scripts_are_sent_packed_and_kept_by_their_version(client: httpx.Client) -> None:

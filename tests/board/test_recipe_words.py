@@ -1,4 +1,4 @@
-"""A root's recipe is told as the command line would say it."""
+"""The recipe of a root in words of the command line."""
 
 from __future__ import annotations
 

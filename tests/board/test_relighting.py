@@ -65,8 +65,8 @@ def test_a_lens_that_glares_glares_in_the_sum_that_a_browser_makes(tmp_path: Pat
     stored = light_images(2)
     for factor in (1.0, 0.25):
         total = sum(planes[n] for n in ("lamp1", "lamp2")) * factor + planes["outdoor"]
-        wanted = add_glare(stored["indoor"] * np.float32(factor) + stored["outdoor"], 0.3)
-        np.testing.assert_allclose(total / facts["scale"], wanted, rtol=2e-3)
+        expected = add_glare(stored["indoor"] * np.float32(factor) + stored["outdoor"], 0.3)
+        np.testing.assert_allclose(total / facts["scale"], expected, rtol=2e-3)
 
 
 def test_a_page_says_the_command_that_makes_the_same_file(root: Path, client: httpx.Client) -> None:

@@ -48,7 +48,7 @@ def test_beyond_loopback_nothing_is_read_without_the_token(root: Path, tmp_path:
         for path in ("/", "/views", VIEW, f"{VIEW}/file/depth", f"{VIEW}/pixels"):
             answer = client.get(path)
             assert (answer.status_code, answer.headers["location"]) == (303, "/login")
-        # What the form itself needs is open.
+        # Files of the form are readable.
         assert client.get("/login").status_code == 200
         assert client.get("/static/board.css").status_code == 200
         assert log_in(client, "a guess").status_code == 403
@@ -73,9 +73,9 @@ def test_the_sessions_cookie_is_no_scripts_and_no_other_sites(root: Path, tmp_pa
 
 
 def form_word(client: httpx.Client) -> str:
-    found = re.search(r'name="form_word" value="([0-9a-f]{64})"', client.get("/").text)
-    assert found
-    return found[1]
+    match = re.search(r'name="form_word" value="([0-9a-f]{64})"', client.get("/").text)
+    assert match
+    return match[1]
 
 
 def test_a_change_needs_a_session_and_its_form_word(root: Path, tmp_path: Path) -> None:
@@ -115,8 +115,8 @@ def test_a_change_from_a_foreign_page_is_refused(
         log_in(client)
         data = {"form_word": form_word(client)}
         assert client.post("/logout", data=data, headers=headers).status_code == 403
-        own = {"Origin": str(client.base_url).rstrip("/")}
-        assert client.post("/logout", data=data, headers=own).status_code == 303
+        origin = {"Origin": str(client.base_url).rstrip("/")}
+        assert client.post("/logout", data=data, headers=origin).status_code == 303
 
 
 def test_nothing_changes_on_a_readonly_board(root: Path, tmp_path: Path) -> None:
@@ -228,10 +228,10 @@ def half_open(client: httpx.Client, n: int, sent: bytes) -> Iterator[list[socket
     """n connections that sent so much and say no more."""
     address = (client.base_url.host, client.base_url.port or 0)
     with ExitStack() as stack:
-        held = [stack.enter_context(socket.create_connection(address)) for _ in range(n)]
-        for one in held:
-            one.sendall(sent)
-        yield held
+        sockets = [stack.enter_context(socket.create_connection(address)) for _ in range(n)]
+        for held_socket in sockets:
+            held_socket.sendall(sent)
+        yield sockets
 
 
 def test_three_hundred_half_open_connections_keep_nobody_out(root: Path, tmp_path: Path) -> None:
@@ -244,13 +244,13 @@ def test_who_connects_must_ask_in_time(root: Path, tmp_path: Path) -> None:
     form = b"POST /login HTTP/1.1\r\nHost: localhost\r\nContent-Length: 9\r\n\r\ntoken"
     with served(str(root), tmp_path, limits=limits) as client:
         for sent in (b"", b"GET / HTTP/1.1\r\nHost: loc"):
-            with half_open(client, 1, sent) as (one,):
-                one.settimeout(5)
+            with half_open(client, 1, sent) as (connection,):
+                connection.settimeout(5)
                 with suppress(ConnectionResetError):
-                    assert one.recv(100) == b""
-        with half_open(client, 1, form) as (one,):
-            one.settimeout(5)
-            assert one.recv(100).startswith(b"HTTP/1.1 408")
+                    assert connection.recv(100) == b""
+        with half_open(client, 1, form) as (connection,):
+            connection.settimeout(5)
+            assert connection.recv(100).startswith(b"HTTP/1.1 408")
 
 
 def test_a_wrong_bearer_counts_as_a_wrong_login(root: Path, tmp_path: Path) -> None:

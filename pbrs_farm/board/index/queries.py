@@ -239,35 +239,24 @@ def _view(row: Any) -> ListedView:
 
 def _where(view_filter: ViewFilter) -> tuple[str, tuple[Any, ...]]:
     """A filter as SQL with bound values."""
-    tests: list[str] = []
-    values: list[Any] = []
-
-    def add(test: str, *bound: Any) -> None:
-        tests.append(test)
-        values.extend(bound)
-
     f = view_filter
-    if f.home:
-        add("v.house = ?", f.home)
-    if f.room:
-        add("v.room = ?", f.room)
-    if f.has:
-        add("v.classes & ? != 0", 1 << _CLASS_NUMBER[f.has])
-    if f.mode:
-        add("v.layers & ? != 0", LAYER_BIT[f.mode])
-    if f.verdict:
-        tests_of = {"kept": "v.reason = ''", "refused": "v.reason != ''"}
-        add(tests_of.get(f.verdict, "v.reason IS NULL"))
-    if f.reason:
-        add("v.reason = ?", f.reason)
-    if f.warned:
-        add("v.warnings != '[]'" if f.warned == "1" else "v.warnings = '[]'")
-    if f.words:
-        # Match the name of each home once, not per view.
-        homes = f"SELECT id FROM house WHERE {_NAMED}"
-        views = "v.id LIKE ? ESCAPE '\\' OR v.room LIKE ? ESCAPE '\\'"
-        add(f"(v.house IN ({homes}) OR {views})", *[_pattern(f.words)] * 3)
-    return ("WHERE " + " AND ".join(tests) if tests else ""), tuple(values)
+    tests_of_verdict = {"kept": "v.reason = ''", "refused": "v.reason != ''"}
+    # Match the name of each home once, not per view.
+    homes = f"SELECT id FROM house WHERE {_NAMED}"
+    words = f"(v.house IN ({homes}) OR v.id LIKE ? ESCAPE '\\' OR v.room LIKE ? ESCAPE '\\')"
+    tests: list[tuple[str, str, list[Any]]] = [
+        (f.home, "v.house = ?", [f.home]),
+        (f.room, "v.room = ?", [f.room]),
+        (f.has, "v.classes & ? != 0", [1 << _CLASS_NUMBER.get(f.has, 0)]),
+        (f.mode, "v.layers & ? != 0", [LAYER_BIT.get(f.mode)]),
+        (f.verdict, tests_of_verdict.get(f.verdict, "v.reason IS NULL"), []),
+        (f.reason, "v.reason = ?", [f.reason]),
+        (f.warned, f"v.warnings {'!=' if f.warned == '1' else '='} '[]'", []),
+        (f.words, words, [_pattern(f.words)] * 3),
+    ]
+    used = [(test, values) for field, test, values in tests if field]
+    where = f"WHERE {' AND '.join(test for test, _ in used)}" if used else ""
+    return where, tuple(value for _, values in used for value in values)
 
 
 def _pattern(words: str) -> str:

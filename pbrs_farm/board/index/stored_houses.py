@@ -85,7 +85,7 @@ class StoredHouses:
     def _list_seldom(self) -> dict[str, str]:
         now = self._clock()
         if self._listed_at is None or now - self._listed_at >= _LISTING_S:
-            listings = (self._reader.list(f"{root}/") for root in keys.FOLDERS)
+            listings = (self._reader.store.list(f"{root}/") for root in keys.FOLDERS)
             self._listed = {house: text for part in listings for house, text in _listed(part)}
             self._listed_at = now
         return self._listed
@@ -101,7 +101,7 @@ def view_keys(reader: RootReader, house: str) -> Iterable[str]:
                 return [key for key in sha256_by_key(data) if key.startswith(prefix)]
         except (ValueError, KeyError, TypeError, AttributeError):
             pass  # damaged
-    return reader.list(prefix)
+    return reader.store.list(prefix)
 
 
 def _folder_fingerprints(folder: Path) -> Iterator[tuple[str, str]]:

@@ -1,4 +1,4 @@
-"""How much a page loads: bytes as they came over the wire."""
+"""Bytes that a page loads over the network."""
 
 from __future__ import annotations
 

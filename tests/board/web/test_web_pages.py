@@ -110,8 +110,8 @@ def test_the_probe_tells_class_instance_metres_and_normal(tab: Any, base: str) -
     tab.mouse.move(x, stage["y"] + stage["height"] * (30.5 / HEIGHT))
     until(tab, "document.getElementById('probe').textContent.includes('chair')")
     text = tab.inner_text("#probe")
-    for said in (f"{WIDTH // 2}, 30", "Chair, 300", "1.300 m", "-1.00 forward"):
-        assert said in text
+    for line in (f"{WIDTH // 2}, 30", "Chair, 300", "1.300 m", "-1.00 forward"):
+        assert line in text
 
 
 def test_the_probe_is_moved_by_the_keyboard(tab: Any, base: str) -> None:
@@ -157,23 +157,23 @@ def test_relighting_says_what_it_does_until_it_is_there(tab: Any, base: str) -> 
 
 
 def test_a_page_of_a_root_that_is_read_shows_what_came_by_itself(tab: Any, base: str) -> None:
-    said = ["Reading homes: 3 of 9."]
+    texts = ["Reading homes: 3 of 9."]
     page = httpx.get(base + "/").text
     strip = '<p class="strip" id="reading" role="status">Looking for homes</p></header>'
     script = '<script type="module" src="/static/reading.js"></script></head>'
     reading = page.replace("</header>", strip, 1).replace("</head>", script, 1)
 
     def progress(route: Any) -> None:
-        route.fulfill(json={"text": said[0], "fault": False})
+        route.fulfill(json={"text": texts[0], "fault": False})
 
     def first(route: Any) -> None:
-        route.fulfill(body=reading if said[0] else page, content_type="text/html")
+        route.fulfill(body=reading if texts[0] else page, content_type="text/html")
 
     tab.route("**/progress", progress)
     tab.route(base + "/", first)
     tab.goto(base + "/")
     tab.wait_for_selector("#reading:has-text('3 of 9')")
-    said[0] = ""
+    texts[0] = ""
     tab.wait_for_selector("#reading", state="detached")
 
 
@@ -217,9 +217,9 @@ def test_the_relit_picture_is_that_of_the_command_shown(
         tab.click("#save")
     words = shlex.split(tab.inner_text("#command"))
     assert main([*words[1:], "--out", str(tmp_path / "relit.png")]) == 0
-    wanted = array_from_png((tmp_path / "relit.png").read_bytes()).astype(int)
+    expected = array_from_png((tmp_path / "relit.png").read_bytes()).astype(int)
     got = array_from_png(Path(download.value.path()).read_bytes())[..., :3].astype(int)
-    assert np.abs(got - wanted).max() <= 2
+    assert np.abs(got - expected).max() <= 2
 
 
 def test_sliders_colours_and_presets_change_picture_command_and_address(
