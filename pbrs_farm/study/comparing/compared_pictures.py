@@ -20,7 +20,7 @@ from pbrs_farm.study.judging.photo_predictions import SUFFIXES, read_photograph
 from pbrs_farm.study.photographs import camera_of_crop, crop_to_size, middle_of_form
 from pbrs_farm.study.real_frames import camera_of, has_labels_of, nyu40_of, read_pair
 from pbrs_farm.study.training.training_views import evenly_spaced
-from pbrs_farm.study.training.view_sources import credits_of_views, is_root
+from pbrs_farm.study.training.view_sources import is_root, source_credits
 from pbrs_farm.views.open_views import open_views
 from pbrs_farm.views.views import Frame
 
@@ -58,9 +58,8 @@ def read_views(place: str, size: Size, *, mode: str = "", most: int = 0) -> Pict
     pictures, left_out = _readable_pictures(
         place, [partial(_facts_of_frame, frame, size, mode) for frame in frames]
     )
-    homes = {frame.ref.house for frame in frames}
-    credits = tuple(credits_of_views(open_views(place), homes))
-    return PictureSet(place, pictures, left_out, credits)
+    homes = dict.fromkeys(frame.ref.house for frame in frames)
+    return PictureSet(place, pictures, left_out, source_credits(frames[0].source, list(homes)))
 
 
 def _frames(place: str) -> list[Frame]:

@@ -148,14 +148,16 @@ def credits_of(source: TrainingSource, homes: Sequence[str]) -> tuple[str, ...]:
     lines: dict[str, None] = {}
     for place in () if source.is_nyu or source.is_photographs else source.places:
         views = open_views(place)
-        lines |= dict.fromkeys(credits_of_views(views, set(homes)))
+        present = set(views.homes)
+        credits = source_credits(views.source, [home for home in homes if home in present])
+        lines |= dict.fromkeys(credits)
     return tuple(lines)
 
 
-def credits_of_views(views: Views, homes: set[str]) -> list[str]:
-    """Required credit lines of some homes of a root."""
-    credits = getattr(views.source, "credits", None)
-    return list(credits([home for home in views.homes if home in homes])) if credits else []
+def source_credits(source: Any, homes: Sequence[str]) -> tuple[str, ...]:
+    """Required credit lines of some homes of a source of views."""
+    credits = getattr(source, "credits", None)
+    return tuple(credits(list(homes))) if credits else ()
 
 
 def left_out(source: TrainingSource, plan: TrainingPlan) -> dict[str, str]:
