@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
@@ -16,7 +15,7 @@ from pbrs_farm.gallery.gallery_page import data_url, small_jpeg
 from pbrs_farm.gallery.html_page import page
 from pbrs_farm.study.comparing.comparison import Comparison, Unlike, mean_histogram
 from pbrs_farm.study.comparing.picture_facts import PictureFacts, bands_of_height
-from pbrs_farm.study.training.run_folder import make_folder
+from pbrs_farm.study.training.run_folder import write_report
 
 _MOST_BYTES: Final = 14_000  # maximum size of a picture on the page
 _MOST_CLASSES: Final = 12
@@ -25,12 +24,7 @@ _MOST_LINES: Final = 20  # maximum number of unreadable pictures on the page
 
 def write_comparison(out: Path, comparison: Comparison) -> Path:
     """Write compare.json and index.html; the page's path. Raises BadInput if out is not writable."""
-    make_folder(out)
-    text = json.dumps(comparison.report, indent=1)
-    (out / "compare.json").write_text(text + "\n", "utf-8")
-    path = out / "index.html"
-    path.write_text(comparison_page(comparison), "utf-8")
-    return path
+    return write_report(out, "compare.json", comparison.report, comparison_page(comparison))
 
 
 def comparison_page(comparison: Comparison) -> str:

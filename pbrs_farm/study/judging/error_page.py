@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from pathlib import Path
 from typing import Any, Final
@@ -23,7 +22,7 @@ from pbrs_farm.study.judging.evaluation import (
 )
 from pbrs_farm.study.judging.figure_text import shown_figure, title_of
 from pbrs_farm.study.tasks.study_task import WITHOUT_TRUTH, Arrays, StudyTask, grey_picture
-from pbrs_farm.study.training.run_folder import make_folder
+from pbrs_farm.study.training.run_folder import write_report
 from pbrs_farm.views.png_rows import png_of_rows
 
 N_SHOWN: Final = 8  # number of worst views on the page, and of best ones
@@ -34,12 +33,9 @@ def write_evaluation(out: Path, run: Trained, evaluations: list[Evaluation]) -> 
 
     Raises BadInput if the folder is not writable.
     """
-    make_folder(out)
-    rows = json.dumps(report(run, evaluations), indent=1)
+    rows, html = report(run, evaluations), error_page(run, evaluations)
+    page = write_report(out, "evaluation.json", rows, html)
     (out / "table.md").write_text(evaluation_text(run, evaluations) + "\n", "utf-8")
-    (out / "evaluation.json").write_text(rows + "\n", "utf-8")
-    page = out / "index.html"
-    page.write_text(error_page(run, evaluations), "utf-8")
     return page
 
 

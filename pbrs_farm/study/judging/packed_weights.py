@@ -102,7 +102,7 @@ def model_card(run: Trained, record: Mapping[str, Any], evaluations: list[dict[s
         f"Truth: {record['truth']}.",
         "## Figures",
         _figures(run, evaluations),
-        *(f"Truth of {one['on']}: {one['truth']}." for one in evaluations),
+        *(f"Truth of {row['on']}: {row['truth']}." for row in evaluations),
         "## Limits",
         f"A small network at {size}, trained on few pictures: nothing for measuring or for safety."
         " It knows rooms of homes by day and by lamplight; other places, people, animals and close-ups"
@@ -127,12 +127,12 @@ def _seen(record: Mapping[str, Any], homes: Sequence[str]) -> str:
     if record["mode"] == PHOTO_LIGHT:
         return f"{'; '.join(real)}."
     named = f"{', '.join(homes[:_MOST_HOMES])}{' and others' if len(homes) > _MOST_HOMES else ''}"
-    said = f"{n:,} rendered views of {len(homes)} homes in light `{record['mode']}`: {named}."
+    text = f"{n:,} rendered views of {len(homes)} homes in light `{record['mode']}`: {named}."
     if first == NYU_LIGHT:
-        return f"{said} The first weights saw photographs of NYU Depth v2 (Silberman et al., 2012)."
-    seen = record["init_origin"].get("photographs")
-    first = f"; the first weights saw {seen}" if seen else ""
-    return f"{said} {'Beside them ' + '; '.join(real) if real else 'No photograph was trained on'}{first}."
+        return f"{text} The first weights saw photographs of NYU Depth v2 (Silberman et al., 2012)."
+    photographs = record["init_origin"].get("photographs")
+    first = f"; the first weights saw {photographs}" if photographs else ""
+    return f"{text} {'Beside them ' + '; '.join(real) if real else 'No photograph was trained on'}{first}."
 
 
 def _training_credits(record: Mapping[str, Any]) -> list[str]:

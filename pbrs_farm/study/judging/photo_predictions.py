@@ -7,7 +7,6 @@ output is enlarged to the size of the photograph.
 from __future__ import annotations
 
 import io
-import json
 import math
 import time
 from collections.abc import Iterator, Sequence
@@ -30,7 +29,7 @@ from pbrs_farm.study.judging.evaluation import Trained
 from pbrs_farm.study.real_frames import find_camera
 from pbrs_farm.study.tasks.classes_task import class_names
 from pbrs_farm.study.training.prediction import predict
-from pbrs_farm.study.training.run_folder import make_folder
+from pbrs_farm.study.training.run_folder import make_folder, write_report
 
 SUFFIXES: Final = (".jpg", ".jpeg", ".png", ".bmp", ".tga", ".gif")
 _MAX_PIXELS: Final = 100_000_000  # maximum size of a photograph
@@ -165,9 +164,8 @@ def predict_photographs(
                 row["seconds"] = round(seconds, 3)
             rows.append(row)
             yield _without_tiles(row)
-    table = json.dumps([_without_tiles(row) for row in rows], indent=1)
-    (out / "predictions.json").write_text(table + "\n", "utf-8")
-    (out / "index.html").write_text(_page(run, rows), "utf-8")
+    table = [_without_tiles(row) for row in rows]
+    write_report(out, "predictions.json", table, _page(run, rows))
 
 
 def _without_tiles(row: dict[str, Any]) -> dict[str, Any]:

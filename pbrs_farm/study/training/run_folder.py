@@ -156,6 +156,15 @@ def make_folder(path: Path) -> Path:
     raise BadInput(path, "", f"no folder can be written there: {why}") from None
 
 
+def write_report(out: Path, name: str, value: Any, html: str) -> Path:
+    """Write a JSON file and index.html into a folder; the page's path. BadInput if it is not writable."""
+    make_folder(out)
+    (out / name).write_text(json.dumps(value, indent=1) + "\n", "utf-8")
+    page = out / "index.html"
+    page.write_text(html, "utf-8")
+    return page
+
+
 def finished_run(root: Path) -> tuple[RunFolder, dict[str, Any], TrainingPlan]:
     """Folder, record and plan of a finished run; BadInput for any other."""
     folder = RunFolder(root)
