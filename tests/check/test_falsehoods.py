@@ -74,7 +74,7 @@ def test_a_certificate_says_what_was_looked_at(finished_root: Root) -> None:
     assert all(str(f.relative_to(view)) in listed for f in view.rglob("*") if f.is_file())
 
 
-@pytest.mark.quick(18)
+@pytest.mark.quick(12)
 @pytest.mark.parametrize(
     ("sort", "kind"), [pytest.param(*pair, marks=_marked(pair[0])) for pair in _one_a_check()]
 )

@@ -172,6 +172,7 @@ def test_surfaces_half_a_millimetre_apart_do_not_coincide(tmp_path):
     assert certificate.coincident == ()
 
 
+@pytest.mark.long
 def test_model_coordinates_are_recomputed(tmp_path):
     home = (
         small_home().place(can(tmp_path), at=(2, 0.5, 2)).place(crate(tmp_path), at=(2.1, 0.5, 1.9))

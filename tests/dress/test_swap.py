@@ -192,6 +192,7 @@ def test_chairs_of_one_room_get_one_model() -> None:
         assert models != {"T#old"}
 
 
+@pytest.mark.long
 def test_a_library_of_one_s_own_gets_its_share_of_what_is_swapped_however_small_it_is() -> None:
     catalogue = _catalogue(*(("dresser", f"n{k}", (1.2, 0.5, 0.8)) for k in range(50)))
     one_own = replace(catalogue, own=frozenset({"T#n7"}))

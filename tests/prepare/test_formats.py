@@ -70,6 +70,7 @@ def test_a_file_is_known_by_its_own_format_and_read(tmp_path: Path, title: str) 
     assert read_house(source, ReadFields()).rooms
 
 
+@pytest.mark.quick(8)
 @each_format
 def test_a_folder_names_its_homes_to_run_and_submit_alike(tmp_path: Path, title: str) -> None:
     path = WRITERS[title](tmp_path)
@@ -87,6 +88,7 @@ def test_a_folder_names_its_homes_to_run_and_submit_alike(tmp_path: Path, title:
     assert [ref.word for _entry, ref in entries] == [resolve(word).word for word in words]
 
 
+@pytest.mark.quick(8)
 @each_format
 def test_a_file_travels_to_a_farm_or_is_left_in_place(tmp_path: Path, title: str) -> None:
     path = WRITERS[title](tmp_path)

@@ -114,6 +114,7 @@ def test_a_room_whose_name_says_no_use_is_what_the_home_lacks(name: str) -> None
     assert "bed" in names
 
 
+@pytest.mark.long
 def test_a_sparse_room_keeps_what_it_has_and_gets_what_it_lacks() -> None:
     house = empty_house()
     room = next(r for r in house.rooms if r.name == "Living room")

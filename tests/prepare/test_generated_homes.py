@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.prepare.finished_house import repaired_house
 from pbrs_farm.prepare.read_source import read_house
@@ -27,6 +29,7 @@ def test_a_home_whose_digest_begins_with_a_d_keeps_its_id_when_it_is_dressed() -
         assert read_house(one, Recipe().read).id == source.house_id
 
 
+@pytest.mark.long
 def test_a_made_home_is_repaired_without_leaks() -> None:
     _house, report = repaired_house(resolve(f"made:5{BARE}"), Recipe())
     assert report.leaks is not None

@@ -36,6 +36,7 @@ def test_nothing_stands_open_where_none_is_asked_for() -> None:
     assert left_open(house, 0.0, 1) is house
 
 
+@pytest.mark.quick(1)
 @pytest.mark.parametrize("share", [0.1, 0.5])
 def test_about_that_share_stands_open_each_as_far_as_is_drawn(share: float) -> None:
     far = np.array(values(left_open(many(200), share, 1)))

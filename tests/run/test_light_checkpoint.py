@@ -114,6 +114,7 @@ def test_the_share_is_told_every_few_seconds() -> None:
     assert told == [0.2, 0.4]
 
 
+@pytest.mark.long
 @pytest.mark.skipif(choose_variant().startswith("scalar"), reason="needs LLVM or CUDA")
 def test_a_killed_view_goes_on_and_leaves_nothing_behind(monkeypatch: pytest.MonkeyPatch) -> None:
     fields = {"image.width_px": "32", "image.height_px": "24", "cameras.cell_m": "1.0"}

@@ -172,6 +172,7 @@ def test_a_falsehood_about_motion_is_found(made: Path, tmp_path: Path, name: str
     assert counts[check].failed > 0
 
 
+@pytest.mark.long
 def test_a_film_in_memory_shows_what_each_time_shows(moving: pf.Home) -> None:
     camera = moving.viewpoint(moving.cameras_around("door_inner", distance_m=(1.5, 2.5))[0].camera)
     frames = pf.film(moving, camera.camera, fps=4, seconds=0.75, modes=[], layers=["part"])

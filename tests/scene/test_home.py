@@ -73,6 +73,7 @@ def test_a_change_is_a_new_home_with_an_id_of_its_own(home: pf.Home) -> None:
     assert bare.without("bed").source.unedited == home.source
 
 
+@pytest.mark.long
 def test_whatever_is_removed_all_others_keep_their_instance_ids(
     home: pf.Home, tmp_path: Path
 ) -> None:

@@ -62,6 +62,7 @@ def test_a_frame_has_pictures_labels_and_poses(home: pf.Home, tmp_path: Path) ->
     assert "<img" in frame._repr_html_()
 
 
+@pytest.mark.long
 def test_a_frame_has_what_its_own_call_asked_for(home: pf.Home) -> None:
     one = home.cameras(n=1)[0]
     rich = pf.render(home, one, modes=["opengl_dl", "opengl_il"], layers=["albedo"])

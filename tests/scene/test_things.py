@@ -72,6 +72,7 @@ def test_what_does_not_fit_is_one_clear_error(call: dict[str, Any], error: str) 
         pf.thing(**call)
 
 
+@pytest.mark.quick(4)
 @pytest.mark.parametrize("name", sorted(_WITH_PARAMETERS))
 def test_every_choice_of_a_family_makes_a_closed_piece(name: str) -> None:
     family = _WITH_PARAMETERS[name]

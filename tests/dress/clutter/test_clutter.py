@@ -111,6 +111,7 @@ def test_ids_are_unique_and_every_thing_has_a_class_and_a_room() -> None:
     assert all(i.id.startswith("dress-clutter-") and i.nyu40 and i.room_id == "0_0" for i in added)
 
 
+@pytest.mark.long
 def test_a_smaller_share_puts_less() -> None:
     def count(share: float) -> int:
         return sum(len(_added(_dressed(_room(), seed, share))) for seed in range(4))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 import shapely
 
 from pbrs_farm.core.catalogue import EMPTY
@@ -40,6 +41,7 @@ def test_things_on_the_floor_touch_it_inside_their_room() -> None:
         assert shapely.Polygon(room.polygon).contains(shapely.box(x0, z0, x1, z1))
 
 
+@pytest.mark.long
 def test_no_thing_stands_before_a_door_and_the_doors_stay_joined() -> None:
     for seed in range(3):
         bare, dressed = MutableHouse(builtin_home(), seed), _dressed(seed)
