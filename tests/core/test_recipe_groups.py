@@ -36,7 +36,7 @@ text = Path(sys.argv[1]).read_text()
 line = "    blur: BlurFields = BlurFields()\\n"
 assert line in text
 module = ModuleType("pbrs_farm.core.recipe")
-module.FogFields = FogFields
+module.__file__, module.FogFields = sys.argv[1], FogFields
 sys.modules[module.__name__] = pbrs_farm.core.recipe = module
 field = line + "    fog: FogFields = FogFields()\\n"
 exec(compile(text.replace(line, field), sys.argv[1], "exec"), module.__dict__)

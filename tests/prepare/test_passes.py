@@ -28,7 +28,7 @@ from pathlib import Path
 from types import ModuleType
 
 text = Path(sys.argv[1]).read_text()
-table, end = "PASSES: Final = (", "\\n)  # fmt: skip\\n\\nPASS: Final"
+table, end = "PASSES: Final = (", "\\n)\\n\\nPASS: Final"
 assert table in text and end in text
 function = """
 def _sign(work: Preparation) -> Preparation:
