@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import product
+from itertools import pairwise, product
 from typing import Final
 
 from numpy import pi
@@ -28,7 +28,6 @@ from pbrs_farm.dress.thing_materials import (
 from pbrs_farm.furnishings.things.cloth import hanging
 from pbrs_farm.furnishings.things.joints import Inside, Look, fronts_of, hollow
 from pbrs_farm.furnishings.things.maker import Maker, Size, family
-from pbrs_farm.furnishings.things.shapes import row
 from pbrs_farm.geometry.outlines import bent, d_shape, oval, rect, rings
 
 # fmt: off
@@ -296,8 +295,8 @@ def bathtub(m: Maker, size: Size) -> None:
             if m.chance(0.5):
                 m.box(w - 0.02, h - 0.04, 0.038, 0.003, against=hd - 0.05, of=apron)
             else:
-                boards = [*row(0.01 - hw, hw - 0.01, 10)]
-                for board in boards[: m.pick(3, 4, 10)]:
+                seams = [-hw + 0.01 + k * (w - 0.02) / 10 for k in range(m.pick(3, 4, 10) + 1)]
+                for board in pairwise(seams):
                     m.box(board, h - 0.04, 0.038, 0.003, against=hd - 0.05, of=apron)
                 m.box(w - 0.02, h - 0.04, 0.03, against=hd - 0.052, of=apron)
             with m.of(colour):

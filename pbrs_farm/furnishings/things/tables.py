@@ -386,7 +386,7 @@ def nightstand(m: Maker, size: Size) -> None:
             m.disc(w, d, h - t, h, 0.004, of=body)
             if m.chance(0.5):
                 under_top(m, "foot", w, d, h - t + 0.001, m.pick(body, BLACK_STEEL, m.metal),
-                    "round")
+                    "round", m.chance(0.5))
             else:
                 m.legs("tapered", w * 0.8, d * 0.8, h - t + 0.001, 0.03, 0.06, 0.04, of=body)
                 m.disc(w * 0.7, d * 0.7, h * 0.4, h * 0.4 + 0.014, 0.003, n=28, of=body)
