@@ -6,6 +6,7 @@ or says why it cannot. prepare/apply_edits.py carries edits out, in their order.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from typing import Annotated, Final, Literal
 
@@ -197,6 +198,11 @@ def edits_digest(edits: Sequence[Edit]) -> str:
 def edited_id(house_id: str, edits: Sequence[Edit]) -> str:
     """The id of a house with edits: `<house>-e<8 hex of edits_digest>`; its own without any."""
     return f"{house_id}{SUFFIX}{edits_digest(edits)[:8]}" if edits else house_id
+
+
+def unedited_id(house_id: str) -> str:
+    """The id of a house without its edits, whose sky an edited house keeps."""
+    return re.sub(rf"{SUFFIX}[0-9a-f]{{8}}$", "", house_id)
 
 
 def rows_of_matrix(matrix: Matrix4) -> Rows:

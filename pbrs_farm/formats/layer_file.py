@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core.layers import LAYER
+from pbrs_farm.formats.radiance_exr import radiance_from_exr
 from pbrs_farm.images import array_from_png, exr_from_layers, layers_from_exr, png_from_array
 
 
@@ -34,11 +35,13 @@ def layer_bytes(name: str, array: NDArray[Any], attribution: str = "") -> bytes:
 def layer_from_bytes(name: str, data: bytes, place: str) -> NDArray[Any]:
     """The array that layer_bytes wrote: (H, W) or (H, W, C), in the type of the layer's row.
 
-    Half floats come as float32. place: for messages. Raises BadInput where data is no such file.
+    Half floats come as float32; radiance.exr as all its light, (H, W, 3). place: for messages. Raises BadInput where data is no such file.
     """
     layer = LAYER[name]
     if layer.file.endswith(".png"):
         return array_from_png(data, place)
+    if name == "radiance":
+        return radiance_from_exr(data, place).total()
     planes = layers_from_exr(data, place)
     arrays = [planes[channel] for channel in layer.channels.split()]
     return arrays[0] if len(arrays) == 1 else np.stack(arrays, axis=-1)

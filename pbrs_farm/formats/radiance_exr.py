@@ -50,6 +50,13 @@ class RadianceExr:
         except KeyError as error:
             raise BadInput(self.place, str(error), "no such layer") from None
 
+    def total(self) -> F32:
+        """(H, W, 3) float32 radiance of all light together; BadInput if there is none."""
+        names = sorted({name.partition(".")[0] for name in self.planes})
+        lamps = [name for name in names if name.startswith("lamp")]
+        indoor = ["indoor"] if "indoor" in names else lamps
+        return np.asarray(sum(self.image(name) for name in ["outdoor", *indoor]), np.float32)
+
 
 def radiance_from_exr(data: bytes, place: str) -> RadianceExr:
     """Inverse of radiance_exr; BadInput names place for data that is not an EXR.

@@ -310,11 +310,11 @@ def _edit(work: Preparation) -> Preparation:
 
 
 PASSES: Final = (
-    Pass("read", 5, _read, lambda _source, _recipe: True, _read_depends),
+    Pass("read", 6, _read, lambda _source, _recipe: True, _read_depends),
     Pass("stand-ins", 3, _stand_in, _has_stand_ins, _stand_ins_depend),
     Pass("furnish", GENERATE_VERSION + _FURNISH_VERSION, _furnish, _is_furnished, _furnish_depends),
     Pass("dress", 10, _dress, _is_dressed, _dress_depends),
-    Pass("repair", 2, _repair, _is_home),
+    Pass("repair", 3, _repair, _is_home),
     Pass("open", 1, _leave_open, _stands_open, _open_depends),
     Pass("float", 1, _float, _has_floating_things, _float_depends),
     Pass(
@@ -323,7 +323,7 @@ PASSES: Final = (
         _surround,
         lambda source, recipe: _is_home(source, recipe) and recipe.surroundings.kind != "none",
     ),
-    Pass("edits", 3, _edit, lambda source, _recipe: bool(source.edits)),
+    Pass("edits", 4, _edit, lambda source, _recipe: bool(source.edits)),
 )
 
 PASS: Final = {p.name: p for p in PASSES}

@@ -5,10 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
-from pbrs_farm.core.arrays import I32, Bools
+from pbrs_farm.core.arrays import F32, I32, Bools
 from pbrs_farm.core.house import Box, House, Item, ItemKind, Surface, corners_of_surfaces
-from pbrs_farm.core.mesh import faces_with_area, triangle_corners, unit_normals
+from pbrs_farm.core.mesh import faces_with_area, numbered_points, triangle_corners, unit_normals
 from pbrs_farm.core.recipe import RepairFields
 from pbrs_farm.repair.repair_report import FacesReport, Removed
 from pbrs_farm.repair.structure.added_ceilings import with_ceilings
@@ -104,6 +106,8 @@ def _sound(surface: Surface) -> tuple[Surface, int, int]:
     keep = faces_with_area(triangle_corners(surface.positions, faces), MIN_AREA_M2)
     faces = faces[keep]
     against = _against_normals(surface, faces)
+    if against.any() and not against.all():
+        against &= ~_in_closed_shells(surface.positions, faces)
     n_dropped, n_turned = int((~keep).sum()), int(against.sum())
     if n_dropped + n_turned == 0:
         return surface, 0, 0  # the same object, so that sound meshes stay as read
@@ -119,6 +123,23 @@ def _against_normals(surface: Surface, faces: I32) -> Bools:
     mean = surface.normals[faces].astype(np.float64).sum(1)
     own = unit_normals(triangle_corners(surface.positions, faces))
     return np.asarray((mean * own).sum(1) < -1e-6)
+
+
+def _in_closed_shells(positions: F32, faces: I32) -> Bools:
+    """(F,) true for faces of connected parts that are closed and consistently wound.
+
+    Each edge of such a part has one face in each direction, so that turning single faces would open it.
+    """
+    _, welded = numbered_points(positions[faces.ravel()].astype(np.float64))
+    corners = welded.reshape(-1, 3)
+    starts, ends = corners.ravel(), np.roll(corners, -1, 1).ravel()
+    n = int(corners.max()) + 1
+    forward, backward = starts.astype(np.int64) * n + ends, ends.astype(np.int64) * n + starts
+    edges, counts = np.unique(forward, return_counts=True)
+    is_paired = np.isin(backward, edges[counts == 1]) & np.isin(forward, edges[counts == 1])
+    open_corners = np.unique(corners[~is_paired.reshape(-1, 3).all(1)])
+    part = connected_components(coo_array((np.ones(len(starts)), (starts, ends)), (n, n)))[1]
+    return np.asarray(~np.isin(part[corners[:, 0]], part[open_corners]))
 
 
 def with_boxes_of_meshes(house: House) -> House:

@@ -178,10 +178,8 @@ def _meshes(
     found: dict[str, FrontMesh] = {}
     for k, row in enumerate(rows):
         place = f"mesh[{k}]"
-        uid = str(row.get("uid") or place)[:80]
-        if uid in found:
-            notes.add("duplicate-id", place, f"a second mesh is called {uid!r}; left out")
-            continue
+        # Published uids have up to 84 characters, so they are kept whole.
+        uid = str(row.get("uid") or place)
         flat = numbers(row.get("xyz"), 0, file, f"{place}.xyz")
         index = numbers(row.get("faces"), 0, file, f"{place}.faces")
         if len(flat) % 3 or len(index) % 3:
@@ -193,11 +191,18 @@ def _meshes(
             )
         if not len(faces):
             continue
+        key = uid
+        if uid in found:
+            if np.array_equal(found[uid].points[found[uid].faces], points[faces]):
+                notes.add("duplicate-id", place, f"a copy of mesh {uid[:80]!r}; left out")
+                continue
+            notes.add("duplicate-id", place, f"a second mesh is called {uid[:80]!r}")
+            key = f"{uid} ({place})"
         uvs = None
         if row.get("uv"):
             pairs = numbers(row["uv"], 0, file, f"{place}.uv")
             uvs = pairs.reshape(-1, 2) if len(pairs) == 2 * len(points) else None
-        found[uid] = FrontMesh(
+        found[key] = FrontMesh(
             uid,
             str(row.get("type", ""))[:60],
             points,

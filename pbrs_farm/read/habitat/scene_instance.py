@@ -24,6 +24,7 @@ from pbrs_farm.core.checked_json import json_from_bytes
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.frames import transform_points
 from pbrs_farm.core.house import House, Source
+from pbrs_farm.core.joints import JointKind
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.formats.glb import Gltf
 from pbrs_farm.read.common.format import GivenFile
@@ -468,6 +469,16 @@ def _add_robot(
     pose = row.get("initial_joint_pose")
     order = str(row.get("link_order", settings.get("link_order", "")))
     values = robot.values(pose, dataset.scene, f"{place}.initial_joint_pose", order)
+    (size,) = numbers(
+        Gltf({}, (), config or dataset.scene),
+        [settings.get("uniform_scale", 1.0)],
+        1,
+        "uniform_scale",
+    )
+    inner = np.diag([size, size, size, 1.0])
+    world_from_robot = _matrix_of_instance(row, place, dataset.scene) @ inner
+    # habitat-sim scales offsets, shapes and limits, but not the pose of a slide.
+    scale = float(np.cbrt(abs(np.linalg.det(world_from_robot[:3, :3])))) or 1.0
     nodes = built.document.setdefault("nodes", [])
     # Nodes of assets come first: adding them moves the list on.
     shown: dict[str, list[tuple[list[int], F64]]] = {}
@@ -485,6 +496,8 @@ def _add_robot(
         node: dict[str, Any] = {"name": "", "children": []}
         if link.joint is not None:
             value = values.get(link.joint.name, 0.0)
+            if link.joint.kind is JointKind.PRISMATIC:
+                value /= scale
             node["matrix"] = link.joint.parent_from_link(value).T.ravel().tolist()
             if link.joint.kind is not None:
                 limits = link.joint.lower, link.joint.upper
@@ -499,18 +512,10 @@ def _add_robot(
         nodes.append(node)
         above = roots if link.parent is None else nodes[numbers_of[link.parent]]["children"]
         above.append(numbers_of[link.name])
-    (size,) = numbers(
-        Gltf({}, (), config or dataset.scene),
-        [settings.get("uniform_scale", 1.0)],
-        1,
-        "uniform_scale",
-    )
-    inner = np.diag([size, size, size, 1.0])
     name = dataset.class_of(template) or posixpath.basename(template).removesuffix(".urdf")
-    matrix = _matrix_of_instance(row, place, dataset.scene)
     user_fields = row.get("user_defined")
     own_fields = dict(user_fields) if isinstance(user_fields, dict) else {}
-    built.place(roots, matrix @ inner, name, {"one": True, "by_name": True} | own_fields)
+    built.place(roots, world_from_robot, name, {"one": True, "by_name": True} | own_fields)
     return True
 
 

@@ -1,8 +1,10 @@
-"""Geoms of a compiled model of MuJoCo -> triangles and materials; no effects."""
+"""Geoms of a compiled model of MuJoCo -> triangles and materials. Effects: reads the files of meshes."""
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -13,6 +15,7 @@ from pbrs_farm.core.house import Surface
 from pbrs_farm.geometry.solids import box, lathe, quads_surface, sphere
 from pbrs_farm.images import png_from_array
 from pbrs_farm.quiet_mujoco import mujoco
+from pbrs_farm.regular_files import read_regular
 
 _ROUND: Final = 24  # segments around a round shape
 _GREY: Final = (0.5, 0.5, 0.5, 1.0)  # of geoms that say no colour
@@ -119,8 +122,10 @@ def _mesh(model: Any, mesh: int) -> Shape:
     faces = rows(model.mesh_face, model.mesh_faceadr, model.mesh_facenum).astype(np.int64)
     corners = faces.reshape(-1)
     normal_of = rows(model.mesh_facenormal, model.mesh_faceadr, model.mesh_facenum).reshape(-1)
-    every = rows(model.mesh_normal, model.mesh_normaladr, model.mesh_normalnum)
-    normals = every[normal_of].astype(np.float64)
+    normals = None
+    if _has_normals(model, mesh):
+        every = rows(model.mesh_normal, model.mesh_normaladr, model.mesh_normalnum)
+        normals = every[normal_of].astype(np.float64)
     uvs = None
     if int(model.mesh_texcoordadr[mesh]) >= 0:
         uv_of = rows(model.mesh_facetexcoord, model.mesh_faceadr, model.mesh_facenum).reshape(-1)
@@ -133,8 +138,22 @@ def _mesh(model: Any, mesh: int) -> Shape:
         points[corners[kept]],
         index.reshape(-1, 3),
         None if uvs is None else uvs[kept],
-        normals[kept],
+        None if normals is None else normals[kept],
     )
+
+
+def _has_normals(model: Any, mesh: int) -> bool:
+    """True if a mesh's file has normals; MuJoCo generates smooth ones for all others."""
+    if int(model.mesh_pathadr[mesh]) < 0:
+        return False  # written inline
+    path = Path(model.paths[int(model.mesh_pathadr[mesh]) :].split(b"\0", 1)[0].decode())
+    try:
+        data = read_regular(path)
+    except OSError:
+        return False
+    if path.suffix.lower() == ".msh":
+        return int.from_bytes(data[4:8], "little") > 0  # header: vertices, normals, ...
+    return path.suffix.lower() == ".obj" and re.search(rb"^\s*vn\s", data, re.MULTILINE) is not None
 
 
 def material_row(model: Any, geom: int, texture: int | None) -> dict[str, Any]:

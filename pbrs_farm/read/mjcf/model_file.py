@@ -260,9 +260,8 @@ class _Scene:
             if model.jnt_limited[joint]:
                 limits = float(model.jnt_range[joint, 0]), float(model.jnt_range[joint, 1])
             part = self._body_name(body) or name_of(model, _OBJECT.mjOBJ_JOINT, joint)
-            value = float(
-                data.qpos[model.jnt_qposadr[joint]] - model.qpos0[model.jnt_qposadr[joint]]
-            )
+            # In the coordinate of the limits: a joint with a reference is drawn at that value.
+            value = float(data.qpos[model.jnt_qposadr[joint]])
             return joint_row(
                 part or f"part {body}", kind, data.xanchor[joint], data.xaxis[joint], limits, value
             )

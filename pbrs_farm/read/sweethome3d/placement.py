@@ -42,24 +42,25 @@ class PieceFrame:
 def frame_of(piece: PlanPiece, level: PlanLevel, local_height: F64 | None = None) -> PieceFrame:
     """Pose of a piece: its centre and axes in the world, its size.
 
-    local_height: (N, 3) the points of its model in its own frame; they give the height of a tilted
-    piece. Angles of the file run clockwise seen from above; pitch is applied before roll.
+    local_height: (N, 3) the points of its model in its own frame; the program centres the box of the
+    tilted points on the piece's place. Angles of the file run clockwise seen from above; pitch is
+    applied before roll.
     """
     width, depth, height = piece.size
     half = np.array([width, height, depth]) / 2
     # Pitch, then roll, then turn about the vertical; the program's angles run clockwise.
     tilt = _rotation_z(-piece.roll) @ _rotation_x(-piece.pitch)
     axes = rotation_y(-piece.angle) @ tilt
-    # The height of a tilted piece is that of its tilted points.
-    in_plan = height
+    in_plan, offset = height, np.zeros(3)
     if piece.pitch or piece.roll:
         if local_height is not None and len(local_height):
-            rotated_y = local_height @ tilt.T[:, 1]
-            in_plan = float(rotated_y.max() - rotated_y.min())
+            tilted = local_height @ tilt.T
+            low, high = tilted.min(0), tilted.max(0)
+            in_plan, offset = float(high[1] - low[1]), rotation_y(-piece.angle) @ (low + high) / 2
         elif piece.height_in_plan is not None:
             in_plan = piece.height_in_plan
     x, z = piece.centre
-    origin = np.array([x, level.elevation + piece.elevation + in_plan / 2, z])
+    origin = np.array([x, level.elevation + piece.elevation + in_plan / 2, z]) - offset
     return PieceFrame(origin, axes, half, -1.0 if piece.is_mirrored else 1.0)
 
 

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import F32, F64
+from pbrs_farm.core.edits import unedited_id
 from pbrs_farm.core.errors import BadRecipe
 from pbrs_farm.core.frames import LM_PER_W, LUMINANCE
 from pbrs_farm.core.recipe import Recipe
@@ -111,7 +112,7 @@ def choose_panorama(names: list[str], house_id: str, seed: int) -> str:
     if not skies:
         hint = "latitude-longitude .exr or .hdr files; `blender-data` has some"
         raise BadRecipe("sky.panoramas: no outdoor panorama in the folder", hint=hint)
-    return skies[keys.seed("panorama", house_id, seed) % len(skies)]
+    return skies[keys.seed("panorama", unedited_id(house_id), seed) % len(skies)]
 
 
 def sky_for_house(
@@ -423,4 +424,4 @@ def _without_sun(picture: F64) -> tuple[F64, F64, F64]:
 
 
 def _uniform(house_id: str, seed: int, what: str) -> float:
-    return keys.seed("sky", what, house_id, seed) / 2**32
+    return keys.seed("sky", what, unedited_id(house_id), seed) / 2**32

@@ -19,6 +19,8 @@ from pbrs_farm.prepare.finished_house import repaired_house
 from pbrs_farm.prepare.read_source import read_house
 from pbrs_farm.prepare.source import resolve
 from pbrs_farm.read.common.given_classes import given_class
+from pbrs_farm.read.common.notes import Notes
+from pbrs_farm.read.front3d.front_file import front_file
 from tests.inputs import front3d_files as files
 
 
@@ -28,6 +30,7 @@ def read(path: Path, models: str = "") -> House:
 
 def written(folder: Path, house: dict[str, Any]) -> Path:
     path = folder / "flat.json"
+    folder.mkdir(exist_ok=True)
     path.write_text(json.dumps(house))
     return path
 
@@ -303,6 +306,30 @@ def test_ids_twice_and_names_that_lead_out_do_no_harm(tmp_path: Path) -> None:
     assert "duplicate-id" in [n.kind for n in house.notes]
     ids = [i.id for i in house.items]
     assert len(ids) == len(set(ids))
+
+
+def test_uids_are_told_apart_by_their_last_characters(tmp_path: Path) -> None:
+    short = read(written(tmp_path / "short", files.front_house()))
+    scene = files.front_house()
+    renamed = {mesh["uid"]: "x" * 80 + f"/{k:03d}" for k, mesh in enumerate(scene["mesh"])}
+    for mesh in scene["mesh"]:
+        mesh["uid"] = renamed[mesh["uid"]]
+    for room in scene["scene"]["room"]:
+        for child in room["children"]:
+            child["ref"] = renamed.get(child["ref"], child["ref"])
+    long = read(written(tmp_path / "long", scene))
+    assert [(i.kind, i.room_id) for i in long.items] == [(i.kind, i.room_id) for i in short.items]
+    assert "duplicate-id" not in [n.kind for n in long.notes]
+
+
+def test_a_second_mesh_of_one_uid_is_read_if_it_differs(tmp_path: Path) -> None:
+    scene = files.front_house()
+    floor = next(m for m in scene["mesh"] if m["type"] == "Floor")
+    scene["mesh"] += [floor, floor | {"xyz": [v + 1 for v in floor["xyz"]]}]
+    notes = Notes("flat.json", strict=False)
+    meshes = front_file(json.dumps(scene).encode(), "flat.json", notes).meshes
+    assert len(meshes) == len(files.front_house()["mesh"]) + 1
+    assert notes.count("duplicate-id") == 2
 
 
 def test_a_million_entries_are_refused_at_once(tmp_path: Path) -> None:

@@ -113,6 +113,14 @@ def test_an_object_scales_and_turns_with_its_joints(tmp_path: Path) -> None:
     assert joints["drawer"].upper == pytest.approx(0.175)
 
 
+def test_the_pose_of_a_slide_is_in_metres_whatever_the_scale(tmp_path: Path) -> None:
+    found = cupboard(scene(tmp_path, uniform_scale=0.5, initial_joint_pose=[1.0, -0.1]))
+    joints = {joint.part: joint for joint in found.joints}
+    assert joints["drawer"].value == pytest.approx(0.1)
+    assert joints["drawer"].upper == pytest.approx(0.175)
+    assert joints["door"].value == pytest.approx(1.0)
+
+
 def test_a_config_names_its_urdf(tmp_path: Path) -> None:
     path = scene(tmp_path, template_name="kitchen/cabinet_3")
     written(tmp_path / "urdf/cabinet_3.ao_config.json", {"urdf_filepath": "cupboard/cupboard.urdf"})

@@ -82,6 +82,37 @@ def test_the_first_keyframe_is_how_they_stand(tmp_path: Path) -> None:
     assert item(found, "cabinet").joints[0].value == pytest.approx(0.2)
 
 
+def test_a_joint_drawn_open_by_its_reference_is_open(tmp_path: Path) -> None:
+    box = """<body name="safe" pos="1 1 .5"><geom type="box" size=".3 .3 .5"/>
+      <body name="safe_door" pos="-.3 -.31 0" euler="0 0 -1.0471975511965976"><geom type="box" size=".3 .01 .4" pos=".3 0 0"/>
+      <joint type="hinge" axis="0 0 1" range="-1.5707963267948966 0" ref="-1.0471975511965976"/></body></body>"""
+    safe = item(house(write_model(tmp_path, ROOM + box)), "safe")
+    (door,) = safe.joints
+    assert door.value == pytest.approx(np.pi / 3)
+    assert (door.lower, door.upper) == pytest.approx((0, np.pi / 2))
+    points = np.concatenate([s.positions for s in safe.surfaces if s.part])
+    shut = points @ door.motion(0.0)[:3, :3].T + door.motion(0.0)[:3, 3]
+    assert np.ptp(shut[:, 2]) == pytest.approx(0.02, abs=1e-5)
+
+
+@pytest.mark.parametrize("normals", [False, True])
+def test_normals_that_mujoco_generates_are_not_those_of_the_file(
+    tmp_path: Path, normals: bool
+) -> None:
+    (tmp_path / "meshes").mkdir()
+    corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n"
+    faces = ["1 3 2", "1 2 4", "2 3 4", "1 4 3"]
+    if normals:
+        corners += "vn -1 -1 -1\nvn 1 0 0\nvn 0 1 0\nvn 0 0 1\n"
+        faces = [" ".join(f"{k}//{k}" for k in face.split()) for face in faces]
+    lines = "".join(f"f {face}\n" for face in faces)
+    (tmp_path / "meshes/wedge.obj").write_text(corners + lines)
+    assets = """<compiler meshdir="meshes"/><asset><mesh name="wedge" file="wedge.obj"/></asset>"""
+    body = '<body name="vase" pos="1 1 1"><geom type="mesh" mesh="wedge"/></body>'
+    (surface,) = item(house(write_model(tmp_path, ROOM + body, assets)), "vase").surfaces
+    assert (surface.normals is not None) == normals
+
+
 def test_colliders_and_hidden_geoms_are_not_seen(tmp_path: Path) -> None:
     table = """
       <body name="table" pos="2 1 .4">

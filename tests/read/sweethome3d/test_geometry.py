@@ -10,6 +10,7 @@ import pytest
 import shapely
 import trimesh
 
+from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import House, Item, ItemKind
 from pbrs_farm.read.sweethome3d.home import read_home
 from tests.read.sweethome3d.sh3d_source import (
@@ -252,6 +253,20 @@ def test_a_tilted_piece_stands_on_its_elevation() -> None:
     low, high = thing.bounds
     assert low[1] == pytest.approx(0.2, abs=1e-5)
     assert high - low == pytest.approx([2.0, 1.0, 0.5], abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    "tilt", ["pitch='0.4'", "roll='-0.3'", "angle='1.1' pitch='0.4' roll='0.3'"]
+)
+def test_the_box_of_the_tilted_points_is_centred_on_the_place(tilt: str) -> None:
+    # The wedge is not symmetric: its tilted points have another centre than its box.
+    thing = item(read(piece(f"{tilt} elevation='20'")), "piece_0")
+    angle = 1.1 if "angle" in tilt else 0.0
+    turned = points(thing) @ rotation_y(-angle)
+    low, high = turned.min(0), turned.max(0)
+    assert low[1] == pytest.approx(0.2, abs=1e-5)
+    centre = rotation_y(-angle) @ ((low + high) / 2)
+    assert (centre[0], centre[2]) == pytest.approx((1.5, 1.0), abs=1e-5)
 
 
 def test_pieces_of_a_group_keep_their_own_coordinates() -> None:

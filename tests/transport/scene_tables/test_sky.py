@@ -171,3 +171,10 @@ def test_an_overcast_sky_is_three_times_as_bright_at_the_zenith_and_has_no_sun()
 def test_the_hour_is_in_the_digest_of_a_sky() -> None:
     paper = recipe_from_name("paper")
     assert paper.digest("sky") != recipe_from_name("paper", {"sky.time": "night"}).digest("sky")
+
+
+def test_an_edited_home_keeps_the_weather_of_the_home() -> None:
+    skies = [sky_for_house(Recipe(), house_id) for house_id in ("flat-1234", "flat-1234-e0123abcd")]
+    other = sky_for_house(Recipe(), "flat-1235")
+    assert np.array_equal(skies[0].sun_direction, skies[1].sun_direction)
+    assert not np.array_equal(skies[0].sun_direction, other.sun_direction)
