@@ -2,7 +2,9 @@
 
 Renders the builtin home, three example homes, eight generated homes and one home of each input format
 with all labels and pictures at 64x48, and writes the SHA-256 of each stored file to out/bench/bytes.json.
-`python -m benchmarks.stored_bytes --against OTHER.json` lists the files that differ from an earlier report.
+`--homes FOLDER` keeps the files of the input formats there: writers of IFC and Sweet Home 3D put random ids and dates
+into them, so two commits compare only if they read the same files. `--against OTHER.json` lists the files that differ
+from an earlier report.
 
 Effects: renders into a temporary folder; writes out/bench/bytes.json.
 """
@@ -42,13 +44,14 @@ def main(words: list[str] | None = None) -> None:
     parser.add_argument(
         "--against", type=Path, help="an earlier bytes.json: list differing files, exit 1 if any"
     )
+    parser.add_argument("--homes", type=Path, help="folder for the files of the input formats")
     options = parser.parse_args([] if words is None else words)
     if options.against:
         raise SystemExit(_compare(options.against, FOLDER / "bytes.json"))
     digests: dict[str, str] = {}
     failed = []
     with tempfile.TemporaryDirectory() as scratch:
-        for name, arguments in _jobs(Path(scratch)):
+        for name, arguments in _jobs(options.homes or Path(scratch) / "homes"):
             out = Path(scratch) / "out" / name
             command = [
                 sys.executable,
@@ -74,7 +77,7 @@ def main(words: list[str] | None = None) -> None:
     )
 
 
-def _jobs(scratch: Path) -> Iterator[tuple[str, list[str]]]:
+def _jobs(homes: Path) -> Iterator[tuple[str, list[str]]]:
     """Name and arguments of each run."""
     yield "builtin", ["builtin"]
     for home in EXAMPLES:
@@ -84,9 +87,12 @@ def _jobs(scratch: Path) -> Iterator[tuple[str, list[str]]]:
     yield "made_dressed", ["made:1..2", "--dress", "1"]
     for title, write in sorted(every_format().items()):
         name = "".join(c if c.isalnum() else "_" for c in title)
-        folder = scratch / "homes" / name
-        folder.mkdir(parents=True)
-        yield name, [str(write(folder))]
+        folder = homes / name
+        note = folder / "home.path"
+        if not note.is_file():
+            folder.mkdir(parents=True, exist_ok=True)
+            note.write_text(str(write(folder)))
+        yield name, [note.read_text()]
 
 
 def _digests(out: Path) -> Iterator[tuple[str, str]]:
