@@ -239,12 +239,12 @@ def _hung(door: Item, width: float) -> Item:
     """The door with its leaf on hinges, at the left seen from its front, to which it opens."""
     box = door.oriented_box
     foot = box.centre - box.half[1] * box.axes[:, 1]
-    at = foot + box.axes @ np.array([-width / 2 + 0.05, 0.0, 0.02])
+    position = foot + box.axes @ np.array([-width / 2 + 0.05, 0.0, 0.02])
     surfaces = tuple(
         replace(s, part=_LEAF) if s.name in ("wood", "metal") else s for s in door.surfaces
     )
     joint = Joint(
-        _LEAF, JointKind.REVOLUTE, triple(at), (0.0, -1.0, 0.0), np.pi / 2, mass_kg=_LEAF_KG
+        _LEAF, JointKind.REVOLUTE, triple(position), (0.0, -1.0, 0.0), np.pi / 2, mass_kg=_LEAF_KG
     )
     return replace(door, surfaces=surfaces, joints=(joint,))
 
@@ -281,6 +281,6 @@ def _parts_of_home(**boxes: Boxes) -> tuple[Part, ...]:
 
 def _furniture_items(index: dict[str, int]) -> list[Item]:
     return [
-        place_piece(name, _FILE.pieces[name], f"piece_{k}", room_id, at, turn, index)
-        for k, (name, room_id, at, turn) in enumerate(_FILE.places)
+        place_piece(name, _FILE.pieces[name], f"piece_{k}", room_id, position, turn, index)
+        for k, (name, room_id, position, turn) in enumerate(_FILE.places)
     ]

@@ -123,11 +123,11 @@ def furniture_library(
         return None
     # Call the library by its file: its own name changes with the language.
     name = path.stem if catalogue == FURNITURE else "eTeks"
-    held = set(opened.contents.names())
+    archived = set(opened.contents.names())
     entries = []
     for row in numbered_entries(opened.properties):
         entry = _entry(row, name, notes)
-        if entry is not None and entry.piece.model not in held:
+        if entry is not None and entry.piece.model not in archived:
             notes.add(
                 "missing-model", entry.id, f"no {entry.piece.model[:80]!r} in the library: left out"
             )

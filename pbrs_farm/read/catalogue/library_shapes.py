@@ -53,8 +53,8 @@ def library_shape(
 
     turn_deg: about the vertical, of a model that faces another way than its library says.
     """
-    own = Notes(entry.id, strict=False)
-    materials = HomeMaterials(contents, own)
+    shape_notes = Notes(entry.id, strict=False)
+    materials = HomeMaterials(contents, shape_notes)
     piece = entry.piece
     try:
         model = PieceModels(materials, entry.id, MAX_TRIANGLES).get(piece.model, entry.id)
@@ -62,7 +62,7 @@ def library_shape(
         notes.add("unusable-model", entry.id, error.message)
         return None
     if model is None:
-        for note in own.all():
+        for note in shape_notes.all():
             notes.add(note.kind, entry.id, note.text)
         return None
     piece = turned(piece, turn_deg)

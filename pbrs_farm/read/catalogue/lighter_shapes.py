@@ -57,10 +57,10 @@ def _clustered(shape: Shape, cell: float) -> Shape:
     # Take the surfaces apart again.
     surfaces, first = [], 0
     for surface in shape.surfaces:
-        own = cluster[first : first + len(surface.positions)]
+        clusters = cluster[first : first + len(surface.positions)]
         first += len(surface.positions)
         # Keep surfaces smaller than a cell: lights refer to surfaces by index.
-        surfaces.append(_lighter_surface(surface, own, mean) or surface)
+        surfaces.append(_lighter_surface(surface, clusters, mean) or surface)
     return replace(shape, surfaces=tuple(surfaces))
 
 
@@ -70,8 +70,8 @@ def _lighter_surface(surface: Surface, cluster: I64, mean: F64) -> Surface | Non
     is_whole = (corners[:, 0] != corners[:, 1]) & (corners[:, 1] != corners[:, 2])
     is_whole &= corners[:, 2] != corners[:, 0]
     faces = surface.faces[is_whole]
-    _, kept = np.unique(np.sort(corners[is_whole], axis=1), axis=0, return_index=True)
-    faces = faces[np.sort(kept)]
+    _, first_of_equals = np.unique(np.sort(corners[is_whole], axis=1), axis=0, return_index=True)
+    faces = faces[np.sort(first_of_equals)]
     if not len(faces):
         return None
     # Vertices of one cell stay apart where normals or texture coordinates differ much.

@@ -74,28 +74,28 @@ def model_folder(
     """
     files = {f.relative_to(path).as_posix(): f for f in sorted(path.rglob("*")) if f.is_file()}
     stored = store / f"index-{_key_of_folder(path, files)}.json" if store is not None else None
-    found = _read_index(stored) if stored is not None else None
-    if found is None:
-        own = LibraryNotes()
-        pieces = tuple(_index(path, own))
-        found = _digest_of_folder(files), pieces, tuple(own.found)
+    index = _read_index(stored) if stored is not None else None
+    if index is None:
+        own_notes = LibraryNotes()
+        pieces = tuple(_index(path, own_notes))
+        index = _digest_of_folder(files), pieces, tuple(own_notes.found)
         if stored is not None:
-            _write_index(stored, *found)
-    digest, pieces, said = found
-    for note in said:
+            _write_index(stored, *index)
+    digest, pieces, noted = index
+    for note in noted:
         notes.add(note.kind, note.place, note.text)
-    return digest, tuple(_piece_of_model(path, one, notes) for one in pieces)
+    return digest, tuple(_piece_of_model(path, piece, notes) for piece in pieces)
 
 
 def _index(path: Path, notes: LibraryNotes) -> list[_Indexed]:
     table = model_table(path, notes)
-    found = []
+    entries = []
     for model in _models(path, table):
         file = model.path.relative_to(model.root).as_posix()
-        one = _indexed(model, file, table.rows.get(file, ModelRow()), notes)
-        if one is not None:
-            found.append(one)
-    return found
+        entry = _indexed(model, file, table.rows.get(file, ModelRow()), notes)
+        if entry is not None:
+            entries.append(entry)
+    return entries
 
 
 def _models(path: Path, table: ModelTable) -> list[ObjectModel]:
@@ -155,10 +155,10 @@ def _find_rule_and_size(
         for unit, words in _UNITS.items():
             width, depth, height = size
             smaller = (width * unit, depth * unit, height * unit)
-            other = _rule_by_words(name, row, category, smaller)
-            if other is not None and other.fits("", smaller):
+            smaller_rule = _rule_by_words(name, row, category, smaller)
+            if smaller_rule is not None and smaller_rule.fits("", smaller):
                 notes.add("other-unit", place, f"is told in {words}")
-                return other, smaller
+                return smaller_rule, smaller
     if rule is None:
         notes.add("unmapped-class", place, f"no group for {name!r} of {_size_text(size)}: left out")
     else:
@@ -225,20 +225,22 @@ def _bounds_of_glb(path: Path) -> Any:
     if {"KHR_mesh_quantization", "EXT_mesh_gpu_instancing"} & set(used):
         return None
     roots = scene["scenes"][scene.get("scene", 0)]["nodes"]
-    corners, left = [], [(k, np.zeros(3), np.ones(3)) for k in roots]
+    corners, waiting = [], [(k, np.zeros(3), np.ones(3)) for k in roots]
     for _ in range(_MOST_NODES):
-        if not left:
+        if not waiting:
             break
-        k, at, scale = left.pop()
+        k, offset, scale = waiting.pop()
         node = nodes[k]
-        at = at + scale * np.array(node.get("translation", (0, 0, 0)), float)
+        offset = offset + scale * np.array(node.get("translation", (0, 0, 0)), float)
         scale = scale * np.array(node.get("scale", (1, 1, 1)), float)
-        left += [(child, at, scale) for child in node.get("children", ())]
+        waiting += [(child, offset, scale) for child in node.get("children", ())]
         if "mesh" in node:
             for primitive in scene["meshes"][node["mesh"]]["primitives"]:
                 accessor = scene["accessors"][primitive["attributes"]["POSITION"]]
-                corners += [at + scale * np.array(accessor[end], float) for end in ("min", "max")]
-    is_whole = corners and not left
+                corners += [
+                    offset + scale * np.array(accessor[end], float) for end in ("min", "max")
+                ]
+    is_whole = corners and not waiting
     return np.array([np.min(corners, 0), np.max(corners, 0)]) if is_whole else None
 
 
@@ -262,8 +264,8 @@ def _digest_of_folder(files: dict[str, Path]) -> str:
 def _write_index(
     file: Path, digest: str, pieces: tuple[_Indexed, ...], notes: tuple[Note, ...]
 ) -> None:
-    said = [(n.kind, n.place, n.text) for n in notes]
-    row = {"digest": digest, "pieces": [asdict(one) for one in pieces], "notes": said}
+    noted = [(n.kind, n.place, n.text) for n in notes]
+    row = {"digest": digest, "pieces": [asdict(piece) for piece in pieces], "notes": noted}
     with suppress(OSError):
         file.parent.mkdir(parents=True, exist_ok=True)
         write_whole(file, json.dumps(row).encode())
@@ -273,8 +275,10 @@ def _read_index(file: Path) -> tuple[str, tuple[_Indexed, ...], tuple[Note, ...]
     """Read the file of _write_index; None if it is missing or damaged."""
     try:
         row = json.loads(file.read_bytes())
-        pieces = tuple(_Indexed(**{**one, "size": tuple(one["size"])}) for one in row["pieces"])
-        return str(row["digest"]), pieces, tuple(Note(*said) for said in row["notes"])
+        pieces = tuple(
+            _Indexed(**{**fields, "size": tuple(fields["size"])}) for fields in row["pieces"]
+        )
+        return str(row["digest"]), pieces, tuple(Note(*note) for note in row["notes"])
     except (OSError, ValueError, KeyError, TypeError):
         return None
 

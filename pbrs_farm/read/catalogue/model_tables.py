@@ -79,9 +79,9 @@ def model_table(path: Path, notes: LibraryNotes) -> ModelTable:
         for name in names:
             if (path / name).exists():
                 return _read_model_table(path, name, read, notes)
-    others = [f for f in sorted(path.glob("*.csv"))[:8] if _names_files(f)]
+    tables = [f for f in sorted(path.glob("*.csv"))[:8] if _names_files(f)]
     return (
-        _read_model_table(path, others[0].name, _own, notes) if len(others) == 1 else ModelTable({})
+        _read_model_table(path, tables[0].name, _own, notes) if len(tables) == 1 else ModelTable({})
     )
 
 
@@ -117,13 +117,13 @@ def _own(path: Path, name: str, notes: LibraryNotes) -> ModelTable:
     rows = list(csv.DictReader(text.splitlines()))
     if rows and "file" not in rows[0]:
         raise ValueError("has no column `file`")
-    found: dict[str, ModelRow] = {}
+    models: dict[str, ModelRow] = {}
     for row in rows:
         cells = {
             k.strip().lower(): (v or "").strip() for k, v in row.items() if k and isinstance(v, str)
         }
         try:
-            found[cells["file"]] = ModelRow(
+            models[cells["file"]] = ModelRow(
                 name=cells.get("name", ""),
                 group=cells.get("group", "") or cells.get("class", ""),
                 size=_size_cm(cells),
@@ -137,7 +137,7 @@ def _own(path: Path, name: str, notes: LibraryNotes) -> ModelTable:
                 f"{name}: {cells.get('file', '')}",
                 f"{error}: its other models are read",
             )
-    return ModelTable(found)
+    return ModelTable(models)
 
 
 def _size_cm(cells: Mapping[str, str]) -> Size | None:
@@ -172,16 +172,16 @@ def _future(path: Path, name: str, notes: LibraryNotes) -> ModelTable:
     """3D-FUTURE: a list of model_id, super-category, category; raw_model.obj in metres, front to +z."""
     rows = bounded_json(_data(path / name), name)
     folder = name.rpartition("/")[0]
-    found = {}
+    models = {}
     for row in rows if isinstance(rows, list) else []:
         if isinstance(row, dict) and _is_plain(str(row.get("model_id", ""))):
             category = str(row.get("category") or "")
             above = str(row.get("super-category") or "")
-            seen = given_class("3dfuture", category) or given_class("3dfuture-super", above)
+            label_class = given_class("3dfuture", category) or given_class("3dfuture-super", above)
             file = "/".join(filter(None, (folder, str(row["model_id"]), "raw_model.obj")))
-            label = NYU40_NAMES[seen.nyu40] if seen and seen.nyu40 > 0 else ""
-            found[file] = ModelRow(name=category or above, label=label, creator="3D-FUTURE")
-    return ModelTable(found, is_whole=True)
+            label = NYU40_NAMES[label_class.nyu40] if label_class and label_class.nyu40 > 0 else ""
+            models[file] = ModelRow(name=category or above, label=label, creator="3D-FUTURE")
+    return ModelTable(models, is_whole=True)
 
 
 def _hssd(path: Path, name: str, notes: LibraryNotes) -> ModelTable:
@@ -190,16 +190,20 @@ def _hssd(path: Path, name: str, notes: LibraryNotes) -> ModelTable:
     head = [h.strip().lower() for h in next(rows, [])]
     at_id = head.index("id") if "id" in head else 0
     at_class = next((head.index(h) for h in ("main_category", "category") if h in head), 14)
-    found = {}
+    models = {}
     for row in rows:
         if len(row) <= max(at_id, at_class) or not _is_plain(row[at_id].strip()):
             continue
-        one, words = row[at_id].strip(), row[at_class].strip().replace("_", " ")
-        ways = (f"objects/{one[0]}/{one}.glb", f"objects/{one}.glb", f"{one}.glb")
+        model_id, words = row[at_id].strip(), row[at_class].strip().replace("_", " ")
+        ways = (
+            f"objects/{model_id[0]}/{model_id}.glb",
+            f"objects/{model_id}.glb",
+            f"{model_id}.glb",
+        )
         file = next((w for w in ways if (path / w).is_file()), ways[0])
         quarters = _front_of_config(path / file.replace(".glb", ".object_config.json"))
-        found[file] = ModelRow(name=words, label=words, quarters=quarters, creator="HSSD")
-    return ModelTable(found, is_whole=True)
+        models[file] = ModelRow(name=words, label=words, quarters=quarters, creator="HSSD")
+    return ModelTable(models, is_whole=True)
 
 
 def _front_of_config(file: Path) -> int:
@@ -216,25 +220,27 @@ def _objathor(path: Path, name: str, notes: LibraryNotes) -> ModelTable:
     rows = bounded_json(_data(path / name), name)
     if not isinstance(rows, dict):
         raise ValueError("holds no annotations by id")
-    found, pickles = {}, 0
-    for one, row in rows.items():
-        if not (_is_plain(one) and isinstance(row, dict)):
+    models, pickles = {}, 0
+    for model_id, row in rows.items():
+        if not (_is_plain(model_id) and isinstance(row, dict)):
             continue
         ways = [
-            f"{folder}{one}{end}" for folder in ("", "assets/") for end in (".glb", f"/{one}.glb")
+            f"{folder}{model_id}{end}"
+            for folder in ("", "assets/")
+            for end in (".glb", f"/{model_id}.glb")
         ]
         file = next((w for w in ways if (path / w).is_file()), "")
         if not file:
-            packed = [f"{folder}{one}/{one}.pkl.gz" for folder in ("", "assets/")]
+            packed = [f"{folder}{model_id}/{model_id}.pkl.gz" for folder in ("", "assets/")]
             pickles += any((path / w).is_file() for w in packed)
         words = str(row.get("category") or row.get("ref_category") or "").replace("_", " ")
-        seen = given_class("ai2thor", words)
-        label = NYU40_NAMES[seen.nyu40] if seen and seen.nyu40 > 0 else ""
-        found[file or ways[0]] = ModelRow(name=words, label=label or words, creator="objathor")
+        label_class = given_class("ai2thor", words)
+        label = NYU40_NAMES[label_class.nyu40] if label_class and label_class.nyu40 > 0 else ""
+        models[file or ways[0]] = ModelRow(name=words, label=label or words, creator="objathor")
     if pickles:
         text = f"{pickles} models are pickles, which may hold programs: convert them to GLB"
         notes.add("refused-pickles", name, text)
-    return ModelTable(found, is_whole=True)
+    return ModelTable(models, is_whole=True)
 
 
 def _is_plain(one: str) -> bool:

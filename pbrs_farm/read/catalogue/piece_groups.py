@@ -97,9 +97,9 @@ def group_rule(
     if _OUTSIDE & set(plain(category).split()):
         return None
     for text in (name, inner):
-        found = _rule_by_words(text, category, size)
-        if found is not None:
-            return found
+        rule = _rule_by_words(text, category, size)
+        if rule is not None:
+            return rule
     # Look up the name's class in the multilingual vocabulary.
     by_word = class_of_piece("", name).nyu40
     return _rule_by_words(NYU40_NAMES[by_word], category, size) if by_word else None
@@ -149,11 +149,11 @@ def _words_of_rule(text: str) -> list[str]:
 
 @cache
 def _by_phrase() -> Mapping[str, tuple[GroupRule, ...]]:
-    found: dict[str, list[GroupRule]] = {}
+    rules_of: dict[str, list[GroupRule]] = {}
     for rule in group_rules():
         for phrase in rule.words:
-            found.setdefault(" ".join(_words_of_rule(phrase)), []).append(rule)
-    return {phrase: tuple(rules) for phrase, rules in found.items()}
+            rules_of.setdefault(" ".join(_words_of_rule(phrase)), []).append(rule)
+    return {phrase: tuple(rules) for phrase, rules in rules_of.items()}
 
 
 def _rules_of(phrase: str) -> list[GroupRule]:

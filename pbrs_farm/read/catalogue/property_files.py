@@ -21,7 +21,7 @@ def parse_properties(data: bytes) -> dict[str, str]:
         text = text_from_bytes(data)
     except UnicodeDecodeError:
         text = data.decode("latin-1")
-    found = {}
+    properties = {}
     whole = ""
     for raw in text.splitlines():
         line = raw.lstrip()
@@ -35,8 +35,8 @@ def parse_properties(data: bytes) -> dict[str, str]:
         match = _ENTRY.fullmatch(whole)
         whole = ""
         if match is not None:
-            found[_unescape(match[1])] = _unescape(match[2]).strip()
-    return found
+            properties[_unescape(match[1])] = _unescape(match[2]).strip()
+    return properties
 
 
 def numbered_entries(properties: dict[str, str]) -> list[dict[str, str]]:

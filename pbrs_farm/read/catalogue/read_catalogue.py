@@ -72,27 +72,27 @@ def catalogue_from(
     library without any usable piece, unless may_be_empty.
     """
     notes = LibraryNotes()
-    found = []
+    libraries_read = []
     if jar is not None:
-        found.append(_read_furniture_library(jar, notes, JAR_FURNITURE))
-        found.append(_textures(jar, notes, JAR_TEXTURES))
-    found += [_read_furniture_library(path, notes, FURNITURE) for path in libraries]
+        libraries_read.append(_read_furniture_library(jar, notes, JAR_FURNITURE))
+        libraries_read.append(_textures(jar, notes, JAR_TEXTURES))
+    libraries_read += [_read_furniture_library(path, notes, FURNITURE) for path in libraries]
     users = [_given(path, notes, store, may_be_empty=may_be_empty) for path in given]
-    found += users
-    held = [f for f in found if f is not None]
+    libraries_read += users
+    usable = [f for f in libraries_read if f is not None]
     # Later libraries replace pieces of earlier ones.
     shapes = ShapeStore(store) if store is not None else None
     pieces: dict[str, Piece] = {}
     loaders: dict[str, Loader] = {}
-    for library in held:
+    for library in usable:
         for piece, loader in library.pieces:
             pieces[piece.id] = piece
             loaders[piece.id] = _load_through_store(shapes, library.sha256, piece, loader)
     return Catalogue(
         pieces=tuple(pieces.values()),
         load=lambda piece: loaders[piece.id]() if piece.id in loaders else None,
-        digest=keys.digest({"version": VERSION, "libraries": [f.sha256 for f in held]}),
-        pictures=tuple({p.texture.id: p for f in held for p in f.pictures}.values()),
+        digest=keys.digest({"version": VERSION, "libraries": [f.sha256 for f in usable]}),
+        pictures=tuple({p.texture.id: p for f in usable for p in f.pictures}.values()),
         notes=tuple(notes.found),
         own=frozenset(piece.id for f in users if f is not None for piece, _ in f.pieces),
     )
@@ -112,21 +112,21 @@ def _given(
 ) -> Found | None:
     if not path.exists():
         raise BadInput(path, "", "no such file or folder", hint="of --catalogue")
-    found: Found | None
+    library: Found | None
     n_before = len(notes.found)
     if path.is_dir():
-        found = _read_folder(path, notes, store)
+        library = _read_folder(path, notes, store)
     elif path.suffix.lower() == ".sh3t":
-        found = _textures(path, notes, TEXTURES)
+        library = _textures(path, notes, TEXTURES)
     elif path.suffix.lower() == ".sh3f":
-        found = _read_furniture_library(path, notes, FURNITURE)
+        library = _read_furniture_library(path, notes, FURNITURE)
     else:
         hint = ".sh3f, .sh3t or a folder of OBJ and GLB, or of pictures, is read"
         raise BadInput(path, "", "is no catalogue", hint=hint)
-    if not may_be_empty and (found is None or not (found.pieces or found.pictures)):
+    if not may_be_empty and (library is None or not (library.pieces or library.pictures)):
         why = next((n.text for n in [*notes.found][n_before:]), "")
         raise BadInput(path, "", "holds nothing that can be used", hint=why)
-    return found
+    return library
 
 
 def _read_folder(path: Path, notes: LibraryNotes, store: Path | None) -> Found:
@@ -142,8 +142,8 @@ def _read_folder(path: Path, notes: LibraryNotes, store: Path | None) -> Found:
 
 
 def _textures(path: Path, notes: LibraryNotes, catalogue: str) -> Found | None:
-    found = texture_library(path, notes, catalogue)
-    return Found(found[0], pictures=found[1]) if found else None
+    library = texture_library(path, notes, catalogue)
+    return Found(library[0], pictures=library[1]) if library else None
 
 
 def _read_furniture_library(path: Path, notes: LibraryNotes, catalogue: str) -> Found | None:
@@ -153,12 +153,14 @@ def _read_furniture_library(path: Path, notes: LibraryNotes, catalogue: str) -> 
     pieces = []
     for entry in library.entries:
         # Go by what people decided of this very piece, else by its name and size.
-        seen = piece_verdicts().get(entry.id)
+        verdict = piece_verdicts().get(entry.id)
         rule = (
-            None if seen and not seen.group else _rule_of_entry(entry, seen.group if seen else "")
+            None
+            if verdict and not verdict.group
+            else _rule_of_entry(entry, verdict.group if verdict else "")
         )
         if rule is not None:
-            pieces.append(_piece_of_entry(library, entry, rule, seen or _AS_WRITTEN, notes))
+            pieces.append(_piece_of_entry(library, entry, rule, verdict or _AS_WRITTEN, notes))
     if not pieces:
         notes.add("no-classes", library.name, "no piece of the library has a known class")
     pictures = pictures_of_models(library.name, library.contents, library.licence, notes)

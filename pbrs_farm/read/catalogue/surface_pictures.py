@@ -79,13 +79,13 @@ def pictures_of_models(
     library: str, contents: Resources, licence: str, notes: LibraryNotes
 ) -> tuple[Picture, ...]:
     """The surface pictures that a library of the packages holds among its models."""
-    found = []
+    pictures = []
     for row in _seen_pictures().get(library, ()):
         texture = _read_texture(contents, row.image, f"{library}#{row.image}", notes)
         if texture is not None:
             texture = _turn_texture(texture) if row.is_turned else texture
-            found.append(Picture(texture, row.group, row.size, library, licence))
-    return tuple(found)
+            pictures.append(Picture(texture, row.group, row.size, library, licence))
+    return tuple(pictures)
 
 
 def texture_library(
@@ -99,10 +99,10 @@ def texture_library(
     opened = opened_library(path, catalogue, notes)
     if opened is None:
         return None
-    found = tuple(_pictures_of_library(opened, path.stem, notes))
-    if not found:
+    pictures = tuple(_pictures_of_library(opened, path.stem, notes))
+    if not pictures:
         notes.add("no-classes", path.name, "no picture of the library is of a known kind")
-    return opened.sha256, found
+    return opened.sha256, pictures
 
 
 def _pictures_of_library(
@@ -127,8 +127,8 @@ def surface_group(name: str, category: str) -> str:
     for text in (name, category if plain(category) not in _PLACES else ""):
         words = set(plain(text).replace("-", " ").replace("_", " ").split())
         words |= {w.removesuffix("s") for w in words}
-        for group, known in _GROUPS:
-            if words & set(known.split()):
+        for group, words_of_group in _GROUPS:
+            if words & set(words_of_group.split()):
                 return group
     return ""
 
@@ -180,12 +180,12 @@ def _turn_texture(texture: Texture) -> Texture:
 def _seen_pictures() -> dict[str, list[_Seen]]:
     folder = files("pbrs_farm.read.catalogue")
     text = folder.joinpath("surface-pictures.csv").read_text("utf-8")
-    found: dict[str, list[_Seen]] = {}
+    rows_of_library: dict[str, list[_Seen]] = {}
     for r in csv.DictReader(text.splitlines()):
         size = (float(r["width_cm"]) / 100, float(r["height_cm"]) / 100)
         row = _Seen(r["image"], r["group"], r["turned"] == "1", size)
-        found.setdefault(r["library"], []).append(row)
-    return found
+        rows_of_library.setdefault(r["library"], []).append(row)
+    return rows_of_library
 
 
 def picture_folder(path: Path, notes: LibraryNotes) -> tuple[str, tuple[Picture, ...]]:
@@ -193,7 +193,7 @@ def picture_folder(path: Path, notes: LibraryNotes) -> tuple[str, tuple[Picture,
 
     EXIF orientation is applied. Undecodable files become notes.
     """
-    digest, found = hashlib.sha256(), []
+    digest, pictures = hashlib.sha256(), []
     files = sorted(p for p in path.rglob("*") if p.suffix.lower() in _SUFFIXES)
     for file in files[:MOST_PICTURES]:
         place = f"{path.name}/{file.relative_to(path).as_posix()}"
@@ -204,10 +204,10 @@ def picture_folder(path: Path, notes: LibraryNotes) -> tuple[str, tuple[Picture,
             notes.add("unreadable-texture", place, f"{error}: left out")
             continue
         digest.update(keys.sha256(data).encode())
-        found.append(Picture(texture, PRINTS, (_WIDTH_M, _WIDTH_M / aspect)))
+        pictures.append(Picture(texture, PRINTS, (_WIDTH_M, _WIDTH_M / aspect)))
     if len(files) > MOST_PICTURES:
         notes.add("many-pictures", path.name, f"{len(files)} pictures: {MOST_PICTURES} are used")
-    return digest.hexdigest(), tuple(found)
+    return digest.hexdigest(), tuple(pictures)
 
 
 def _bounded_picture(data: bytes, name: str) -> tuple[Texture, float]:

@@ -39,12 +39,12 @@ def box_only_item(
     """
     if words_of(_spoken(name)) & _ON_FIXTURES:
         return None
-    seen = given_class(vocabulary, name) or class_by_words(_spoken(name))
-    if seen is not None and seen.kind == LEFT_OUT:
+    words_class = given_class(vocabulary, name) or class_by_words(_spoken(name))
+    if words_class is not None and words_class.kind == LEFT_OUT:
         return None
-    if seen is not None and seen.nyu40 < 0:
-        seen = class_by_words(_spoken(name))
-    if seen is not None and seen.kind not in _FURNITURE:
+    if words_class is not None and words_class.nyu40 < 0:
+        words_class = class_by_words(_spoken(name))
+    if words_class is not None and words_class.kind not in _FURNITURE:
         return None
     if not all(map(math.isfinite, (*centre, *size, turn_rad))):
         return None
@@ -56,10 +56,10 @@ def box_only_item(
     return Item(
         id=item_id,
         name=_spoken(name),
-        kind=seen.item_kind if seen else ItemKind.OBJECT,
+        kind=words_class.item_kind if words_class else ItemKind.OBJECT,
         level_id=level_id,
         surfaces=(),
-        nyu40=seen.nyu40 if seen else 40,
+        nyu40=words_class.nyu40 if words_class else 40,
         source_class=name,
         room_id=room_id,
         box=Box(np.array(centre, np.float64), np.array(size, np.float64) / 2, axes),

@@ -157,8 +157,8 @@ def _door(hole: Hole) -> _Boxes:
             boxes, (float(low), float(high)), (-h + 0.006, top - 0.003), track, hole.is_glazed
         )
         hinged_right = hole.is_hinged_right if n == 1 else k % 2 == 1
-        at = low + 0.07 if hinged_right else high - 0.07
-        _handle(boxes, float(at), -h + min(_HANDLE_Y, h), track)
+        handle_x = low + 0.07 if hinged_right else high - 0.07
+        _handle(boxes, float(handle_x), -h + min(_HANDLE_Y, h), track)
     return boxes
 
 
@@ -222,21 +222,26 @@ def merge_holes(holes: list[Hole]) -> list[Hole]:
     Two rooms often name the hole between them once each. The first keeps its id and kind; the order
     stays.
     """
-    found: list[Hole] = []
+    merged: list[Hole] = []
     for hole in holes:
-        same = next((k for k, other in enumerate(found) if _is_same(other, hole)), None)
+        same = next((k for k, same_hole in enumerate(merged) if _is_same(same_hole, hole)), None)
         if same is None:
-            found.append(hole)
+            merged.append(hole)
             continue
-        other = found[same]
-        across = other.axes[:, 2]
-        at = float((hole.centre - other.centre) @ across)
-        ends = [-other.size[2] / 2, other.size[2] / 2, at - hole.size[2] / 2, at + hole.size[2] / 2]
+        same_hole = merged[same]
+        across = same_hole.axes[:, 2]
+        offset = float((hole.centre - same_hole.centre) @ across)
+        ends = [
+            -same_hole.size[2] / 2,
+            same_hole.size[2] / 2,
+            offset - hole.size[2] / 2,
+            offset + hole.size[2] / 2,
+        ]
         depth, middle = max(ends) - min(ends), (max(ends) + min(ends)) / 2
-        found[same] = replace(
-            other, centre=other.centre + middle * across, size=(*other.size[:2], depth)
+        merged[same] = replace(
+            same_hole, centre=same_hole.centre + middle * across, size=(*same_hole.size[:2], depth)
         )
-    return found
+    return merged
 
 
 def _is_same(a: Hole, b: Hole) -> bool:

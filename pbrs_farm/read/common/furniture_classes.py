@@ -167,13 +167,13 @@ def _vocabulary() -> Mapping[str, tuple[str, bool]]:
 
 @cache
 def _describing_words() -> Mapping[str, _Describing]:
-    found: dict[str, _Describing] = {}
+    rules: dict[str, _Describing] = {}
     for row in _rows_of_csv("describing_words.csv"):
         after, but_not = (frozenset(row[key].split("|")) for key in ("after", "but not"))
         # One value a row: words of a row do not describe each other.
         rule = _Describing(after, but_not, row["is"] == "material")
-        found |= dict.fromkeys(row["words"].split("|"), rule)
-    return found
+        rules |= dict.fromkeys(row["words"].split("|"), rule)
+    return rules
 
 
 def plain(text: str) -> str:
@@ -217,28 +217,28 @@ def _found_candidates(name: str) -> Iterator[_Candidate]:
 
 
 def _from_the_noun(words: list[str], *, is_head: bool) -> Iterator[_Candidate]:
-    found: list[_Candidate] = []
+    candidates: list[_Candidate] = []
     k = len(words)
     # The last known word is the noun; phrases of several words take precedence.
     while k > 0:
         for n in range(min(_LONGEST_PHRASE, k), 0, -1):
             phrase = " ".join(words[k - n : k])
-            known = None if _is_a_tint(phrase, words, k) else _class_of_phrase(phrase)
-            if known is not None and (k == len(words) or words[k - 1] not in _MODIFIERS):
-                is_first = known[1] and k == n
+            word_class = None if _is_a_tint(phrase, words, k) else _class_of_phrase(phrase)
+            if word_class is not None and (k == len(words) or words[k - 1] not in _MODIFIERS):
+                is_first = word_class[1] and k == n
                 is_noun = is_head and (is_first or k == len(words))
-                found.append(_Candidate(known[0], is_noun, phrase, is_first))
+                candidates.append(_Candidate(word_class[0], is_noun, phrase, is_first))
                 k -= n - 1
                 break
         k -= 1
     # A word described by the last word precedes it: "table leg", "cabinet door glass".
     noun = 0
-    for k in range(1, len(found)):
-        noun = k if _describes(found[noun], found[k]) else noun
+    for k in range(1, len(candidates)):
+        noun = k if _describes(candidates[noun], candidates[k]) else noun
     if noun:
-        found.insert(0, replace(found.pop(noun), is_noun=found[0].is_noun))
+        candidates.insert(0, replace(candidates.pop(noun), is_noun=candidates[0].is_noun))
     # Languages with the noun first use the first word.
-    yield from sorted(found, key=lambda c: not c.is_first)
+    yield from sorted(candidates, key=lambda c: not c.is_first)
 
 
 def _is_a_tint(phrase: str, words: list[str], end: int) -> bool:
@@ -251,8 +251,8 @@ def _is_a_tint(phrase: str, words: list[str], end: int) -> bool:
 
 def is_also_a_material(phrase: str) -> bool:
     """Whether a plant's word names as often a wood, a pattern or a tint: pine, rose."""
-    known = _describing_words().get(phrase)
-    return known is not None and known.is_material
+    rule = _describing_words().get(phrase)
+    return rule is not None and rule.is_material
 
 
 def _describes(last: _Candidate, before: _Candidate) -> bool:
@@ -267,16 +267,16 @@ def _describes(last: _Candidate, before: _Candidate) -> bool:
 
 
 def _class_of_phrase(phrase: str) -> tuple[str, bool] | None:
-    known = _vocabulary()
+    vocabulary = _vocabulary()
     singular = phrase[: -2 if phrase.endswith(("shes", "ches", "xes", "sses")) else -1]
     for form in (phrase, singular if phrase.endswith("s") else phrase):
         for entry in (form, "-" + form):
-            if entry in known:
-                return known[entry]
+            if entry in vocabulary:
+                return vocabulary[entry]
     # Try the ends of a compound word, longest first.
     for k in range(1, len(phrase) if " " not in phrase else 0):
-        if "-" + phrase[k:] in known:
-            return known["-" + phrase[k:]]
+        if "-" + phrase[k:] in vocabulary:
+            return vocabulary["-" + phrase[k:]]
     return None
 
 
@@ -322,9 +322,9 @@ def _by_words(name: str, place: PieceSize | None, rule: str) -> PieceClass:
             refused = True
             continue
         stands_for = {PLANT_WORD: "otherprop", _STAIRS: "otherstructure"}
-        found = NYU40_NAMES.index(stands_for.get(label, label))
+        nyu40 = NYU40_NAMES.index(stands_for.get(label, label))
         by = rule if is_noun or rule != "name" else "inner-word"
-        return PieceClass(found, by, label, candidate.phrase)
+        return PieceClass(nyu40, by, label, candidate.phrase)
     return PieceClass(None, "size" if refused else "none")
 
 
@@ -336,25 +336,31 @@ def class_of_piece(
     A bare box, cylinder or triangle is classified by name, else by group: people build furniture from
     them. The class must fit the place, if given; a table 5 cm high is rejected.
     """
-    known = _classes_of_catalogue_ids().get(catalogue_id)
+    catalogue_class = _classes_of_catalogue_ids().get(catalogue_id)
     inner = catalogue_id.partition("#")[2]
     if catalogue_id in _PRIMITIVES:
         is_named = name.lower() not in _PRIMITIVE_NAMES
-        own = _by_words(name, place, "name") if is_named else PieceClass(None, "none")
-        if own.nyu40 is None and own.rule == "none":
-            own = _by_words(group, place, "group")
-        return own if own.nyu40 is not None else PieceClass(known, "catalogue")
+        name_class = _by_words(name, place, "name") if is_named else PieceClass(None, "none")
+        if name_class.nyu40 is None and name_class.rule == "none":
+            name_class = _by_words(group, place, "group")
+        return (
+            name_class if name_class.nyu40 is not None else PieceClass(catalogue_class, "catalogue")
+        )
     # The catalogue is the surest, as long as the size agrees.
-    is_fit = known is not None and _fits_its_size(NYU40_NAMES[known], place)
-    if known is not None and is_fit and not _is_a_bench_alone(NYU40_NAMES[known], place):
+    is_fit = catalogue_class is not None and _fits_its_size(NYU40_NAMES[catalogue_class], place)
+    if (
+        catalogue_class is not None
+        and is_fit
+        and not _is_a_bench_alone(NYU40_NAMES[catalogue_class], place)
+    ):
         word = next((c.label for c in (*_candidates(inner), *_candidates(name))), "")
-        return PieceClass(known, "catalogue", word)
-    own = _by_words(name, place, "name")
-    if own.nyu40 is not None:
-        return own
+        return PieceClass(catalogue_class, "catalogue", word)
+    name_class = _by_words(name, place, "name")
+    if name_class.nyu40 is not None:
+        return name_class
     by_id = _by_words(inner, place, "id")
     # Say "size" where a class was found and refused, "none" where there was none.
-    misfit = known is not None or "size" in (own.rule, by_id.rule)
+    misfit = catalogue_class is not None or "size" in (name_class.rule, by_id.rule)
     return by_id if by_id.nyu40 is not None else PieceClass(None, "size" if misfit else "none")
 
 

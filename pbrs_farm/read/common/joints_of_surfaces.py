@@ -15,12 +15,12 @@ def joints_of_surfaces(
     joints: Iterable[Joint], surfaces: Sequence[Surface], materials: Sequence[Material]
 ) -> tuple[Joint, ...]:
     """The joints that move one of some surfaces at all, with the mass of what they move."""
-    found = []
+    moving = []
     for joint in joints:
-        own = [s for s in surfaces if s.part == joint.part]
+        moved = [s for s in surfaces if s.part == joint.part]
         mass = sum(
-            mass_kg(triangle_corners(s.positions, s.faces), materials[s.material]) for s in own
+            mass_kg(triangle_corners(s.positions, s.faces), materials[s.material]) for s in moved
         )
-        if own:
-            found.append(replace(joint, mass_kg=joint.mass_kg or mass))
-    return tuple(found)
+        if moved:
+            moving.append(replace(joint, mass_kg=joint.mass_kg or mass))
+    return tuple(moving)

@@ -157,8 +157,8 @@ class MaterialLibrary:
     def textures(self) -> dict[str, Texture]:
         """Textures used by a material, by id; unused loaded textures are left out."""
         used = {name for m in self._materials for name in m.texture_ids}
-        found = (loaded.texture for loaded in self._loaded.values() if loaded is not None)
-        return {t.id: t for t in found if t.id in used}
+        loaded_textures = (loaded.texture for loaded in self._loaded.values() if loaded is not None)
+        return {t.id: t for t in loaded_textures if t.id in used}
 
     def index(self, material: Material) -> int:
         """The material's index in the house, the same for equal materials.

@@ -52,8 +52,8 @@ class ModelMaterials:
             diffuse = override.diffuse
         elif reference and base.kd in (GREY, BLACK):  # no Kd, or one that would hide the picture
             diffuse = WHITE
-        found = self._texture(reference, base.map_d, place) if reference or base.map_d else None
-        if reference and found is None and diffuse == WHITE:
+        loaded = self._texture(reference, base.map_d, place) if reference or base.map_d else None
+        if reference and loaded is None and diffuse == WHITE:
             diffuse = GREY
         return Material(
             name=(override.name if override is not None else "") or base.name,
@@ -62,8 +62,8 @@ class ModelMaterials:
             specular=base.ks,
             shininess=base.ns,
             opacity=base.d,
-            texture_id=found.texture.id if found else None,
-            alpha_cutout=bool(found and found.has_holes()),
+            texture_id=loaded.texture.id if loaded else None,
+            alpha_cutout=bool(loaded and loaded.has_holes()),
         )
 
     def wall_material(

@@ -72,20 +72,20 @@ def class_of_node_name(
     size: of the node, if known: decides between words of a name, and rejects persons and plants of
     the wrong size.
     """
-    said = (_class_of_words(text, size) for text in _likely_names(name, materials))
-    return next((seen for seen in said if seen is not None), None)
+    classes = (_class_of_words(text, size) for text in _likely_names(name, materials))
+    return next((node_class for node_class in classes if node_class is not None), None)
 
 
 def _likely_names(name: str, materials: Sequence[str]) -> Iterator[str]:
     """Parts of a name that may be the item's noun, the likeliest first; the whole name comes last."""
-    own = _without_material(name, materials)
+    plain_name = _without_material(name, materials)
     # "Kitchen_Sink_0": all parts of a room with the material Sink.
-    if own != name and own.lower() not in _ROOMS_AND_CABINETS:
-        yield own
+    if plain_name != name and plain_name.lower() not in _ROOMS_AND_CABINETS:
+        yield plain_name
     # Revit: "M_Table-Coffee:0610 x 0610mm:143210", family, type and id; a maker follows a dash.
-    is_revit = _REVIT_NAME.search(own) is not None
+    is_revit = _REVIT_NAME.search(plain_name) is not None
     if is_revit:
-        for text in own.split(":"):
+        for text in plain_name.split(":"):
             yield text.partition("-")[0]
             yield text
     yield name

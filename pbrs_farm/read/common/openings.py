@@ -65,13 +65,13 @@ def openings(items: Sequence[Item]) -> tuple[Opening, ...]:
     Openings are not cut here: repair does that.
     """
     frames = [f for item in items if item.kind is ItemKind.WALL for f in _frames(item)]
-    found = []
+    results = []
     for item in items:
         if item.kind in (ItemKind.DOOR, ItemKind.WINDOW) and item.box is not None:
             opening = _opening_of_leaf(item, item.box, frames)
             if opening is not None:
-                found.append(opening)
-    return tuple(found)
+                results.append(opening)
+    return tuple(results)
 
 
 def openings_of_voids(items: Sequence[Item], voids: Sequence[Void]) -> dict[str, Opening]:
@@ -81,16 +81,16 @@ def openings_of_voids(items: Sequence[Item], voids: Sequence[Void]) -> dict[str,
     (a niche), or if it has no door or window and is inside another void.
     """
     frames = [f for item in items if item.kind is ItemKind.WALL for f in _frames(item)]
-    found: dict[str, Opening] = {}
+    openings: dict[str, Opening] = {}
     for void in sorted(voids, key=lambda v: (v.item is None, not v.undrawn)):
         opening = _opening_of_void(void, frames)
         if opening is None:
             continue
         is_free = void.item is None and not void.undrawn
-        if is_free and any(_lies_in(opening, o) for o in found.values()):
+        if is_free and any(_lies_in(opening, o) for o in openings.values()):
             continue
-        found[void.id] = opening
-    return found
+        openings[void.id] = opening
+    return openings
 
 
 def _lies_in(opening: Opening, other: Opening) -> bool:
@@ -100,15 +100,15 @@ def _lies_in(opening: Opening, other: Opening) -> bool:
 
 
 def _opening_of_void(void: Void, frames: Sequence[_WallFrame]) -> Opening | None:
-    own = [f for f in frames if f.item_id in void.walls]
-    if not own:
+    own_frames = [f for f in frames if f.item_id in void.walls]
+    if not own_frames:
         return None
-    normal = _across_void(void, own)
+    normal = _across_void(void, own_frames)
     axes = _axes_of_wall(normal)
     body = void.points @ axes
     low, high = body.min(0), body.max(0)
     # The corners that the cut left in the wall are its rim.
-    wall = np.concatenate([f.points for f in own]) @ axes
+    wall = np.concatenate([f.points for f in own_frames]) @ axes
     rim = wall[(wall > low - _RIM_M).all(1) & (wall < high + _RIM_M).all(1)]
     has_rim = len(rim) >= 4 and np.ptp(rim[:, :2], axis=0).min() >= LEAST_HOLE_M
     # Without a rim the cut took the wall beside it away too, or failed.
@@ -116,31 +116,31 @@ def _opening_of_void(void: Void, frames: Sequence[_WallFrame]) -> Opening | None
     low, high = np.maximum(low, within.min(0)), np.minimum(high, within.max(0))
     if (high - low)[:2].min() < LEAST_HOLE_M:
         return None
-    sides = [p for f in own for p in _wall_points_around(f, axes, low, high)]
+    sides = [p for f in own_frames for p in _wall_points_around(f, axes, low, high)]
     if void.item is None and (not has_rim or _is_niche(rim, sides)):
         return None
     depth = [rim] if has_rim else sides
     if not depth:
         return None
     ends = np.stack([low, high])
-    is_bare = not _is_covered((low + high) / 2, axes, own)
+    is_bare = not _is_covered((low + high) / 2, axes, own_frames)
     # Adjacent walls have their own holes, or are cut.
-    others = [
+    wall_depths = [
         points
         for f in frames
         if f.item_id not in void.walls
         for points in _wall_points_around(f, axes, ends[0], ends[1])
     ]
-    holes = [h for points in others if (h := _hole(points, ends[0], ends[1])) is not None]
+    holes = [h for points in wall_depths if (h := _hole(points, ends[0], ends[1])) is not None]
     return _opening(
         void.id if void.item is None else f"{void.item.id}_hole",
         void.level_id,
         void.item,
         is_window=void.is_window,
         axes=axes,
-        ends=_across_walls(ends, [*depth, *others]),
+        ends=_across_walls(ends, [*depth, *wall_depths]),
         has_holes=is_bare,
-        is_cut=is_bare and len(holes) == len(others),
+        is_cut=is_bare and len(holes) == len(wall_depths),
     )
 
 
@@ -189,18 +189,20 @@ def _frames(item: Item) -> list[_WallFrame]:
     upright = (np.abs(n[:, 1]) < 0.01 * (2 * area)) & (area > 0)
     n, area, corners = n[upright], area[upright], corners[upright]
     degree = np.rint(np.degrees(np.arctan2(n[:, 2], n[:, 0]))).astype(int) % 180
-    found = []
+    wall_frames = []
     for d in np.unique(degree):
-        here = degree == d
-        if area[here].sum() < _LEAST_SHARE * area.sum():
+        is_facing = degree == d
+        if area[is_facing].sum() < _LEAST_SHARE * area.sum():
             continue
         # Take the direction of the largest face of the group.
-        best = n[here][area[here].argmax()] * [1, 0, 1]
-        points = np.unique(corners[here].reshape(-1, 3), axis=0)
+        best = n[is_facing][area[is_facing].argmax()] * [1, 0, 1]
+        points = np.unique(corners[is_facing].reshape(-1, 3), axis=0)
         normal = best / np.linalg.norm(best)
-        area_m2 = float(area[here].sum())
-        found.append(_WallFrame(item.id, item.level_id, normal, points, corners[here], area_m2))
-    return found
+        area_m2 = float(area[is_facing].sum())
+        wall_frames.append(
+            _WallFrame(item.id, item.level_id, normal, points, corners[is_facing], area_m2)
+        )
+    return wall_frames
 
 
 def _axes_of_wall(normal: F64) -> F64:

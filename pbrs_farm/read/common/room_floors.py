@@ -66,10 +66,11 @@ def covered_share(surface: Surface, polygon: F64) -> float:
     In [0, 1], 0 for a polygon without area. Overlapping faces count once.
     """
     # A planar ceiling may look either way.
-    both = np.concatenate([_faces_looking([surface], 1), _faces_looking([surface], -1)])
+    level_faces = np.concatenate([_faces_looking([surface], 1), _faces_looking([surface], -1)])
     area: Any = shapely.Polygon(polygon)
     return float(
-        shapely.area(shapely.intersection(_outline_from_above(both), area)) / max(area.area, 1e-9)
+        shapely.area(shapely.intersection(_outline_from_above(level_faces), area))
+        / max(area.area, 1e-9)
     )
 
 
@@ -102,8 +103,8 @@ def floor_polygons(
     narrow = shapely.is_empty(_grown(pieces, -min_width_m / 2))
     fit = pieces[(shapely.area(pieces) >= min_area_m2) & ~narrow].tolist()
     fit.sort(key=lambda p: (-p.area, p.bounds))
-    found = [polygon_of(p) for p in _grown(fit, _TRACE_M)]
-    return [p for p in found if p is not None]
+    polygons = [polygon_of(p) for p in _grown(fit, _TRACE_M)]
+    return [p for p in polygons if p is not None]
 
 
 def _line_of_door(bounds: F64) -> shapely.LineString | None:
@@ -123,12 +124,12 @@ def _grown(areas: Any, by_m: float) -> Any:
 
 def _traces(walls: Sequence[Surface]) -> Any:
     """Ground of upright faces seen from above, as strips 2 _TRACE_M wide."""
-    found = []
+    upright_faces = []
     for surface in walls:
         p = triangle_corners(surface.positions, surface.faces)
         upright = np.abs(area_vectors(p)[:, 1]) < _UPRIGHT_UP * (2 * face_areas(p))
-        found.append(p[upright][:, :, [0, 2]])
-    plan = np.concatenate([np.zeros((0, 3, 2)), *found])[:MAX_OUTLINE_FACES]
+        upright_faces.append(p[upright][:, :, [0, 2]])
+    plan = np.concatenate([np.zeros((0, 3, 2)), *upright_faces])[:MAX_OUTLINE_FACES]
     lines: Any = shapely.linestrings(plan)
     return shapely.union_all(shapely.buffer(lines, _TRACE_M, cap_style="square"))
 
@@ -170,11 +171,11 @@ def _largest(area: Any, otherwise: Any) -> Any:
 
 def _faces_looking(surfaces: Sequence[Surface], sign: int) -> F64:
     """(F, 3, 3) corners of the faces that look up (sign 1) or down (-1)."""
-    found = [np.zeros((0, 3, 3))]
+    level_faces = [np.zeros((0, 3, 3))]
     for surface in surfaces:
         p = triangle_corners(surface.positions, surface.faces)
-        found.append(p[sign * area_vectors(p)[:, 1] > _LEVEL_UP * (2 * face_areas(p))])
-    return np.concatenate(found)
+        level_faces.append(p[sign * area_vectors(p)[:, 1] > _LEVEL_UP * (2 * face_areas(p))])
+    return np.concatenate(level_faces)
 
 
 def _outline_from_above(corners: F64) -> Any:

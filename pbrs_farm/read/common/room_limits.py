@@ -71,9 +71,9 @@ def check_number(n_rooms: int, file: str) -> None:
 
 
 def _count_overlaps(outlines: Sequence[Points2]) -> int:
-    found = [shapely.make_valid(shapely.Polygon(p)) for p in outlines if len(p) > 2]
-    areas = np.array(found, object)
-    first, second = shapely.STRtree(found).query(areas, predicate="intersects")
+    polygons = [shapely.make_valid(shapely.Polygon(p)) for p in outlines if len(p) > 2]
+    areas = np.array(polygons, object)
+    first, second = shapely.STRtree(polygons).query(areas, predicate="intersects")
     is_pair = first < second
     shared = shapely.area(shapely.intersection(areas[first[is_pair]], areas[second[is_pair]]))
     return int((shared > _MIN_SHARED_M2).sum())

@@ -50,15 +50,15 @@ def planar_parts(item: Item) -> tuple[Item, ...]:
     # Gather the faces of each plane from all surfaces.
     ends = np.cumsum([len(s.faces) for s in item.surfaces])[:-1]
     by_surface = np.split(plane_of_face, ends)
-    found = []
+    planes = []
     for plane in range(n):
         parts = tuple(
             part_of(s, s.faces[of_face == plane], s.name)
             for s, of_face in zip(item.surfaces, by_surface, strict=True)
             if (of_face == plane).any()
         )
-        found.append(replace(item, id=f"{item.id}.{plane}", surfaces=parts, lights=(), box=None))
-    return (replace(found[0], lights=item.lights), *found[1:])
+        planes.append(replace(item, id=f"{item.id}.{plane}", surfaces=parts, lights=(), box=None))
+    return (replace(planes[0], lights=item.lights), *planes[1:])
 
 
 def _is_closed(surfaces: Sequence[Surface]) -> bool:
@@ -115,8 +115,8 @@ def room_parts(item: Item, others: F64) -> tuple[Item, ...]:
     # Leave items that are only the walls of a room unchanged.
     if sign < 0 and {p.kind for p in parts} == {item.kind}:
         return (item,)
-    kept = picked(item, rest)
-    return (*parts, replace(item, surfaces=kept, lights=(), box=None)) if kept else parts
+    remaining = picked(item, rest)
+    return (*parts, replace(item, surfaces=remaining, lights=(), box=None)) if remaining else parts
 
 
 def components(corners: F64) -> I64:
@@ -191,16 +191,16 @@ def picked(item: Item, chosen: Bools) -> tuple[Surface, ...]:
     face uses are left out as `part_of` does.
     """
     pairs = zip(item.surfaces, _split(item, chosen), strict=True)
-    return tuple(part_of(s, s.faces[own], s.name) for s, own in pairs if own.any())
+    return tuple(part_of(s, s.faces[is_own], s.name) for s, is_own in pairs if is_own.any())
 
 
 def _turn_faces(item: Item, outward: Bools) -> Item:
     """The item with some faces turned round; normals with those of surfaces turned as a whole."""
     surfaces = []
-    for s, own in zip(item.surfaces, _split(item, outward), strict=True):
-        faces = np.where(own[:, None], s.faces[:, [0, 2, 1]], s.faces).astype(np.int32)
-        normals = None if own.any() and not own.all() else s.normals
-        if normals is not None and own.any():
+    for s, is_turned in zip(item.surfaces, _split(item, outward), strict=True):
+        faces = np.where(is_turned[:, None], s.faces[:, [0, 2, 1]], s.faces).astype(np.int32)
+        normals = None if is_turned.any() and not is_turned.all() else s.normals
+        if normals is not None and is_turned.any():
             normals = -normals
         surfaces.append(replace(s, faces=faces, normals=normals))
     return replace(item, surfaces=tuple(surfaces))
@@ -211,31 +211,31 @@ def _parts_by_plane(item: Item, shown: Bools) -> tuple[Item, ...]:
     corners = corners_of_surfaces(item.surfaces)
     plane = plane_of_faces(item.surfaces)
     normal = area_vectors(corners)
-    found: list[Item] = []
+    items: list[Item] = []
     for number in dict.fromkeys(plane[shown].tolist()):
         faces = shown & (plane == number)
         # Faces of one plane may look both ways; part them.
         for sign in (1, -1):
             leading = normal[:, int(np.abs(normal[faces].sum(0)).argmax())]
-            own = faces & (sign * leading > 0)
-            if not own.any():
+            is_own = faces & (sign * leading > 0)
+            if not is_own.any():
                 continue
-            total = normal[own].sum(0)
+            total = normal[is_own].sum(0)
             up = float(total[1] / max(float(np.linalg.norm(total)), 1e-12))
             kind = ItemKind.WALL
             if abs(up) > _LEVEL:
                 kind = ItemKind.FLOOR if up > 0 else ItemKind.CEILING
-            found.append(
+            items.append(
                 replace(
                     item,
-                    id=f"{item.id}.{len(found)}",
+                    id=f"{item.id}.{len(items)}",
                     name=f"{item.name} {kind}".strip(),
                     kind=kind,
                     nyu40=CLASS_OF_STRUCTURE[kind],
-                    surfaces=picked(item, own),
+                    surfaces=picked(item, is_own),
                     lights=(),
                     box=None,
                     tags=tuple(t for t in item.tags if t != "unmapped"),
                 )
             )
-    return (replace(found[0], lights=item.lights), *found[1:])
+    return (replace(items[0], lights=item.lights), *items[1:])

@@ -80,9 +80,9 @@ def _room_of_row(row: _GivenRoom, file: str, place: str, items: Sequence[Item]) 
     polygon = polygon_of(area) if area.is_valid else None
     if polygon is None:
         raise BadHouse(file, f"{place}.polygon", "crosses itself or has no area")
-    given = {"floor_y": row.floor_y, "ceiling_y": row.ceiling_y}
+    heights = {"floor_y": row.floor_y, "ceiling_y": row.ceiling_y}
     words = tuple(str(t)[:60] for t in row.types) if isinstance(row.types, list) else ()
-    return _with_heights(polygon, str(row.name)[:60], words, given, items)
+    return _with_heights(polygon, str(row.name)[:60], words, heights, items)
 
 
 def rooms_from_floors(items: Sequence[Item]) -> list[Room]:
@@ -94,10 +94,10 @@ def rooms_from_floors(items: Sequence[Item]) -> list[Room]:
     """
     walls = _surfaces_of_kind(items, ItemKind.WALL)
     doors = [i for i in items if i.kind is ItemKind.DOOR and i.n_faces]
-    found: list[Room] = []
+    rooms: list[Room] = []
     for item in items:
         height = floor_height(item.surfaces) if item.kind is ItemKind.FLOOR else None
-        if height is None or len(found) > MAX_ROOMS:  # check_rooms refuses them
+        if height is None or len(rooms) > MAX_ROOMS:  # check_rooms refuses them
             continue
         # Divide the floor by walls that reach 1 m above it.
         standing = [w for w in walls if w.positions[:, 1].max() > height + 1.0]
@@ -111,9 +111,9 @@ def rooms_from_floors(items: Sequence[Item]) -> list[Room]:
             min_width_m=MIN_ROOM_WIDTH_M,
             doors=[d.bounds for d in doors if abs(d.bounds[0, 1] - height) < _SLACK_M],
         )
-        given = {"floor_y": height, "ceiling_y": None}
-        found += [_with_heights(p, "", (), given, items) for p in pieces]
-    return found
+        heights = {"floor_y": height, "ceiling_y": None}
+        rooms += [_with_heights(p, "", (), heights, items) for p in pieces]
+    return rooms
 
 
 def _with_heights(
@@ -194,8 +194,8 @@ def levels_of(rooms: Sequence[Room]) -> tuple[tuple[Level, ...], tuple[Room, ...
     # A level is as high as its rooms are in the middle.
     levels = []
     for k, height in enumerate(heights):
-        here = [r.ceiling_y - r.floor_y for r in numbered if r.level_id == str(k)]
-        levels.append(Level(str(k), f"Level {k}", height, float(np.median(here))))
+        ceiling_heights = [r.ceiling_y - r.floor_y for r in numbered if r.level_id == str(k)]
+        levels.append(Level(str(k), f"Level {k}", height, float(np.median(ceiling_heights))))
     return tuple(levels), tuple(numbered)
 
 
@@ -214,11 +214,11 @@ def room_at(rooms: Sequence[Room], point: F64) -> str | None:
     A point in a wall (of a door, a window) belongs to the nearest room on the other side of it.
     """
     x, y, z = point
-    here = [r for r in rooms if r.floor_y - _SLACK_M <= y <= r.ceiling_y + _SLACK_M]
-    if not here:
+    rooms_at_height = [r for r in rooms if r.floor_y - _SLACK_M <= y <= r.ceiling_y + _SLACK_M]
+    if not rooms_at_height:
         return None
     place: Any = shapely.Point(x, z)
     # Measure to each room's polygon: 0 inside it.
-    distance = [float(shapely.Polygon(r.polygon).distance(place)) for r in here]
+    distance = [float(shapely.Polygon(r.polygon).distance(place)) for r in rooms_at_height]
     nearest = int(np.argmin(distance))
-    return here[nearest].id if distance[nearest] <= _SLACK_M else None
+    return rooms_at_height[nearest].id if distance[nearest] <= _SLACK_M else None

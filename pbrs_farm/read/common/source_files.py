@@ -40,10 +40,10 @@ def read_mtl(folder: RootFolder, name: str) -> tuple[ObjMaterial, ...] | None:
     data = folder.read(name, max_bytes=_MAX_MTL_BYTES)
     if data is None:
         return None
-    at = posixpath.dirname(name)
+    parent = posixpath.dirname(name)
 
     def below_root(name: str) -> str:
-        return folder.name_from(at, name) if name else ""
+        return folder.name_from(parent, name) if name else ""
 
     return tuple(
         replace(m, map_kd=below_root(m.map_kd), map_d=below_root(m.map_d)) for m in parse_mtl(data)
@@ -77,8 +77,8 @@ class SourceFiles:
         A file that is added, changed or removed changes the digest, so that the step runs again. Damaged
         files and files outside the folder count as absent: the reader reports them.
         """
-        found = {name: self._digest(folder, name) for name in names}
-        lines = [f"{digest}  {name}\n" for name, digest in sorted(found.items()) if digest]
+        digests = {name: self._digest(folder, name) for name in names}
+        lines = [f"{digest}  {name}\n" for name, digest in sorted(digests.items()) if digest]
         return hashlib.sha256("".join(lines).encode()).hexdigest() if lines else ""
 
     def pictures(self, folder: RootFolder, mtl: str) -> tuple[str, ...]:

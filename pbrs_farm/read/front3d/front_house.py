@@ -81,17 +81,17 @@ def companions_of_front3d(given: GivenFile, files: SourceFiles) -> str:
         house = front_file(data, path.name, Notes(path.name, strict=False))
     except BadHouse:
         return ""  # the reader reports the fault
-    found = []
+    digests = []
     folder = model_folder(path, models)
     if folder is not None:
         names = [n for jid in sorted({p.jid for p in house.pieces}) for n in files_of_model(jid)]
-        found.append(files.digest(folder, [INFO, *names]))
+        digests.append(files.digest(folder, [INFO, *names]))
     textures = _texture_folder(path, models)
     if textures is not None:
         jids = sorted({str(m.get("jid") or "") for m in house.materials.values()})
         names = [f"{j}/texture.png" for j in jids if NAME.fullmatch(j) and ".." not in j]
-        found.append(files.digest(textures, names))
-    return keys.digest(*found) if any(found) else ""
+        digests.append(files.digest(textures, names))
+    return keys.digest(*digests) if any(digests) else ""
 
 
 def read_front3d(given: GivenFile, fields: ReadFields) -> House:
@@ -199,7 +199,7 @@ class _Paints:
         row = self._house.materials.get(uid, {})
         colour = _parse_front_colour(row.get("color"))
         jid = str(row.get("jid") or "")
-        found = None
+        loaded = None
         if (
             self._folder is not None
             and NAME.fullmatch(jid)
@@ -207,14 +207,14 @@ class _Paints:
             and not row.get("useColor")
         ):
             folder, name = self._folder, f"{jid}/texture.png"
-            found = self.library.texture(
+            loaded = self.library.texture(
                 f"3D-FRONT-texture/{name}",
                 name=name,
                 place=f"material {uid[:40]}",
                 load=lambda: folder.read(name, max_bytes=MAX_TEXTURE_BYTES),
             )
-        if found is not None:
-            return Material(uid[:60], texture_id=found.texture.id, alpha_cutout=found.has_holes())
+        if loaded is not None:
+            return Material(uid[:60], texture_id=loaded.texture.id, alpha_cutout=loaded.has_holes())
         return Material(uid[:60], diffuse=colour or (1.0, 1.0, 1.0), is_default=colour is None)
 
 
@@ -244,17 +244,17 @@ class _Structure:
         for front_room in self._house.rooms:
             if given_room("3dfront", front_room.kind) == NO_ROOM:
                 continue
-            own = self._by_room.get(front_room.id, {})
-            floors = [self._level(m, up=True) for m in own.get("Floor", [])]
+            own_meshes = self._by_room.get(front_room.id, {})
+            floors = [self._level(m, up=True) for m in own_meshes.get("Floor", [])]
             surfaces = [s for s in floors if s is not None]
             polygon = floor_polygon(surfaces, []) if surfaces else None
             low = floor_height(surfaces)
             if polygon is None or low is None:
                 self._notes.add("empty-room", f"room {front_room.id}", "has no floor; left out")
                 continue
-            ceilings = [self._level(m, up=False) for m in own.get("Ceiling", [])]
+            ceilings = [self._level(m, up=False) for m in own_meshes.get("Ceiling", [])]
             over = [s for s in ceilings if s is not None]
-            tops = [float(m.points[:, 1].max()) for m in own.get("WallInner", [])]
+            tops = [float(m.points[:, 1].max()) for m in own_meshes.get("WallInner", [])]
             high = min((float(s.positions[:, 1].min()) for s in over), default=0.0)
             if high < low + 1.0:
                 high = float(np.median(tops)) if tops else low + _STOREY_M
@@ -337,19 +337,19 @@ class _Structure:
 
     def trim(self) -> list[Item]:
         """All other visible meshes: skirting, dropped ceilings, columns, fitted cupboards."""
-        found: list[Item] = []
+        items: list[Item] = []
         for mesh in self._house.meshes:
             if mesh.kind in _MADE or (
                 mesh.kind in ("Floor", "Ceiling") and mesh.room in self._areas
             ):
                 continue
-            seen = given_class("3dfront-mesh", mesh.kind) or class_by_words(parted(mesh.kind))
-            if seen is not None and seen.kind == LEFT_OUT:
+            mesh_class = given_class("3dfront-mesh", mesh.kind) or class_by_words(parted(mesh.kind))
+            if mesh_class is not None and mesh_class.kind == LEFT_OUT:
                 continue
             index = self._paints.index(mesh.material)
             uvs = self._paints.uvs(mesh)
             uvs = _planar_uvs(mesh.points) if uvs is None else uvs
-            is_lamp = seen is not None and seen.kind == "lamp"
+            is_lamp = mesh_class is not None and mesh_class.kind == "lamp"
             if is_lamp:
                 material = replace(self.material(index), kind=MaterialKind.BULB)
                 index = self._paints.library.index(material)
@@ -364,23 +364,23 @@ class _Structure:
                         (x, y, z), BULB_RADIUS_M, _LIGHT_BAND_LM, PowerUnit.LUMEN, emitting=(0,)
                     ),
                 )
-            found.append(
+            items.append(
                 Item(
-                    id=f"mesh_{len(found)}",
+                    id=f"mesh_{len(items)}",
                     name=parted(mesh.kind).lower() or "mesh",
                     kind=ItemKind.LAMP if is_lamp else ItemKind.OBJECT,
                     level_id="0",
                     surfaces=(surface,),
-                    nyu40=OTHERPROP if seen is None else max(seen.nyu40, 0),
+                    nyu40=OTHERPROP if mesh_class is None else max(mesh_class.nyu40, 0),
                     source_class=mesh.kind,
                     room_id=mesh.room,
                     lights=lights,
                     tags=("structure",)
-                    if seen is not None and seen.nyu40 in (WALL, FLOOR, CEILING)
+                    if mesh_class is not None and mesh_class.nyu40 in (WALL, FLOOR, CEILING)
                     else (),
                 )
             )
-        return found
+        return items
 
     def material(self, index: int) -> Material:
         """The material of an index."""

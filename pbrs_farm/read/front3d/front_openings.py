@@ -36,28 +36,28 @@ class _NamedOpening:
 
 def is_opening(piece: FrontPiece) -> bool:
     """Whether a piece of furniture is a door or a window: their models were never released."""
-    seen = given_class("3dfront-title", piece.title)
-    return seen is not None and seen.kind in ("door", "window")
+    title_class = given_class("3dfront-title", piece.title)
+    return title_class is not None and title_class.kind in ("door", "window")
 
 
 def holes_with_names(house: FrontFile, holes: Sequence[tuple[Hole, WallPiece]]) -> list[Hole]:
     """Every hole once, with its kind, style and hinge; hole meshes without a gap have one, too."""
     named = _openings_by_name(house)[:_MAX_NAMED]
-    found = []
+    results = []
     for hole, piece in holes:
-        found.append(_kinded(hole, piece, _best(hole, named)))
-    found = merge_holes(sorted(found, key=lambda h: h.kind == "open"))
+        results.append(_kinded(hole, piece, _best(hole, named)))
+    results = merge_holes(sorted(results, key=lambda h: h.kind == "open"))
     # A hole mesh without a gap behind it cuts the wall itself.
     extra = []
-    for one in named:
-        if one.box is not None and not any(_stands_in(one, hole) for hole in found):
-            extra.append(_of_mesh(one, named))
-    return merge_holes([*found, *extra])
+    for opening in named:
+        if opening.box is not None and not any(_stands_in(opening, hole) for hole in results):
+            extra.append(_of_mesh(opening, named))
+    return merge_holes([*results, *extra])
 
 
 def _openings_by_name(house: FrontFile) -> list[_NamedOpening]:
     doors = {ref: door for door in house.doors for ref in door.refs}
-    found = []
+    named_openings = []
     for mesh in house.meshes:
         low, high = mesh.points.min(0), mesh.points.max(0)
         if mesh.kind not in HOLE_TYPES or high[1] - low[1] < _FLAT_M:
@@ -68,24 +68,24 @@ def _openings_by_name(house: FrontFile) -> list[_NamedOpening]:
         door = doors.get(mesh.uid)
         box = None if mesh.kind == "BayWindow" else np.array([low, high])
         if door is not None:
-            found.append(
+            named_openings.append(
                 _NamedOpening(
                     (low + high) / 2, "door", mesh.kind, 0, door.is_entry, door.hinge, box=box
                 )
             )
         else:
-            found.append(_NamedOpening((low + high) / 2, kind, mesh.kind, 2, box=box))
+            named_openings.append(_NamedOpening((low + high) / 2, kind, mesh.kind, 2, box=box))
     for piece in house.pieces:
         if not is_opening(piece) and piece.uid not in doors:
             continue
-        seen = given_class("3dfront-title", piece.title)
+        title_class = given_class("3dfront-title", piece.title)
         height = (piece.size[1] if piece.size else 2.0) * float(abs(piece.scale[1]))
-        at = piece.world_from_model[:3, 3] + np.array([0.0, height / 2, 0.0])
+        middle = piece.world_from_model[:3, 3] + np.array([0.0, height / 2, 0.0])
         door = doors.get(piece.uid)
-        is_window = seen is not None and seen.kind == "window"
-        found.append(
+        is_window = title_class is not None and title_class.kind == "window"
+        named_openings.append(
             _NamedOpening(
-                at,
+                middle,
                 "window" if is_window else "door",
                 piece.title,
                 0 if door else 1,
@@ -94,7 +94,7 @@ def _openings_by_name(house: FrontFile) -> list[_NamedOpening]:
                 is_mirrored=bool(piece.scale[0] < 0),
             )
         )
-    return found
+    return named_openings
 
 
 def _best(hole: Hole, named: Sequence[_NamedOpening]) -> _NamedOpening | None:

@@ -80,12 +80,12 @@ class FrontModels:
         """The piece as an item, as a box if its model is missing; None if it is not drawn."""
         if is_opening(piece):
             return None
-        vocabulary, name, seen = self._class(piece)
-        if seen.kind == "none":
+        vocabulary, name, piece_class = self._class(piece)
+        if piece_class.kind == "none":
             return None
         model = self._model(piece)
         if model is None:
-            return self._box_only(piece, vocabulary, name, seen, item_id)
+            return self._box_only(piece, vocabulary, name, piece_class, item_id)
         surfaces = []
         for mesh, slot in zip(model.meshes, model.slots, strict=True):
             mtl = model.mtl[slot] if slot >= 0 else None
@@ -98,9 +98,9 @@ class FrontModels:
             )
             surfaces += [surface] if surface is not None else []
         if not surfaces:
-            return self._box_only(piece, vocabulary, name, seen, item_id)
-        is_trim = seen.kind in _STRUCTURE
-        kind = ItemKind.OBJECT if is_trim else seen.item_kind
+            return self._box_only(piece, vocabulary, name, piece_class, item_id)
+        is_trim = piece_class.kind in _STRUCTURE
+        kind = ItemKind.OBJECT if is_trim else piece_class.item_kind
         tags = ["mirrored"] if np.linalg.det(piece.world_from_model[:3, :3]) < 0 else []
         item = Item(
             id=item_id,
@@ -108,7 +108,7 @@ class FrontModels:
             kind=kind,
             level_id="0",
             surfaces=tuple(surfaces),
-            nyu40=max(seen.nyu40, 0),
+            nyu40=max(piece_class.nyu40, 0),
             source_class=name,
             room_id=piece.room,
             box=oriented_box(model.meshes, piece.world_from_model),
@@ -126,12 +126,12 @@ class FrontModels:
             ("3dfuture-super", str(info.get("super-category") or "")),
         ]
         for vocabulary, name in names:
-            seen = given_class(vocabulary, name) if name else None
-            if seen is not None:
-                return vocabulary, name, seen
+            name_class = given_class(vocabulary, name) if name else None
+            if name_class is not None:
+                return vocabulary, name, name_class
         name = piece.title or piece.category
-        seen = class_by_words(name.rpartition("/")[2], name) if name else None
-        return "", name or "unknown", seen or GivenClass("object", OTHERPROP)
+        name_class = class_by_words(name.rpartition("/")[2], name) if name else None
+        return "", name or "unknown", name_class or GivenClass("object", OTHERPROP)
 
     def _model(self, piece: FrontPiece) -> ParsedModel | None:
         if self._cache is None or not NAME.fullmatch(piece.jid) or ".." in piece.jid:
@@ -152,14 +152,14 @@ class FrontModels:
         if piece.size is None or seen.kind in _STRUCTURE:
             return None
         size = np.array(piece.size) * np.abs(piece.scale)
-        at = piece.world_from_model[:3, 3] + np.array([0.0, size[1] / 2, 0.0])
+        centre = piece.world_from_model[:3, 3] + np.array([0.0, size[1] / 2, 0.0])
         front = piece.world_from_model[:3, 2] * np.sign(piece.scale[2])
         turn = math.atan2(float(front[0]), float(front[2]))
         return box_only_item(
             item_id,
             vocabulary,
             name,
-            triple(at),
+            triple(centre),
             triple(size),
             turn,
             is_front_given=True,
@@ -182,11 +182,11 @@ def _without_shadow(model: ParsedModel) -> ParsedModel:
     if len(model.meshes) < 2:
         return model
     low = min(float(m.positions[:, 1].min()) for m in model.meshes)
-    kept = [k for k, m in enumerate(model.meshes) if not _is_card(m, low)]
-    if not kept or len(kept) == len(model.meshes):
+    shown = [k for k, m in enumerate(model.meshes) if not _is_card(m, low)]
+    if not shown or len(shown) == len(model.meshes):
         return model
     return ParsedModel(
-        tuple(model.meshes[k] for k in kept), tuple(model.slots[k] for k in kept), model.mtl
+        tuple(model.meshes[k] for k in shown), tuple(model.slots[k] for k in shown), model.mtl
     )
 
 
@@ -211,28 +211,28 @@ def light_items(
     lamps = [
         i.oriented_box.centre for i in items if i.kind is ItemKind.LAMP and (i.surfaces or i.box)
     ]
-    kept: list[FrontLight] = []
+    unlisted: list[FrontLight] = []
     for light in lights:
         near = [p for p in lamps if np.linalg.norm((p - light.at)[[0, 2]]) < 0.3]
-        is_listed = any(np.linalg.norm(o.at - light.at) < 0.05 for o in kept)
+        is_listed = any(np.linalg.norm(o.at - light.at) < 0.05 for o in unlisted)
         if light.room in areas and not near and not is_listed:
-            kept.append(light)
-    found = []
-    for k, light in enumerate(kept):
-        n = sum(o.room == light.room for o in kept)
+            unlisted.append(light)
+    lamp_items = []
+    for k, light in enumerate(unlisted):
+        n = sum(o.room == light.room for o in unlisted)
         flux = float(np.clip(flux_for_floor(areas[light.room], _LUX) / n, _LEAST_LM, _MOST_LM))
-        at = light.at.copy()
-        at[1] = min(at[1], ceilings[light.room] - _BELOW_M)
+        position = light.at.copy()
+        position[1] = min(position[1], ceilings[light.room] - _BELOW_M)
         rgb = _rgb_of_kelvin(light.kelvin) if light.kelvin else (1.0, 1.0, 1.0)
         part = LightPart(
-            triple(at),
+            triple(position),
             BULB_RADIUS_M,
             flux,
             PowerUnit.LUMEN,
             rgb_linear=rgb,
             is_coloured=bool(light.kelvin),
         )
-        found.append(
+        lamp_items.append(
             Item(
                 f"light_{k}",
                 "spotlight",
@@ -246,7 +246,7 @@ def light_items(
                 tags=("made",),
             )
         )
-    return found
+    return lamp_items
 
 
 def _rgb_of_kelvin(kelvin: float) -> tuple[float, float, float]:

@@ -135,20 +135,22 @@ def _join_coplanar(sheets: Sequence[Sheet]) -> list[Sheet]:
         cosine = normals @ sheet.normal
         # Sheets of one room look the same way; an outer one is drawn from either side.
         aligned = np.abs(cosine) if not sheet.room else cosine
-        apart = np.abs(sheet.offset - np.sign(cosine) * offsets)
-        near = (rooms == rooms[k]) & (aligned > _COPLANAR) & (apart < _DEPTHS_M[0])
+        offsets_apart = np.abs(sheet.offset - np.sign(cosine) * offsets)
+        near = (rooms == rooms[k]) & (aligned > _COPLANAR) & (offsets_apart < _DEPTHS_M[0])
         near[k] = False
-        others = {j: _outline_upon(sheets[j], sheet) for j in np.flatnonzero(near).tolist()}
-        others = {j: o for j, o in others.items() if sheet.outline.envelope.intersects(o.envelope)}
-        if not others:
+        outlines = {j: _outline_upon(sheets[j], sheet) for j in np.flatnonzero(near).tolist()}
+        outlines = {
+            j: o for j, o in outlines.items() if sheet.outline.envelope.intersects(o.envelope)
+        }
+        if not outlines:
             joined[k] = sheet
             continue
-        upon = [j for j, o in others.items() if not is_upon[j] and _lies_upon(o, sheet.outline)]
+        upon = [j for j, o in outlines.items() if not is_upon[j] and _lies_upon(o, sheet.outline)]
         is_upon[upon] = True
         joined[k] = replace(
             sheet,
-            outline=_united([sheet.outline, *(others[j] for j in upon)]),
-            filled=_united([sheet.outline, *others.values()]),
+            outline=_united([sheet.outline, *(outlines[j] for j in upon)]),
+            filled=_united([sheet.outline, *outlines.values()]),
         )
     return [joined[k] for k in sorted(joined)]
 
@@ -184,12 +186,12 @@ def _upright_planes(mesh: FrontMesh) -> list[tuple[F64, F64 | None]]:
     n = area_vectors(corners)
     size = np.linalg.norm(n, axis=1)
     upright = (np.abs(n[:, 1]) < _UPRIGHT * size) & (size > 1e-8)
-    found = []
+    planes = []
     for k in np.unique(plane[upright]):
         mine = upright & (plane == k)
         if size[mine].sum() / 2 > 0.01:
-            found.append((corners[mine], None if uvs is None else uvs[mine]))
-    return found
+            planes.append((corners[mine], None if uvs is None else uvs[mine]))
+    return planes
 
 
 def _sheet(mesh: FrontMesh, corners: F64, uvs: F64 | None) -> Sheet | None:
@@ -223,12 +225,12 @@ def _looking(sheet: Sheet, floors: Mapping[str, Any], tree: Any, names: list[str
     s0, _, s1, _ = sheet.bounds
     y = 0.0
     points = [(share, sign) for share in (0.5, 0.25, 0.75) for sign in (1.0, -1.0)]
-    own = floors.get(sheet.mesh.room)
+    floor = floors.get(sheet.mesh.room)
     beside: tuple[str, float] | None = None
     for share, sign in points:
         p = sheet.point(s0 + share * (s1 - s0), y, -sign * _BESIDE_M)
         place = shapely.Point(p[0], p[2])
-        if own is not None and own.contains(place):
+        if floor is not None and floor.contains(place):
             beside = (sheet.mesh.room, sign)
             break
         if beside is None:
@@ -252,17 +254,17 @@ def pieces_of(inner: Sequence[Sheet], outer: Sequence[Sheet]) -> list[WallPiece]
     The back of a stretch is a parallel sheet, inner or outer, within the thickness of a wall; a
     stretch without one has no back.
     """
-    every = [*inner, *outer]
-    normals = np.array([s.normal for s in every]).reshape(-1, 3)
-    offsets = np.array([s.offset for s in every])
-    found: list[WallPiece] = []
+    sheets = [*inner, *outer]
+    normals = np.array([s.normal for s in sheets]).reshape(-1, 3)
+    offsets = np.array([s.offset for s in sheets])
+    wall_pieces: list[WallPiece] = []
     for sheet in inner:
         cosine = normals @ sheet.normal
         behind = sheet.offset - np.sign(cosine) * offsets
         fits = (np.abs(cosine) > 0.999) & (behind > _DEPTHS_M[0]) & (behind < _DEPTHS_M[1])
-        backs = [(float(behind[k]), every[k]) for k in np.flatnonzero(fits)]
-        found += _stretches(sheet, [(d, b, _span(b, sheet)) for d, b in backs])
-    return found
+        backs = [(float(behind[k]), sheets[k]) for k in np.flatnonzero(fits)]
+        wall_pieces += _stretches(sheet, [(d, b, _span(b, sheet)) for d, b in backs])
+    return wall_pieces
 
 
 def _span(other: Sheet, sheet: Sheet) -> tuple[float, float]:
@@ -282,16 +284,16 @@ def _stretches(
         if high - low < 1e-6:
             continue
         middle = (low + high) / 2
-        here = [(d, b) for d, b, span in backs if span[0] < middle < span[1]]
-        nearest = min(here, key=lambda one: one[0], default=(0.0, None))
+        backs_here = [(d, b) for d, b, span in backs if span[0] < middle < span[1]]
+        nearest = min(backs_here, key=lambda one: one[0], default=(0.0, None))
         if runs and abs(runs[-1][2] - nearest[0]) < 1e-3:
             runs[-1][1] = high
         else:
             runs.append([low, high, *nearest])
     # Where another wall joins from behind, take the thickness of the adjacent stretch.
-    known = [r for r in runs if r[3] is not None]
+    thick_runs = [r for r in runs if r[3] is not None]
     for k, run in enumerate(runs):
-        if run[3] is None and known and run[1] - run[0] < _COLUMN_M:
+        if run[3] is None and thick_runs and run[1] - run[0] < _COLUMN_M:
             beside = [
                 runs[j] for j in (k - 1, k + 1) if 0 <= j < len(runs) and runs[j][3] is not None
             ]
@@ -304,14 +306,14 @@ def _stretches(
             joined[-1][1] = run[1]
         else:
             joined.append(list(run))
-    found = []
+    wall_pieces = []
     for low, high, through, back in joined:
         is_inner = back is not None and back.mesh.kind == "WallInner"
         through = through if back is not None else _DEPTH_M
-        found.append(
+        wall_pieces.append(
             WallPiece(sheet, low, high, through / 2 if is_inner else through, through, back)
         )
-    return found
+    return wall_pieces
 
 
 def solid_of(
@@ -345,19 +347,19 @@ def _back_corner(piece: WallPiece, s: float, corner: F64, pieces: Sequence[WallP
     """Plan (2,) of a solid's back at an end: mitred with the neighbour's of the same room."""
     sheet = piece.sheet
     straight = sheet.point(s, 0.0, piece.depth)[[0, 2]]
-    for other in pieces:
-        if other.sheet is sheet or other.sheet.room != sheet.room:
+    for neighbour in pieces:
+        if neighbour.sheet is sheet or neighbour.sheet.room != sheet.room:
             continue
-        if abs(other.sheet.normal @ sheet.normal) > 0.95:
+        if abs(neighbour.sheet.normal @ sheet.normal) > 0.95:
             continue
-        ends = [other.sheet.point(v, 0.0)[[0, 2]] for v in (other.s0, other.s1)]
+        ends = [neighbour.sheet.point(v, 0.0)[[0, 2]] for v in (neighbour.s0, neighbour.s1)]
         if min(float(np.linalg.norm(e - corner)) for e in ends) > _SAME_END_M:
             continue
-        lines = np.array([sheet.normal[[0, 2]], other.sheet.normal[[0, 2]]])
-        offsets = [sheet.offset - piece.depth, other.sheet.offset - other.depth]
-        met = np.linalg.solve(lines, np.array(offsets))
-        if np.linalg.norm(met - straight) < _LONGEST_MITRE_M:
-            return np.asarray(met, np.float64)
+        lines = np.array([sheet.normal[[0, 2]], neighbour.sheet.normal[[0, 2]]])
+        offsets = [sheet.offset - piece.depth, neighbour.sheet.offset - neighbour.depth]
+        mitred = np.linalg.solve(lines, np.array(offsets))
+        if np.linalg.norm(mitred - straight) < _LONGEST_MITRE_M:
+            return np.asarray(mitred, np.float64)
     return np.asarray(straight, np.float64)
 
 
@@ -369,24 +371,24 @@ def holes_of(pieces: Sequence[WallPiece]) -> list[tuple[Hole, WallPiece]]:
     by_sheet: dict[int, list[WallPiece]] = {}
     for piece in pieces:
         by_sheet.setdefault(id(piece.sheet), []).append(piece)
-    found: list[tuple[Hole, WallPiece]] = []
-    for own in by_sheet.values():
-        sheet = own[0].sheet
+    holes: list[tuple[Hole, WallPiece]] = []
+    for own_pieces in by_sheet.values():
+        sheet = own_pieces[0].sheet
         for s0, y0, s1, y1 in _gaps(sheet):
             middle = (s0 + s1) / 2
-            piece = next((p for p in own if p.s0 <= middle <= p.s1), own[0])
+            piece = next((p for p in own_pieces if p.s0 <= middle <= p.s1), own_pieces[0])
             if piece.back is not None and _is_filled(piece.back, sheet, (s0, y0, s1, y1)):
                 continue
             axes = np.stack([sheet.along, [0.0, 1.0, 0.0], sheet.normal], 1)
             hole = Hole(
-                id=f"hole_{len(found)}",
+                id=f"hole_{len(holes)}",
                 kind="open",
                 centre=sheet.point(middle, (y0 + y1) / 2, piece.through / 2),
                 size=(s1 - s0, y1 - y0, piece.through),
                 axes=axes,
             )
-            found.append((hole, piece))
-    return found
+            holes.append((hole, piece))
+    return holes
 
 
 def _gaps(sheet: Sheet) -> list[tuple[float, float, float, float]]:
@@ -394,12 +396,12 @@ def _gaps(sheet: Sheet) -> list[tuple[float, float, float, float]]:
     rest = shapely.box(s0, y0, s1, y1).difference(sheet.cover)
     # Slivers along the edge are no holes.
     rest = rest.buffer(-0.02, join_style="mitre").buffer(0.02, join_style="mitre")
-    found = []
+    gaps = []
     for part in shapely.get_parts(rest):
         a, b, c, d = (float(v) for v in part.bounds)
         if c - a >= _HOLE_M and d - b >= _HOLE_M and part.area > 0.6 * (c - a) * (d - b):
-            found.append((a, max(b, y0), c, d))
-    return found
+            gaps.append((a, max(b, y0), c, d))
+    return gaps
 
 
 def _is_filled(back: Sheet, sheet: Sheet, gap: tuple[float, float, float, float]) -> bool:

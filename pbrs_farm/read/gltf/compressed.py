@@ -48,7 +48,7 @@ def draco_arrays(gltf: Gltf, primitive: dict[str, Any], place: str) -> DracoMesh
         raise BadHouse(gltf.file, place, "has an impossible number of vertices")
     try:
         mesh = DracoPy.decode(view_bytes(gltf, row.get("bufferView")))
-        found = {int(a["unique_id"]): np.asarray(a["data"]) for a in mesh.attributes}
+        arrays = {int(a["unique_id"]): np.asarray(a["data"]) for a in mesh.attributes}
         faces = np.asarray(mesh.faces, np.int64).reshape(-1)
     except BadHouse:
         raise
@@ -56,9 +56,9 @@ def draco_arrays(gltf: Gltf, primitive: dict[str, Any], place: str) -> DracoMesh
         raise BadHouse(gltf.file, place, "its Draco data cannot be decoded: damaged") from None
     ids = row.get("attributes")
     named = {
-        name: found[number].reshape(len(found[number]), -1)
+        name: arrays[number].reshape(len(arrays[number]), -1)
         for name, number in (ids.items() if isinstance(ids, dict) else ())
-        if type(number) is int and number in found
+        if type(number) is int and number in arrays
     }
     if "POSITION" not in named or any(len(a) != n for a in named.values()):
         raise BadHouse(gltf.file, place, "its Draco data has other vertices than its accessors")

@@ -247,8 +247,8 @@ def object_at(holder: dict[str, Any], key: str) -> dict[str, Any]:
 
 def specular_glossiness(fields_json: dict[str, Any]) -> dict[str, Any]:
     """KHR_materials_pbrSpecularGlossiness of a material, {} if absent or if metallic values exist too."""
-    found = object_at(object_at(fields_json, "extensions"), "KHR_materials_pbrSpecularGlossiness")
-    return {} if object_at(fields_json, "pbrMetallicRoughness") else found
+    glossy = object_at(object_at(fields_json, "extensions"), "KHR_materials_pbrSpecularGlossiness")
+    return {} if object_at(fields_json, "pbrMetallicRoughness") else glossy
 
 
 def texture_slots(gltf: Gltf, material: int | None) -> dict[str, dict[str, Any]]:
@@ -260,14 +260,14 @@ def texture_slots(gltf: Gltf, material: int | None) -> dict[str, dict[str, Any]]
         return {}
     fields_json = entry(gltf, "materials", material)
     pbr, glossy = object_at(fields_json, "pbrMetallicRoughness"), specular_glossiness(fields_json)
-    found = {
+    infos = {
         "baseColorTexture": pbr.get("baseColorTexture"),
         "diffuseTexture": glossy.get("diffuseTexture"),
         "normalTexture": fields_json.get("normalTexture"),
         "metallicRoughnessTexture": pbr.get("metallicRoughnessTexture"),
         "specularGlossinessTexture": glossy.get("specularGlossinessTexture"),
     }
-    return {key: info for key, info in found.items() if isinstance(info, dict)}
+    return {key: info for key, info in infos.items() if isinstance(info, dict)}
 
 
 def texture_layout(gltf: Gltf, info: dict[str, Any]) -> tuple[Any, ...]:
@@ -301,7 +301,7 @@ def meshes_of(gltf: Gltf, index: Any, *, max_triangles: int) -> list[tuple[int |
     primitives = entry(gltf, "meshes", index).get("primitives")
     if not isinstance(primitives, list) or not all(isinstance(p, dict) for p in primitives):
         raise BadHouse(gltf.file, f"meshes[{index}].primitives", "expected a list of objects")
-    found: list[tuple[int | None, Mesh]] = []
+    meshes: list[tuple[int | None, Mesh]] = []
     n_triangles = 0
     for k, primitive in enumerate(primitives):
         place = f"meshes[{index}].primitives[{k}]"
@@ -310,11 +310,11 @@ def meshes_of(gltf: Gltf, index: Any, *, max_triangles: int) -> list[tuple[int |
         triangles = _mesh_of_primitive(gltf, primitive, place)
         if triangles is not None:
             n_triangles += len(triangles.faces)
-            found.append((primitive.get("material"), triangles))
+            meshes.append((primitive.get("material"), triangles))
         if n_triangles > max_triangles:
             text = f"more than {max_triangles} triangles"
             raise BadHouse(gltf.file, place, text, hint="limit: read.max_model_triangles")
-    return found
+    return meshes
 
 
 def has_surface(primitive: dict[str, Any]) -> bool:
@@ -327,9 +327,9 @@ def _mesh_of_primitive(gltf: Gltf, primitive: dict[str, Any], place: str) -> Mes
     if not isinstance(attributes, dict) or "POSITION" not in attributes:
         raise BadHouse(gltf.file, place, "has no positions", hint="or they are compressed")
     draco = draco_arrays(gltf, primitive, place)
-    known = draco.attributes if draco else {}
+    numbers_of = draco.attributes if draco else {}
     positions = _accessor_floats(
-        gltf, attributes["POSITION"], 3, f"{place}.POSITION", known.get("POSITION")
+        gltf, attributes["POSITION"], 3, f"{place}.POSITION", numbers_of.get("POSITION")
     )
     faces = _faces(gltf, primitive, len(positions), place, draco.order if draco else None)
     if not len(faces):
@@ -338,14 +338,14 @@ def _mesh_of_primitive(gltf: Gltf, primitive: dict[str, Any], place: str) -> Mes
     leading = next(iter(texture_slots(gltf, primitive.get("material")).values()), {})
     name, uvs = f"TEXCOORD_{texture_set(leading)}", None
     if name in attributes:
-        uvs = _accessor_floats(gltf, attributes[name], 2, f"{place}.TEXCOORD", known.get(name))
+        uvs = _accessor_floats(gltf, attributes[name], 2, f"{place}.TEXCOORD", numbers_of.get(name))
         uvs = _transformed(gltf, uvs, leading, place) * [1, -1] + [0, 1]  # v up
     normals = np.zeros_like(
         positions
     )  # zero means flat shading, as glTF specifies for missing normals
     if "NORMAL" in attributes:
         normals = _accessor_floats(
-            gltf, attributes["NORMAL"], 3, f"{place}.NORMAL", known.get("NORMAL")
+            gltf, attributes["NORMAL"], 3, f"{place}.NORMAL", numbers_of.get("NORMAL")
         )
     # One value per vertex, or none.
     for array in (uvs, normals):
@@ -435,10 +435,12 @@ def note_unread(gltf: Gltf, notes: Notes) -> None:
     primitives = [
         _object_rows(mesh.get("primitives")) for mesh in _object_rows(gltf.document.get("meshes"))
     ]
-    for what, has in _PRIMITIVES.items():
+    for feature, has in _PRIMITIVES.items():
         n = sum(any(map(has, rows)) for rows in primitives)
         if n:
-            notes.add(UNREAD, "meshes", f"{n} of {len(primitives)} have {what}, which are not read")
+            notes.add(
+                UNREAD, "meshes", f"{n} of {len(primitives)} have {feature}, which are not read"
+            )
     n = sum("skin" in node for node in _object_rows(gltf.document.get("nodes")))
     if n:
         notes.add(UNREAD, "nodes", f"{n} have a skin, which is not read: they stand as modelled")

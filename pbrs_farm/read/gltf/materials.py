@@ -87,7 +87,7 @@ class SceneMaterials:
         for path in noted_fields("glTF"):
             if path.startswith("extensions.") and _has_path(fields_json, path):
                 self._notes.add(UNREAD, place, f"{path.rpartition('.')[2]} is not read")
-        factor, found, is_lost = self._colour(number, place)
+        factor, picture, is_lost = self._colour(number, place)
         glossy = specular_glossiness(fields_json)
         metallic, roughness = self._metal(fields_json, place)
         maps = self._maps(number, place)
@@ -96,14 +96,14 @@ class SceneMaterials:
         transmission = object_at(object_at(fields_json, "extensions"), "KHR_materials_transmission")
         passes = self._fraction(transmission, "transmissionFactor", 0.0, place)
         # Opacity is what blending lets through, or transmission, whichever is less.
-        opacity, cutoff = self._alpha(fields_json, float(np.clip(factor[3], 0, 1)), found, place)
+        opacity, cutoff = self._alpha(fields_json, float(np.clip(factor[3], 0, 1)), picture, place)
         opacity = min(opacity, 1.0 - passes)
         colour = np.clip(factor[:3], 0, 1)
         if is_lost:
             colour, metallic = colour * linear_from_srgb(np.array(GREY)), 0.0
         # Roughness to a Phong exponent: alpha = roughness^2, n = 2 / alpha^2 - 2.
         shininess = min(2.0 / max(roughness, 1e-3) ** 4 - 2.0, MAX_SHININESS)
-        is_metal = metallic > 0 and found is None
+        is_metal = metallic > 0 and picture is None
         reflected = self._reflected(fields_json, place)
         if not glossy:
             reflected = reflected + (colour - reflected) * metallic
@@ -114,18 +114,18 @@ class SceneMaterials:
         material = Material(
             name=str(fields_json.get("name", ""))[:100],
             kind=self._kind(fields_json, clear, opacity, metallic, roughness),
-            diffuse=_encoded(colour if found else colour * (1 - metallic)),
+            diffuse=_encoded(colour if picture else colour * (1 - metallic)),
             specular=_encoded(specular),
             shininess=shininess,
             opacity=opacity,
-            texture_id=found.texture.id if found else None,
+            texture_id=picture.texture.id if picture else None,
             alpha_cutout=cutoff is not None,
             alpha_cutoff=USUAL_CUTOFF if cutoff is None else cutoff,
             roughness=roughness if has_coat else None,
             roughness_texture_id=roughness_map,
             normal_texture_id=maps.get("normalTexture"),
             normal_scale=self._normal_scale(fields_json, place) if "normalTexture" in maps else 1.0,
-            is_default=found is None and not is_lost and not _names_colour(fields_json),
+            is_default=picture is None and not is_lost and not _names_colour(fields_json),
         )
         return material, self._emission(fields_json, place)
 
@@ -145,8 +145,8 @@ class SceneMaterials:
             return (factor * alpha.mean if is_even else factor), USUAL_CUTOFF if has_holes else None
         if mode != "MASK":
             return 1.0, None
-        given = fields_json.get("alphaCutoff", USUAL_CUTOFF)
-        (least,) = numbers(self._gltf, [given], 1, f"{place}: alphaCutoff")
+        cutoff_value = fields_json.get("alphaCutoff", USUAL_CUTOFF)
+        (least,) = numbers(self._gltf, [cutoff_value], 1, f"{place}: alphaCutoff")
         if factor * alpha.most < least:
             text = (
                 f"alphaCutoff {least:g}: its alpha is nowhere more than {factor * alpha.most:.3g}"
@@ -163,35 +163,37 @@ class SceneMaterials:
             pbr = object_at(fields_json, "pbrMetallicRoughness")
             info = slots.get("baseColorTexture")
             factor = numbers(self._gltf, pbr.get("baseColorFactor", [1] * 4), 4, f"{place}: colour")
-            found = self._texture(info, place)
-            return factor, found, info is not None and found is None
+            picture = self._texture(info, place)
+            return factor, picture, info is not None and picture is None
         factor = numbers(self._gltf, glossy.get("diffuseFactor", [1] * 4), 4, f"{place}: colour")
         diffuse, shine = slots.get("diffuseTexture"), slots.get("specularGlossinessTexture")
-        found = self._texture(diffuse, place)
-        is_lost = diffuse is not None and found is None
+        picture = self._texture(diffuse, place)
+        is_lost = diffuse is not None and picture is None
         if shine is None or is_lost or (diffuse and not self._lie_alike(diffuse, shine)):
-            return factor, found, is_lost
+            return factor, picture, is_lost
         # Metals of two pictures are black in the one and coloured in the other.
-        made = self._made(
+        converted = self._made(
             shine,
             f"{place}: base colour",
             lambda data: base_colour_picture(
-                found.texture.data if found else None,
+                picture.texture.data if picture else None,
                 data,
                 np.clip(factor[:3], 0, 1),
                 self._specular_factor(glossy, place),
             ),
         )
-        if made is None:
-            return factor, found, False
-        return np.array([1, 1, 1, factor[3]]), made, False
+        if converted is None:
+            return factor, picture, False
+        return np.array([1, 1, 1, factor[3]]), converted, False
 
     def _lie_alike(self, one: dict[str, Any], other: dict[str, Any]) -> bool:
         return texture_layout(self._gltf, one) == texture_layout(self._gltf, other)
 
     def _specular_factor(self, glossy: dict[str, Any], place: str) -> F64:
-        given = numbers(self._gltf, glossy.get("specularFactor", [1] * 3), 3, f"{place}: specular")
-        return np.clip(given, 0, 1)
+        factors = numbers(
+            self._gltf, glossy.get("specularFactor", [1] * 3), 3, f"{place}: specular"
+        )
+        return np.clip(factors, 0, 1)
 
     def _metal(self, fields_json: dict[str, Any], place: str) -> tuple[float, float]:
         """(metallic, roughness) by the factors; what says nothing of its surface is no metal."""
@@ -214,11 +216,13 @@ class SceneMaterials:
         if glossy := specular_glossiness(fields_json):
             return self._specular_factor(glossy, place)
         extensions = object_at(fields_json, "extensions")
-        ior, own = (object_at(extensions, f"KHR_materials_{key}") for key in ("ior", "specular"))
+        ior, specular = (
+            object_at(extensions, f"KHR_materials_{key}") for key in ("ior", "specular")
+        )
         (index,) = numbers(self._gltf, [ior.get("ior", 1.5)], 1, f"{place}: ior")
-        given = own.get("specularColorFactor", [1] * 3)
-        tint = np.maximum(numbers(self._gltf, given, 3, f"{place}: specular colour"), 0)
-        strength = self._fraction(own, "specularFactor", 1.0, place)
+        colour_factor = specular.get("specularColorFactor", [1] * 3)
+        tint = np.maximum(numbers(self._gltf, colour_factor, 3, f"{place}: specular colour"), 0)
+        strength = self._fraction(specular, "specularFactor", 1.0, place)
         f0 = ((index - 1) / (index + 1)) ** 2 if "ior" in ior and index >= 0 else F0
         return np.asarray(np.minimum(f0 * tint, 1) * strength)
 
@@ -234,11 +238,11 @@ class SceneMaterials:
                 text = f"{key} lies on the surface otherwise than the first texture: left out"
                 self._notes.add("texture-layout", place, text)
                 continue
-            found = self._texture(info, f"{place}: {key}")
-            if found is not None and key == "specularGlossinessTexture":
-                found = self._roughness_of_gloss(number, info, place)
-            if found is not None:
-                maps[key] = found.texture.id
+            loaded = self._texture(info, f"{place}: {key}")
+            if loaded is not None and key == "specularGlossinessTexture":
+                loaded = self._roughness_of_gloss(number, info, place)
+            if loaded is not None:
+                maps[key] = loaded.texture.id
         return maps
 
     def _roughness_of_gloss(
@@ -320,22 +324,22 @@ class SceneMaterials:
 
     def _mean(self, info: Any, place: str, *, is_colour: bool) -> F64 | None:
         """(3,) mean of a texture, of a colour in linear light; None without a texture."""
-        found = self._texture(info, place)
-        if found is None:
+        loaded = self._texture(info, place)
+        if loaded is None:
             return None
-        key = (found.texture.id, is_colour)
+        key = (loaded.texture.id, is_colour)
         if key not in self._means:
-            self._means[key] = picture_mean(found.texture.data, is_colour=is_colour)
+            self._means[key] = picture_mean(loaded.texture.data, is_colour=is_colour)
         return self._means[key]
 
     def _made(
         self, info: dict[str, Any], key: str, make: Callable[[bytes], bytes]
     ) -> LoadedTexture | None:
         """A texture derived from another one's picture; None if that is not available."""
-        found = self._texture(info, key)
-        if found is None:
+        loaded = self._texture(info, key)
+        if loaded is None:
             return None
-        data = found.texture.data
+        data = loaded.texture.data
         return self.library.texture(key, name=key, place=key, load=lambda: make(data))
 
     def _picture(self, source: int) -> bytes | None:
@@ -351,10 +355,10 @@ class SceneMaterials:
         if info is None or not leaves_picture(mesh, modes):
             return mesh
         place = f"materials[{number}]"
-        found = self._texture(info, place)
-        if found is None:
+        loaded = self._texture(info, place)
+        if loaded is None:
             return mesh
-        cut = wrapped(mesh, Wraps(modes, opened_picture(found.texture.data, whole=True).size))
+        cut = wrapped(mesh, Wraps(modes, opened_picture(loaded.texture.data, whole=True).size))
         if cut is None:
             text = f"its picture ({' and '.join(modes)}) goes on too often: it repeats"
             self._notes.add("texture-layout", place, text)

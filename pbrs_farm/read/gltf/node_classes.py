@@ -44,8 +44,8 @@ class Mapping:
         Case counts. Patterns are a shell's (`*`, `?`, `[`); None leaves the class to the node's
         name.
         """
-        exact = (found for pattern, found in self.rows if pattern == name)
-        alike = (found for pattern, found in self.rows if fnmatchcase(name, pattern))
+        exact = (node_class for pattern, node_class in self.rows if pattern == name)
+        alike = (node_class for pattern, node_class in self.rows if fnmatchcase(name, pattern))
         return next(chain(exact, alike), None)
 
 
@@ -65,11 +65,11 @@ def mapping_from_json(data: bytes, file: str) -> Mapping:
 
 def _class_of_row(row: Any, file: str, pattern: str) -> NodeClass:
     fields_json = {"class": row} if isinstance(row, (str, int)) else row
-    found = _tagged(fields_json) if isinstance(fields_json, dict) else None
-    if found is None:
+    tagged = _tagged(fields_json) if isinstance(fields_json, dict) else None
+    if tagged is None:
         text = f"{str(row)[:60]!r} names no class; one of {', '.join(NYU40_NAMES[1:])}"
         raise BadHouse(file, f"nodes[{pattern[:60]!r}]", text)
-    return found
+    return tagged
 
 
 def class_of_node(

@@ -53,14 +53,14 @@ def joints_of_parts(gltf: Gltf, parts: Sequence[Placed]) -> dict[tuple[int, ...]
     parts: of one item, parents first. Nodes below a moving part belong to that part: only motion
     relative to the body counts. Raises BadHouse for invalid numbers.
     """
-    found: dict[tuple[int, ...], Joint] = {}
+    joints: dict[tuple[int, ...], Joint] = {}
     for part in parts:
-        above = found.get(part.path[:-1])
+        above = joints.get(part.path[:-1])
         row = object_at(object_at(entry(gltf, "nodes", part.index), "extras"), KEY)
         joint = above or (_joint(gltf, row, part) if row else None)
         if joint is not None:
-            found[part.path] = joint
-    return found
+            joints[part.path] = joint
+    return joints
 
 
 def _joint(gltf: Gltf, row: dict[str, Any], part: Placed) -> Joint | None:
@@ -70,12 +70,12 @@ def _joint(gltf: Gltf, row: dict[str, Any], part: Placed) -> Joint | None:
     keys = ("lower", "upper", "value")
     lower, upper, value = numbers(gltf, [row.get(key, 0.0) for key in keys], 3, place)
     length = float(np.linalg.norm(axis))
-    known = {kind.value: kind for kind in JointKind}
-    if row.get("kind") not in known or upper - lower < _LEAST or length < 1e-9:
+    kinds = {kind.value: kind for kind in JointKind}
+    if row.get("kind") not in kinds or upper - lower < _LEAST or length < 1e-9:
         return None
     joint = Joint(
         str(row.get("part"))[:100],
-        known[row["kind"]],
+        kinds[row["kind"]],
         triple(point),
         triple(axis / length),
         float(upper),

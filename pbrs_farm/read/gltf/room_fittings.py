@@ -85,11 +85,11 @@ def parted_fittings(item: Item, *, by_shape: bool) -> tuple[Item, tuple[Item, ..
     corners = corners_of_surfaces(item.surfaces)
     if not len(corners):
         return item, ()
-    said = _said(item.surfaces)
-    part_of_face = _connected_parts(corners, said)
+    kind_of_face = _said(item.surfaces)
+    part_of_face = _connected_parts(corners, kind_of_face)
     bounds = bounds_of_shells(corners, part_of_face)
     is_named = np.zeros(len(bounds), np.bool_)
-    is_named[part_of_face[said > 0]] = True
+    is_named[part_of_face[kind_of_face > 0]] = True
     fitted = is_named
     if by_shape:
         fitted = is_named | _is_strip(bounds) | _is_board(corners, part_of_face, bounds)
@@ -97,12 +97,12 @@ def parted_fittings(item: Item, *, by_shape: bool) -> tuple[Item, tuple[Item, ..
     if chosen.all() or not chosen.any():
         return item, ()
     thing_of_part = _join_touching_parts(bounds, fitted)
-    found: list[Item] = []
+    fittings: list[Item] = []
     for thing in range(int(thing_of_part.max()) + 1):
         faces = chosen & (thing_of_part[part_of_face] == thing)
         if faces.any():
-            found.append(_fitting_item(item, faces, said[faces], len(found)))
-    return replace(item, surfaces=picked(item, ~chosen)), tuple(found)
+            fittings.append(_fitting_item(item, faces, kind_of_face[faces], len(fittings)))
+    return replace(item, surfaces=picked(item, ~chosen)), tuple(fittings)
 
 
 _UNSAID, _GLAZED, _FRAMED, _DOORLIKE, _SKIRTED = range(5)
@@ -129,9 +129,9 @@ def _connected_parts(corners: F64, said: I64) -> I64:
     part = np.zeros(len(corners), np.int64)
     n = 0
     for kind in np.unique(said):
-        own = said == kind
-        part[own] = components(corners[own]) + n
-        n = int(part[own].max()) + 1
+        is_kind = said == kind
+        part[is_kind] = components(corners[is_kind]) + n
+        n = int(part[is_kind].max()) + 1
     return part
 
 
@@ -144,11 +144,11 @@ def _is_board(corners: F64, part_of_face: I64, bounds: F64) -> Bools:
     """(P,) whether a part is a thin closed solid, smaller than a wall."""
     size = np.sort(bounds[:, 1] - bounds[:, 0], axis=1)
     thin = (size[:, 0] > _THIN_M[0]) & (size[:, 0] < _THIN_M[1]) & (size[:, 2] < _LARGEST_M)
-    found = np.zeros(len(bounds), np.bool_)
+    is_solid = np.zeros(len(bounds), np.bool_)
     for part in np.flatnonzero(thin)[np.argsort(-size[thin, 2], kind="stable")][:_MOST_CLOSED]:
-        own = corners[part_of_face == part]
-        found[part] = closed_edge_share(np.rint(own / _WELD_M)) == 1
-    return found
+        part_corners = corners[part_of_face == part]
+        is_solid[part] = closed_edge_share(np.rint(part_corners / _WELD_M)) == 1
+    return is_solid
 
 
 def _join_touching_parts(bounds: F64, fitted: Bools) -> I64:

@@ -124,12 +124,12 @@ def house_of_gltf(
     items = list(items_of_scene(gltf, mapping, materials, notes, fields))
     note_unread(gltf, notes)
     if room_file is not None:
-        found = rooms_from_json(room_file, f"{stem}.rooms.json", items)
-    elif own := _rooms_of_scene(gltf):
-        found = rooms_from_value({"rooms": own}, name, items)
+        house_rooms = rooms_from_json(room_file, f"{stem}.rooms.json", items)
+    elif scene_rooms := _rooms_of_scene(gltf):
+        house_rooms = rooms_from_value({"rooms": scene_rooms}, name, items)
     else:
-        found = rooms_from_floors(items)
-    if not found:
+        house_rooms = rooms_from_floors(items)
+    if not house_rooms:
         hint = f"name a node `floor`, map one in {stem}.classes.json, or give {stem}.rooms.json"
         hint = (
             f"{_of_its_size(items, source.kind)}{hint}; `pbrs-farm objects` renders single models"
@@ -137,7 +137,7 @@ def house_of_gltf(
         raise BadHouse(name, "scene", "has no floor", hint=hint)
     # Sort rooms into levels and items into rooms.
     builder = HouseBuilder(name, fields, notes, materials.library)
-    builder.set_rooms(found)
+    builder.set_rooms(house_rooms)
     builder.items += [_sort_by_place(item, builder) for item in items]
     return builder.house(stem, source, openings=openings(items))
 

@@ -74,12 +74,12 @@ def items_of_scene(
     A node with its descendants is one item, unless it is a group or a whole room, which is split.
     Raises BadHouse for too many triangles or items, and for coordinates too far away.
     """
-    known: dict[Any, list[tuple[int | None, Mesh]]] = {}  # mesh number -> its primitives
+    meshes: dict[Any, list[tuple[int | None, Mesh]]] = {}  # mesh number -> its primitives
     taken: set[str] = set()  # ids
     n_faces = n_items = 0
-    found: list[tuple[_Thing, str, Item]] = []  # with the place that notes name
+    placed: list[tuple[_Thing, str, Item]] = []  # with the place that notes name
     for thing in _gather_things(gltf, mapping):
-        item = _item(gltf, thing, materials, notes, known, fields)
+        item = _item(gltf, thing, materials, notes, meshes, fields)
         if item is None:
             continue
         place = _place_in_file(gltf, thing)
@@ -89,14 +89,14 @@ def items_of_scene(
             hint = "is its unit right? glTF is in metres; limit: read.max_extent_m"
             raise BadHouse(gltf.file, place, text, hint=hint)
         n_faces += item.n_faces
-        if n_faces > fields.max_triangles or len(found) >= MAX_INSTANCES:
+        if n_faces > fields.max_triangles or len(placed) >= MAX_INSTANCES:
             text = f"more than {fields.max_triangles} triangles or {MAX_INSTANCES} items"
             raise BadHouse(gltf.file, place, text, hint="limit: read.max_triangles")
-        found.append((thing, place, item))
+        placed.append((thing, place, item))
     # Split rooms and items with class names in their materials; tags of the file or user take
     # precedence.
-    centres = centres_of([item for _, _, item in found])
-    for thing, place, item in found:
+    centres = centres_of([item for _, _, item in placed])
+    for thing, place, item in placed:
         if thing.extras.get("solid") is True or item.joints:
             parts: tuple[Item, ...] = (item,)
         elif thing.seen.is_tagged:
@@ -147,39 +147,41 @@ def _gather_things(gltf: Gltf, mapping: Mapping) -> list[_Thing]:
     # By path from the root: the item a node belongs to, and the class its members inherit.
     owner: dict[tuple[int, ...], _Thing] = {}
     members: dict[tuple[int, ...], NodeClass] = {}
-    found: list[_Thing] = []
+    things: list[_Thing] = []
     for node in placed_nodes(gltf):
         fields_json = entry(gltf, "nodes", node.index)
         name = str(fields_json.get("name", ""))[:200]
         extras = object_at(fields_json, "extras")
         above = owner.get(node.path[:-1])
         materials = material_names(gltf, fields_json)
-        own = class_of_node(name, extras, mapping, materials)
+        own_class = class_of_node(name, extras, mapping, materials)
         inherited = members.get(node.path[:-1])
-        if own and inherited and not own.is_tagged and _is_shown(own, inherited):
-            own = None
-        seen = own or inherited
+        if own_class and inherited and not own_class.is_tagged and _is_shown(own_class, inherited):
+            own_class = None
+        effective = own_class or inherited
         # A group named by a collective noun is not an item.
         if extras.get("group") is True:
-            seen = None
-        if seen and not seen.is_tagged and "mesh" not in fields_json:
-            grouped = collection_of(name, seen)
+            effective = None
+        if effective and not effective.is_tagged and "mesh" not in fields_json:
+            grouped = collection_of(name, effective)
             if grouped is not None:
-                seen = None
+                effective = None
                 if grouped.nyu40 and above is None:
                     members[node.path] = grouped
         # Leave out empty nodes without a class: they only hold others.
         has_light = "KHR_lights_punctual" in object_at(fields_json, "extensions")
         has_part = "mesh" in fields_json or has_light or extras.get("one") is True
         # Begin an item at the outermost node of a class, and at tagged ones below it.
-        if (seen and (above is None or seen.is_tagged)) or (above is None and has_part):
-            is_by_name = own is not None and (not own.is_tagged or extras.get("by_name") is True)
-            above = _Thing(node, name, seen or _UNMAPPED, extras, materials, is_by_name)
-            found.append(above)
+        if (effective and (above is None or effective.is_tagged)) or (above is None and has_part):
+            is_by_name = own_class is not None and (
+                not own_class.is_tagged or extras.get("by_name") is True
+            )
+            above = _Thing(node, name, effective or _UNMAPPED, extras, materials, is_by_name)
+            things.append(above)
         if above is not None:
             owner[node.path] = above
             above.parts.append(node)
-    return found
+    return things
 
 
 def _is_shown(own: NodeClass, collection: NodeClass) -> bool:
@@ -249,11 +251,11 @@ def _item(
         lights = _with_surfaces(lights, surfaces, unknown)
         shining = {k: emission for k, emission in shining.items() if k not in unknown}
     lights += emitted(surfaces, shining)
-    found = _finish_item(thing, surfaces, lights, _box_of_thing(thing, parts))
+    item = _finish_item(thing, surfaces, lights, _box_of_thing(thing, parts))
     moving = joints_of_surfaces(
         dict.fromkeys(joints.values()), surfaces, materials.library.materials
     )
-    return replace(found, joints=moving) if moving else found
+    return replace(item, joints=moving) if moving else item
 
 
 def _with_surfaces(
@@ -296,11 +298,11 @@ def _box_of_thing(
 
 
 def _punctual_lights(gltf: Gltf, thing: _Thing) -> list[LightPart]:
-    found = [
+    light_parts = [
         punctual_light(gltf, entry(gltf, "nodes", p.index), p.world_from_node, f"nodes[{p.index}]")
         for p in thing.parts
     ]
-    return [light for light in found if light]
+    return [light for light in light_parts if light]
 
 
 def _meshes(
@@ -354,26 +356,26 @@ def _size_of(parts: list[tuple[Placed, list[tuple[int | None, Mesh]]]]) -> Piece
 def _finish_item(
     thing: _Thing, surfaces: list[Surface], lights: list[LightPart], box: Box | None
 ) -> Item:
-    seen = thing.seen
+    thing_class = thing.seen
     if lights and not surfaces:
         # A light without a shape is a lamp.
-        seen = replace(seen, kind=ItemKind.LAMP, nyu40=LAMP)
-    tags = [UNMAPPED] if seen is _UNMAPPED else []
+        thing_class = replace(thing_class, kind=ItemKind.LAMP, nyu40=LAMP)
+    tags = [UNMAPPED] if thing_class is _UNMAPPED else []
     if any(np.linalg.det(p.world_from_node[:3, :3]) < 0 for p in thing.parts):
         tags.append("mirrored")
     item_id, name = thing.extras.get("item"), thing.extras.get("name")
     item = Item(
         id=item_id[:100] if isinstance(item_id, str) and item_id else f"n{thing.root.index}",
         name=name[:200] if isinstance(name, str) else thing.name or f"node {thing.root.index}",
-        kind=seen.kind,
+        kind=thing_class.kind,
         level_id="0",
         surfaces=tuple(surfaces),
-        nyu40=seen.nyu40,
+        nyu40=thing_class.nyu40,
         source_class=thing.name,
         lights=tuple(lights),
         box=box,
         tags=tuple(tags),
     )
-    if seen.kind is ItemKind.LAMP and not lights:
+    if thing_class.kind is ItemKind.LAMP and not lights:
         return replace(item, lights=(assumed_light(item),), tags=(*item.tags, "assumed_light"))
     return item

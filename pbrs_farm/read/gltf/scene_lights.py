@@ -73,16 +73,16 @@ def emitted(surfaces: Sequence[Surface], shining: dict[int, Emission]) -> tuple[
     corners = {k: corners_of_surfaces([surfaces[k]]) for k in shining}
     area = {k: float(face_areas(corners[k]).sum()) for k in shining}
     unknown = sum(area[k] for k, emission in shining.items() if emission.luminance == 0)
-    found = []
+    light_parts = []
     for k, emission in shining.items():
         low, high = surfaces[k].positions.min(0), surfaces[k].positions.max(0)
         # A Lambertian emitter.
-        known = math.pi * emission.luminance * outside_area(corners[k])
-        found.append(
+        power_lm = math.pi * emission.luminance * outside_area(corners[k])
+        light_parts.append(
             LightPart(
                 position=triple((low + high) / 2),
                 radius_m=float(np.mean(high - low)) / 2,
-                power=known or ASSUMED_LM * area[k] / max(unknown, 1e-12),
+                power=power_lm or ASSUMED_LM * area[k] / max(unknown, 1e-12),
                 unit=PowerUnit.LUMEN,
                 rgb_linear=emission.rgb_linear,
                 is_coloured=emission.is_coloured,
@@ -90,4 +90,4 @@ def emitted(surfaces: Sequence[Surface], shining: dict[int, Emission]) -> tuple[
                 emitting=(k,),
             )
         )
-    return tuple(found)
+    return tuple(light_parts)

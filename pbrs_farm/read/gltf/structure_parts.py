@@ -21,8 +21,8 @@ _THICKEST_OPENING_M: Final = 1.5  # a porch of glass has less
 
 def centres_of(items: Sequence[Item]) -> F64:
     """(N, 3) centres of items that are not part of a room."""
-    found = [i.bounds.mean(0) for i in items if i.n_faces and i.kind not in _STRUCTURE]
-    return np.array(found, np.float64).reshape(-1, 3)
+    centres = [i.bounds.mean(0) for i in items if i.n_faces and i.kind not in _STRUCTURE]
+    return np.array(centres, np.float64).reshape(-1, 3)
 
 
 def structure_parts(item: Item, others: F64) -> tuple[Item, ...]:
@@ -39,15 +39,15 @@ def structure_parts(item: Item, others: F64) -> tuple[Item, ...]:
         return (item,)
     # Parts identified by name or connectivity are not sides of the room, whatever their face
     # directions.
-    own, fittings = parted_fittings(item, by_shape=True)
-    parts = room_parts(own, others)
-    if fittings and parts[0] is own:
-        own, fittings = item, ()
+    rest, fittings = parted_fittings(item, by_shape=True)
+    parts = room_parts(rest, others)
+    if fittings and parts[0] is rest:
+        rest, fittings = item, ()
         if item.kind is ItemKind.WALL:
-            own, fittings = parted_fittings(item, by_shape=False)
-        parts = room_parts(own, others)
-    if parts[0] is own and (is_unknown or item.kind is ItemKind.WALL):
-        parts = _by_materials(own)
+            rest, fittings = parted_fittings(item, by_shape=False)
+        parts = room_parts(rest, others)
+    if parts[0] is rest and (is_unknown or item.kind is ItemKind.WALL):
+        parts = _by_materials(rest)
     return (*(p for part in parts for p in planar_parts(part)), *fittings)
 
 
@@ -62,26 +62,26 @@ def _by_materials(item: Item) -> tuple[Item, ...]:
     kinds = [class_of_node_name(s.name) for s in item.surfaces]
     # Separate wall, floor and ceiling; surfaces with inconclusive names stay with the item.
     groups: dict[ItemKind | None, list[Surface]] = {}
-    for surface, seen in zip(item.surfaces, kinds, strict=True):
-        kind = seen.kind if seen and seen.kind in _STRUCTURE else None
+    for surface, material_class in zip(item.surfaces, kinds, strict=True):
+        kind = material_class.kind if material_class and material_class.kind in _STRUCTURE else None
         groups.setdefault(None if kind is item.kind else kind, []).append(surface)
     if set(groups) == {None}:
         return (_name_by_materials(item),)
-    found = [replace(item, surfaces=tuple(groups.pop(None)))] if None in groups else []
+    parts = [replace(item, surfaces=tuple(groups.pop(None)))] if None in groups else []
     for kind, surfaces in groups.items():
         assert kind is not None
         part = replace(
             item,
-            id=f"{item.id}.{kind}" if found else item.id,
+            id=f"{item.id}.{kind}" if parts else item.id,
             kind=kind,
             nyu40=CLASS_OF_STRUCTURE[kind],
             surfaces=tuple(surfaces),
             box=None,
-            lights=() if found else item.lights,
+            lights=() if parts else item.lights,
             tags=_tags_of_known(item),
         )
-        found.append(part)
-    return tuple(found)
+        parts.append(part)
+    return tuple(parts)
 
 
 def _name_by_materials(item: Item) -> Item:
@@ -92,12 +92,12 @@ def _name_by_materials(item: Item) -> Item:
         return item
     width, height, depth = np.ptp(item.bounds, axis=0).tolist()
     size = PieceSize(width, height, depth)
-    one, *others = [class_of_node_name(s.name, size=size) for s in item.surfaces]
-    if one is None or any(other != one for other in others):
+    first_class, *other_classes = [class_of_node_name(s.name, size=size) for s in item.surfaces]
+    if first_class is None or any(next_class != first_class for next_class in other_classes):
         return item
-    if one.kind in (ItemKind.LAMP, ItemKind.PERSON, ItemKind.DOOR, ItemKind.WINDOW):
+    if first_class.kind in (ItemKind.LAMP, ItemKind.PERSON, ItemKind.DOOR, ItemKind.WINDOW):
         return item  # needs more than a class: light, a place in a wall
-    return replace(item, nyu40=one.nyu40, kind=one.kind, tags=_tags_of_known(item))
+    return replace(item, nyu40=first_class.nyu40, kind=first_class.kind, tags=_tags_of_known(item))
 
 
 def _tags_of_known(item: Item) -> tuple[str, ...]:

@@ -141,14 +141,14 @@ class _Dataset:
 
     def __init__(self, path: Path, models: str) -> None:
         above = [path.parent, *path.parents[1:_LEVELS_UP]]
-        found = next((f for f in above if next(f.glob(_CONFIG), None)), None)
-        if found is None:
+        root = next((f for f in above if next(f.glob(_CONFIG), None)), None)
+        if root is None:
             hint = "keep the scene below the folder of its data set"
             raise BadHouse(path, "", f"no {_CONFIG} lies above it", hint=hint)
-        self.folder = RootFolder(found)
-        self.scene = path.relative_to(found).as_posix()
+        self.folder = RootFolder(root)
+        self.scene = path.relative_to(root).as_posix()
         self._parsed: dict[str, dict[str, Any]] = {}
-        self._files = sorted(_names_below(found))
+        self._files = sorted(_names_below(root))
         self._known = frozenset(self._files)
         self._by_name: dict[str, str] = {}
         for name in self._files:
@@ -185,8 +185,8 @@ class _Dataset:
         """An asset that a config names, and the buffers and pictures outside it."""
         asset = self.asset(config, reference)
         data = self.folder.read(asset, max_bytes=MAX_SCENE_BYTES) or b""
-        at = posixpath.dirname(asset)
-        return {asset, *(self.folder.name_from(at, uri) for uri in files_of_gltf(data, asset))}
+        parent = posixpath.dirname(asset)
+        return {asset, *(self.folder.name_from(parent, uri) for uri in files_of_gltf(data, asset))}
 
     def urdf(self, template: str) -> str | None:
         """Name of the URDF of an articulated object's template; None if it has none."""
@@ -216,18 +216,18 @@ class _Dataset:
                 data = self.folder.read(name, max_bytes=_MOST_JSON_BYTES) or b""
                 for row in csv.DictReader(io.StringIO(text_from_bytes(data, "replace"))):
                     words = [row.get(k) for k in ("main_category", "category", "name")]
-                    known = next((w for w in words if w), "")
-                    self._classes[next(iter(row.values())) or ""] = str(known)
+                    category = next((w for w in words if w), "")
+                    self._classes[next(iter(row.values())) or ""] = str(category)
         return self._classes.get(posixpath.basename(template), "")
 
 
 def _names_below(root: Path) -> list[str]:
-    found = []
+    names = []
     for path in root.rglob("*"):
-        found.append(path.relative_to(root).as_posix())
-        if len(found) > _MOST_FILES:
+        names.append(path.relative_to(root).as_posix())
+        if len(names) > _MOST_FILES:
             raise BadHouse(root, "", f"holds more than {_MOST_FILES} files")
-    return found
+    return names
 
 
 @dataclass(slots=True)
@@ -243,8 +243,8 @@ class _Built:
 
     def fetch(self, name: str) -> bytes | None:
         """A picture beside an asset: its name below the root."""
-        at = next(iter(self.folders.values()))[0]
-        return at.read(name, max_bytes=MAX_SCENE_BYTES)
+        root = next(iter(self.folders.values()))[0]
+        return root.read(name, max_bytes=MAX_SCENE_BYTES)
 
     def asset(self, dataset: _Dataset, name: str) -> tuple[list[int], Gltf] | None:
         """Root nodes of an asset in the document, added where it is new; None without the file."""
@@ -253,24 +253,26 @@ class _Built:
         data = dataset.folder.read(name, max_bytes=MAX_SCENE_BYTES)
         if data is None:
             return None
-        at = posixpath.dirname(name)
-        self.folders[name] = (dataset.folder, at)
+        parent = posixpath.dirname(name)
+        self.folders[name] = (dataset.folder, parent)
 
         def beside(reference: str) -> bytes | None:
-            inner = dataset.folder.name_from(at, reference)
+            inner = dataset.folder.name_from(parent, reference)
             return dataset.folder.read(inner, max_bytes=MAX_SCENE_BYTES)
 
         gltf = gltf_document(data, name, beside)
-        self.assets[name] = (self._added(gltf, dataset, at), gltf)
+        self.assets[name] = (self._added(gltf, dataset, parent), gltf)
         return self.assets[name]
 
     def _added(self, gltf: Gltf, dataset: _Dataset, at: str) -> list[int]:
-        own = gltf.document
+        document = gltf.document
         start = {key: len(self.document.setdefault(key, [])) for key in _ARRAYS}
-        own = {k: own.get(k, []) for k in _ARRAYS} | {"scenes": own.get("scenes", [])}
-        if not all(isinstance(own[k], list) for k in own):
+        document = {k: document.get(k, []) for k in _ARRAYS} | {
+            "scenes": document.get("scenes", [])
+        }
+        if not all(isinstance(document[k], list) for k in document):
             raise BadHouse(gltf.file, "", "has lists that are none")
-        copy = json.loads(json.dumps(own))
+        copy = json.loads(json.dumps(document))
         _shifted(copy, start)
         self._add_lights(gltf, copy["nodes"])
         for image in copy["images"]:
@@ -288,7 +290,7 @@ class _Built:
 
     def _add_lights(self, gltf: Gltf, nodes: list[Any]) -> None:
         """Take an asset's lights, and let its nodes name them by their new numbers."""
-        own = object_at(object_at(gltf.document, "extensions"), _LIGHTS).get("lights")
+        own_lights = object_at(object_at(gltf.document, "extensions"), _LIGHTS).get("lights")
         lights = self.document.setdefault("extensions", {_LIGHTS: {"lights": []}})[_LIGHTS][
             "lights"
         ]
@@ -298,7 +300,7 @@ class _Built:
             )
             if "light" in row:
                 row["light"] = _plus(row["light"], len(lights))
-        lights += own if isinstance(own, list) else []
+        lights += own_lights if isinstance(own_lights, list) else []
 
     def place(self, roots: list[int], matrix: F64, name: str, extras: dict[str, Any]) -> None:
         """Put an asset's roots below a new node."""
@@ -387,12 +389,12 @@ def _add_stage(dataset: _Dataset, template: str, built: _Built) -> None:
     if _BAKED in name.lower():
         text = "has light baked into its pictures; it cannot be lit anew"
         raise BadHouse(config, "render_asset", text, hint="take the unbaked data set")
-    found = built.asset(dataset, name)
-    if found is None:
+    added = built.asset(dataset, name)
+    if added is None:
         raise BadHouse(config, "render_asset", f"{name} does not exist")
-    matrix = _upright_matrix(row, found[1], config)
+    matrix = _upright_matrix(row, added[1], config)
     # Keep the stage's roots separate, so that their names and extras give their classes.
-    for root in found[0]:
+    for root in added[0]:
         built.place([root], matrix, "", {})
 
 
@@ -403,12 +405,12 @@ def _add_object(dataset: _Dataset, row: Any, origin: Any, place: str, built: _Bu
     template = row["template_name"]
     config = dataset.config(template, "object")
     settings = dataset.json(config) if config else {}
-    found = None
+    added = None
     if config and settings.get("render_asset"):
-        found = built.asset(dataset, dataset.asset(config, settings["render_asset"]))
-    if found is None:
+        added = built.asset(dataset, dataset.asset(config, settings["render_asset"]))
+    if added is None:
         return False
-    roots, gltf = found
+    roots, gltf = added
     matrix = _matrix_of_instance(row, place, dataset.scene)
     inner = _upright_matrix(settings, gltf, config or "")
     if str(row.get("translation_origin", origin)).lower() != "asset_local":
@@ -485,9 +487,9 @@ def _add_robot(
     for link in robot.links:
         for visual in link.visuals:
             name = dataset.folder.name_from(posixpath.dirname(urdf), visual.file)
-            found = built.asset(dataset, name)
-            if found is not None:
-                shown.setdefault(link.name, []).append((found[0], visual.link_from_model))
+            added = built.asset(dataset, name)
+            if added is not None:
+                shown.setdefault(link.name, []).append((added[0], visual.link_from_model))
     if not shown:
         return False
     numbers_of: dict[str, int] = {}
@@ -501,10 +503,10 @@ def _add_robot(
             node["matrix"] = link.joint.parent_from_link(value).T.ravel().tolist()
             if link.joint.kind is not None:
                 limits = link.joint.lower, link.joint.upper
-                told = joint_row(
+                extras = joint_row(
                     link.name, link.joint.kind, (0, 0, 0), link.joint.axis, limits, value
                 )
-                node["extras"] = {KEY: told}
+                node["extras"] = {KEY: extras}
         for models, matrix in shown.get(link.name, []):
             node["children"].append(len(nodes))
             nodes.append({"name": "", "matrix": matrix.T.ravel().tolist(), "children": models})
@@ -558,12 +560,12 @@ def _centre(gltf: Gltf, inner: F64, settings: dict[str, Any], config: str) -> F6
     for node in placed_nodes(gltf):
         mesh = gltf.document["nodes"][node.index].get("mesh")
         if mesh is not None:
-            for _number, one in meshes_of(gltf, mesh, max_triangles=2_000_000):
-                points.append(transform_points(inner @ node.world_from_node, one.positions))
+            for _number, primitive in meshes_of(gltf, mesh, max_triangles=2_000_000):
+                points.append(transform_points(inner @ node.world_from_node, primitive.positions))
     if not points:
         return np.zeros(3)
-    every = np.concatenate(points)
-    return np.asarray((every.min(0) + every.max(0)) / 2)
+    positions = np.concatenate(points)
+    return np.asarray((positions.min(0) + positions.max(0)) / 2)
 
 
 def _upright_matrix(row: dict[str, Any], gltf: Gltf, config: str) -> F64:
@@ -586,17 +588,17 @@ def _rooms_of_regions(dataset: _Dataset, named: Any, stem: str) -> bytes | None:
     """The regions of the scene's semantic config as a room file; None without regions."""
     base = posixpath.basename(named) if isinstance(named, str) else stem
     base = base.removesuffix(".semantic_config.json")
-    found = next((n for n in dataset.named(f"{base}.semantic_config.json")), None)
-    if found is None:
+    config = next((n for n in dataset.named(f"{base}.semantic_config.json")), None)
+    if config is None:
         return None
-    rows = dataset.json(found).get("region_annotations")
+    rows = dataset.json(config).get("region_annotations")
     rooms = []
     for k, row in enumerate(rows if isinstance(rows, list) else []):
         place = f"region_annotations[{k}]"
         loop = row.get("poly_loop") if isinstance(row, dict) else None
         if not isinstance(loop, list) or len(loop) < 3:
-            raise BadHouse(found, place, "has no poly_loop of three corners or more")
-        where = Gltf({}, (), found)
+            raise BadHouse(config, place, "has no poly_loop of three corners or more")
+        where = Gltf({}, (), config)
         corners = [numbers(where, corner, 3, f"{place}.poly_loop") for corner in loop]
         floor = row.get("floor_height", float(min(c[1] for c in corners)))
         high = row.get("extrusion_height")

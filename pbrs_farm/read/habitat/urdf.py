@@ -143,8 +143,8 @@ def _parsed(data: bytes, file: str) -> Element:
 
 
 def _named(row: Element, tag: str, links: Mapping[str, Any], file: str) -> str:
-    found = row.find(tag)
-    name = "" if found is None else str(found.get("link"))
+    child = row.find(tag)
+    name = "" if child is None else str(child.get("link"))
     if name not in links:
         raise BadHouse(file, f"joint {str(row.get('name'))[:60]}", f"its {tag} is no link")
     return name
@@ -168,7 +168,7 @@ def _joint(row: Element, file: str) -> LinkJoint:
 
 def _visuals(row: Element, file: str) -> tuple[tuple[Visual, ...], int]:
     """The models that show a link, and how many other shapes do."""
-    found, n_unread = [], 0
+    visuals, n_unread = [], 0
     place = f"link {str(row.get('name'))[:60]}"
     for visual in row.findall("visual"):
         mesh = visual.find("geometry/mesh")
@@ -177,8 +177,8 @@ def _visuals(row: Element, file: str) -> tuple[tuple[Visual, ...], int]:
             continue
         matrix = _origin(visual, file, place)
         matrix[:3, :3] *= _numbers(mesh.get("scale"), (1.0, 1.0, 1.0), file, place)
-        found.append(Visual(str(mesh.get("filename")), matrix))
-    return tuple(found), n_unread
+        visuals.append(Visual(str(mesh.get("filename")), matrix))
+    return tuple(visuals), n_unread
 
 
 def _origin(row: Element, file: str, place: str) -> F64:

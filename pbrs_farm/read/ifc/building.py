@@ -126,10 +126,10 @@ class _Building:
         self._note_failed(products)
         self._shift_to_origin()
         items = list(self._items(products))
-        told = self._rooms_of_spaces()
-        items = with_roofs(items, [room for room, _top in told])
+        spaces = self._rooms_of_spaces()
+        items = with_roofs(items, [room for room, _top in spaces])
         overheads = Overheads(items)
-        rooms = self._under_ceilings(told, overheads) or _rooms_between_walls(items, overheads)
+        rooms = self._under_ceilings(spaces, overheads) or _rooms_between_walls(items, overheads)
         if not rooms:
             hint = "export its spaces or rooms, or its floor slabs, with it"
             raise BadHouse(
@@ -150,22 +150,24 @@ class _Building:
         voids = list(
             voids_of_walls(self._model, self._meshes, self._world, by_id, builder.level_of)
         )
-        told = openings_of_voids(builder.items, voids)
+        of_void = openings_of_voids(builder.items, voids)
         # Build doors and windows without a shape to the size of their hole.
         for void in voids:
-            if not void.undrawn or (opening := told.get(void.id)) is None:
+            if not void.undrawn or (opening := of_void.get(void.id)) is None:
                 continue
             hole = hole_of_undrawn(opening, self._model.by_guid(void.undrawn))
             room_id = builder.room_at(hole.centre)
             item = fill_hole(hole, self._library, opening.level_id, room_id)
             if item is not None:
                 builder.items.append(item)
-                told[void.id] = replace(opening, item_id=item.id)
-        filled = {o.item_id for o in told.values()}
+                of_void[void.id] = replace(opening, item_id=item.id)
+        filled = {o.item_id for o in of_void.values()}
         rest = [i for i in builder.items if i.id not in filled]
-        of_item = {o.item_id: o for o in (*told.values(), *openings(rest)) if o.item_id is not None}
-        found = [of_item[i.id] for i in builder.items if i.id in of_item]
-        return found + [o for o in told.values() if o.item_id is None]
+        of_item = {
+            o.item_id: o for o in (*of_void.values(), *openings(rest)) if o.item_id is not None
+        }
+        own_openings = [of_item[i.id] for i in builder.items if i.id in of_item]
+        return own_openings + [o for o in of_void.values() if o.item_id is None]
 
     def _note_failed(self, products: Sequence[Any]) -> None:
         for product in products:
@@ -209,10 +211,10 @@ class _Building:
             yield replace(item, id=unique)
 
     def _item(self, product: Any, mesh: ProductMesh) -> Item | None:
-        own = self._class(product, mesh)
-        if own is None:
+        product_class = self._class(product, mesh)
+        if product_class is None:
             return None
-        kind, nyu40, tags = own
+        kind, nyu40, tags = product_class
         name = str(product.Name or _type_name(product) or product.is_a())[:200]
         world = self._world @ mesh.world_from_product
         surfaces = tuple(self._surfaces(product, kind, mesh, world))
@@ -245,28 +247,28 @@ class _Building:
         self, product: Any, mesh: ProductMesh
     ) -> tuple[ItemKind, int, tuple[str, ...]] | None:
         """(kind, NYU40 class, tags); None for products that are not drawn."""
-        given = _given(product)
+        given_class_ = _given(product)
         place = f"#{product.id()} {product.is_a()}"
-        if given is not None and given.kind == "none":
+        if given_class_ is not None and given_class_.kind == "none":
             return None
         if product.is_a("IfcPlate") or product.is_a("IfcMember"):
             return _part_of_wall(product, mesh)
         names = [str(n) for n in (product.Name, product.ObjectType, _type_name(product)) if n]
-        if given is not None and given.item_kind in _OPENINGS:
-            return self._class_of_opening(product, given.item_kind, names, mesh)
-        if given is not None and given.nyu40 >= 0:
-            return given.item_kind, given.nyu40, ()
+        if given_class_ is not None and given_class_.item_kind in _OPENINGS:
+            return self._class_of_opening(product, given_class_.item_kind, names, mesh)
+        if given_class_ is not None and given_class_.nyu40 >= 0:
+            return given_class_.item_kind, given_class_.nyu40, ()
         if product.is_a("IfcCovering"):
             return self._class_of_covering(product, mesh)
         is_piece = any(product.is_a(entity) for entity in _PIECES)
         for name in names:
-            seen = class_of_node_name(name, size=_size_of(mesh))
+            name_class = class_of_node_name(name, size=_size_of(mesh))
             # A cabinet with two doors is no door.
-            if is_piece and seen is not None and not _is_piece(seen):
-                seen = _class_of_part_of_name(name)
-            if seen is not None:
-                kind = ItemKind.LAMP if seen.nyu40 == LAMP else seen.kind
-                return kind, seen.nyu40, ()
+            if is_piece and name_class is not None and not _is_piece(name_class):
+                name_class = _class_of_part_of_name(name)
+            if name_class is not None:
+                kind = ItemKind.LAMP if name_class.nyu40 == LAMP else name_class.kind
+                return kind, name_class.nyu40, ()
         self._notes.add("unmapped-class", f"{place} {product.Name or ''}", "is otherprop")
         return ItemKind.OBJECT, OTHERPROP, (UNMAPPED,)
 
@@ -285,10 +287,10 @@ class _Building:
     ) -> tuple[ItemKind, int, tuple[str, ...]]:
         low_z, high_z = float(mesh.world[:, 2].min()), float(mesh.world[:, 2].max())
         foot_m = low_z - self._floor_z(product)
-        found = kind_of_opening(product, kind, names, foot_m, high_z - low_z)
-        if found is ItemKind.WINDOW:
-            return found, WINDOW, ()
-        return found, DOOR, swing(product) if found is kind else tags_of_name(names)
+        opening_kind = kind_of_opening(product, kind, names, foot_m, high_z - low_z)
+        if opening_kind is ItemKind.WINDOW:
+            return opening_kind, WINDOW, ()
+        return opening_kind, DOOR, swing(product) if opening_kind is kind else tags_of_name(names)
 
     def _floor_z(self, product: Any) -> float:
         """z of the file, metres, of the floor of the storey that holds a product."""
@@ -358,8 +360,8 @@ class _Building:
         """Material of a product without a style, from its name."""
         import ifcopenshell.util.element as element
 
-        found = element.get_material(product, should_skip_usage=True)
-        name = str(getattr(found, "Name", None) or getattr(found, "LayerSetName", None) or "")
+        material = element.get_material(product, should_skip_usage=True)
+        name = str(getattr(material, "Name", None) or getattr(material, "LayerSetName", None) or "")
         return Material(name[:100], diffuse=(0.8, 0.8, 0.8), is_default=True)
 
     def _box(self, product: Any, kind: ItemKind, mesh: ProductMesh) -> Box | None:
@@ -372,12 +374,12 @@ class _Building:
         whole = Mesh(
             "", "", source.positions, source.faces.astype(np.int32), None, source.positions
         )
-        found = oriented_box([whole], self._world @ source.world_from_product)
-        if found is not None and int(np.abs(found.axes[1]).argmax()) == 2:
+        box = oriented_box([whole], self._world @ source.world_from_product)
+        if box is not None and int(np.abs(box.axes[1]).argmax()) == 2:
             # Right, up and front are the product's x, z and -y.
-            axes = found.axes[:, [0, 2, 1]] * [1, 1, -1]
-            found = Box(found.centre, found.half[[0, 2, 1]], axes)
-        return across_last(found) if found is not None and kind in _OPENINGS else found
+            axes = box.axes[:, [0, 2, 1]] * [1, 1, -1]
+            box = Box(box.centre, box.half[[0, 2, 1]], axes)
+        return across_last(box) if box is not None and kind in _OPENINGS else box
 
     # Rooms and levels
 
@@ -388,13 +390,13 @@ class _Building:
             for row in self._model.by_type("IfcSpace")
             if row.id() in self._meshes
         ]
-        return [found for space in spaces if (found := self._room(space)) is not None]
+        return [room for space in spaces if (room := self._room(space)) is not None]
 
     def _under_ceilings(
         self, told: Sequence[tuple[Room, F64]], overheads: Overheads
     ) -> list[tuple[Room, F64 | None]]:
         """Limit the rooms to the height of their ceilings; drop rooms on a roof, with nothing above."""
-        found: list[tuple[Room, F64 | None]] = []
+        limited: list[tuple[Room, F64 | None]] = []
         for room, top in told:
             above = overheads.over(room)
             near_y = room.ceiling_y + NEAR_M
@@ -402,10 +404,10 @@ class _Building:
                 self._notes.add("degenerate-room", room.name, "lies under no roof; left out")
             elif above.share(near_y, of_ceilings=True) > _COVERED:
                 y = above.height(near_y, of_ceilings=True)
-                found.append((replace(room, ceiling_y=y or room.ceiling_y), top))
+                limited.append((replace(room, ceiling_y=y or room.ceiling_y), top))
             else:
-                found.append((room, top))
-        return found
+                limited.append((room, top))
+        return limited
 
     def _room(self, space: _Space) -> tuple[Room, F64] | None:
         row, mesh = space.row, space.mesh
@@ -443,12 +445,12 @@ class _Building:
             for row in self._model.by_type("IfcBuildingStorey")
             if (z := self._elevation(row)) is not None
         ]
-        found = []
+        named = []
         for level in levels:
             near = min(storeys, key=lambda s: abs(s[0] - level.elevation), default=(np.inf, ""))
             is_named = abs(near[0] - level.elevation) < 1.0 and near[1]
-            found.append(replace(level, name=near[1]) if is_named else level)
-        return tuple(found)
+            named.append(replace(level, name=near[1]) if is_named else level)
+        return tuple(named)
 
     def _covers(
         self, rooms: Sequence[tuple[Room, F64 | None]], items: Sequence[Item], overheads: Overheads
@@ -459,13 +461,13 @@ class _Building:
         of the room above; its underside gets the ceiling of the room below.
         """
         white = self._library.index(Material("", diffuse=(0.9, 0.9, 0.9), is_default=True))
-        found: list[Item] = []
+        covers: list[Item] = []
         for room, top in rooms:
             is_open = named_kind(" ".join((*room.types, room.name))) is RoomKind.OUTDOOR
             floors = _heights_of_floors(items, room)
             if not floors:
                 surface = horizontal("floor", [[room.polygon]], room.floor_y, white, up=True)
-                found.append(_floor_or_ceiling_item(room, ItemKind.FLOOR, surface))
+                covers.append(_floor_or_ceiling_item(room, ItemKind.FLOOR, surface))
             above = overheads.over(room)
             near_y = room.ceiling_y + NEAR_M
             is_ceiled = above.share(near_y, of_ceilings=True) > _COVERED
@@ -477,8 +479,8 @@ class _Building:
             else:
                 y = min(room.ceiling_y, slab_y or np.inf) - _BELOW_SLAB_M
                 surface = horizontal("ceiling", [[room.polygon]], y, white, up=False)
-            found.append(_floor_or_ceiling_item(room, ItemKind.CEILING, surface))
-        return found
+            covers.append(_floor_or_ceiling_item(room, ItemKind.CEILING, surface))
+        return covers
 
 
 def _sort_product(item: Item, builder: HouseBuilder) -> Item:
@@ -507,15 +509,18 @@ def _is_piece(seen: NodeClass) -> bool:
 
 def _class_of_part_of_name(name: str) -> NodeClass | None:
     """The class of the first part of a name that says a piece: a base cabinet of "Base Cabinet-2 Doors"."""
-    found = (class_of_node_name(part) for part in _BETWEEN.split(name))
-    return next((seen for seen in found if seen is not None and _is_piece(seen)), None)
+    classes = (class_of_node_name(part) for part in _BETWEEN.split(name))
+    return next(
+        (part_class for part_class in classes if part_class is not None and _is_piece(part_class)),
+        None,
+    )
 
 
 def _type_name(product: Any) -> str:
     import ifcopenshell.util.element as element
 
-    found = element.get_type(product)
-    return str(found.Name or "") if found is not None else ""
+    product_type = element.get_type(product)
+    return str(product_type.Name or "") if product_type is not None else ""
 
 
 def _given(product: Any) -> GivenClass | None:
@@ -533,8 +538,8 @@ def _given(product: Any) -> GivenClass | None:
             names.append(f"{entity} {word_of_type}")
         names.append(entity)
     for name in sorted(names, key=lambda n: " " not in n):
-        if (found := given_class("ifc", name)) is not None:
-            return found
+        if (class_row := given_class("ifc", name)) is not None:
+            return class_row
     if product.is_a("IfcSlab"):
         return GivenClass("floor", FLOOR)
     # Entities of other schema versions are handled as their supertype.
@@ -581,7 +586,7 @@ def _top_of_item(item: Item) -> float:
 def _heights_of_floors(items: Sequence[Item], room: Room) -> list[float]:
     """Heights of the slabs that form the room's floor."""
     low, high = room.polygon.min(0), room.polygon.max(0)
-    found = []
+    heights = []
     for item in items:
         if item.kind is not ItemKind.FLOOR or abs(_top_of_item(item) - room.floor_y) > NEAR_M:
             continue
@@ -589,8 +594,8 @@ def _heights_of_floors(items: Sequence[Item], room: Room) -> list[float]:
         if (plan[0] < high).all() and (plan[1] > low).all():
             share = sum(covered_share(s, room.polygon) for s in item.surfaces)
             if share > _COVERED:
-                found.append(_top_of_item(item))
-    return found
+                heights.append(_top_of_item(item))
+    return heights
 
 
 def _is_called_attic(name: str) -> bool:
@@ -601,14 +606,14 @@ def _rooms_between_walls(
     items: Sequence[Item], overheads: Overheads
 ) -> list[tuple[Room, F64 | None]]:
     """Rooms of a building without IfcSpaces, as high as the ceiling over most of their area."""
-    found: list[tuple[Room, F64 | None]] = []
+    rooms: list[tuple[Room, F64 | None]] = []
     for room in rooms_from_floors(items):
         above = overheads.over(room)
         y = above.height() if above.share(np.inf) > _COVERED else None
         # Under a roof knee walls bound a room, under the sky they are parapets.
         if _is_walled(room, items, _LEAST_HEIGHT_M if y is None else _LEAST_KNEE_M):
-            found.append((room if y is None else replace(room, ceiling_y=y), None))
-    return found
+            rooms.append((room if y is None else replace(room, ceiling_y=y), None))
+    return rooms
 
 
 def _looking_down(top: F64, material: int) -> Surface:

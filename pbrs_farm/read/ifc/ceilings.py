@@ -92,13 +92,13 @@ class Overheads:
 
 def _undersides(items: Sequence[Item], kind: ItemKind) -> list[F64]:
     """The faces that look down; all of a sheet, which may lie either way."""
-    found = []
+    undersides = []
     for item in items:
         if item.kind is kind:
             corners = corners_of_surfaces(item.surfaces)
             is_closed = closed_edge_share(np.round(corners, _WELD_DECIMALS)) == 1.0
-            found.append(corners[unit_normals(corners)[:, 1] < 0] if is_closed else corners)
-    return found
+            undersides.append(corners[unit_normals(corners)[:, 1] < 0] if is_closed else corners)
+    return undersides
 
 
 def _samples_of_plan(polygon: F64) -> F64:
@@ -122,7 +122,7 @@ def with_roofs(items: Sequence[Item], rooms: Sequence[Room]) -> list[Item]:
     """
     walls = [i.bounds for i in items if i.kind is ItemKind.WALL]
     bounds = np.array(walls).reshape(-1, 2, 3)
-    found = []
+    roofed = []
     for item in items:
         is_roof = (
             item.kind is ItemKind.FLOOR
@@ -133,8 +133,8 @@ def with_roofs(items: Sequence[Item], rooms: Sequence[Room]) -> list[Item]:
                 or _is_placed_as_roof(item, bounds)
             )
         )
-        found.append(replace(item, kind=ItemKind.CEILING, nyu40=CEILING) if is_roof else item)
-    return found
+        roofed.append(replace(item, kind=ItemKind.CEILING, nyu40=CEILING) if is_roof else item)
+    return roofed
 
 
 def is_called_roof(name: str) -> bool:

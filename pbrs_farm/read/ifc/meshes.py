@@ -65,15 +65,15 @@ def meshes_of_products(
     settings.set("apply-default-materials", False)
     settings.set("reorient-shells", True)
     settings.set("circle-segments", 16)
-    found: dict[int, ProductMesh] = {}
+    meshes: dict[int, ProductMesh] = {}
     if not products:
-        return found
+        return meshes
     n_threads = min(multiprocessing.cpu_count(), _MOST_THREADS)
     iterator = ifcopenshell.geom.iterator(
         settings, model, n_threads, include=list(products), geometry_library=_KERNEL
     )
     if not iterator.initialize():
-        return found
+        return meshes
     n_faces = 0
     while True:
         shape = iterator.get()
@@ -87,9 +87,9 @@ def meshes_of_products(
             if n_faces > fields.max_triangles:
                 text = f"more than {fields.max_triangles} triangles"
                 raise BadHouse(file, place, text, hint="limit: read.max_triangles")
-            found[shape.id] = mesh
+            meshes[shape.id] = mesh
         if not iterator.next():
-            return found
+            return meshes
 
 
 def _mesh_of_shape(shape: Any) -> ProductMesh | None:
@@ -117,13 +117,13 @@ def _facing_out(positions: F64, faces: I64, items: I64) -> I64:
     """
     turned = faces.copy()
     for item in np.unique(items):
-        own = items == item
-        corners = positions[faces[own]]
+        is_of_item = items == item
+        corners = positions[faces[is_of_item]]
         # Ask for the sign first: nearly all bodies are sound.
         if signed_volume(corners, corners.reshape(-1, 3).mean(0)) >= 0:
             continue
         if closed_edge_share(np.round(corners, _WELD_DECIMALS)) == 1.0:
-            turned[own] = faces[own][:, ::-1]
+            turned[is_of_item] = faces[is_of_item][:, ::-1]
     return turned
 
 

@@ -58,7 +58,7 @@ def _in_known_schema(text: str, path: Path) -> str:
     """
     named = _SCHEMA.search(text)
     schema = named[2].upper() if named else ""
-    near = next((known for begins, known in _SCHEMAS if schema.startswith(begins)), None)
+    near = next((known_name for begins, known_name in _SCHEMAS if schema.startswith(begins)), None)
     if named is None or near is None:
         hint = "export it as IFC2x3, IFC4 or IFC4x3"
         raise BadHouse(
@@ -103,10 +103,10 @@ def _check_step_file(data: bytes, path: Path) -> None:
 
 def _last_quote(data: bytes) -> int:
     """Where the string begins that does not end."""
-    at = 0
-    for found in _STRING.finditer(data):
-        at = found.end()
-    return data.find(b"'", at)
+    position = 0
+    for match in _STRING.finditer(data):
+        position = match.end()
+    return data.find(b"'", position)
 
 
 def _check_references(plain: bytes, path: Path) -> None:

@@ -89,9 +89,9 @@ def _read_line(key: str, words: list[str], raw: str, fields: dict[str, object]) 
             fields["uv_scale"] = _pair_of_option(options.get("-s"), 1.0)
             fields["uv_offset"] = _pair_of_option(options.get("-o"), 0.0)
         for option in options:
-            what = f"{option} {' '.join(options[option])}".lower()
-            if _noted_words() & {option, what}:
-                _add_unread(fields, f"{key} {what}")
+            setting = f"{option} {' '.join(options[option])}".lower()
+            if _noted_words() & {option, setting}:
+                _add_unread(fields, f"{key} {setting}")
     elif key in _noted_words() and words and (key != "ke" or any(_mtl_number(w) for w in words)):
         _add_unread(fields, key)
 
@@ -109,8 +109,8 @@ def _add_unread(fields: dict[str, object], what: str) -> None:
 
 def _pair_of_option(words: list[str] | None, default: float) -> tuple[float, float]:
     """The first two numbers after -s or -o; the default for missing ones."""
-    found = [_mtl_number(w) for w in (words or [])[:2]] + [None, None]
-    u, v = (default if value is None else value for value in found[:2])
+    values = [_mtl_number(w) for w in (words or [])[:2]] + [None, None]
+    u, v = (default if value is None else value for value in values[:2])
     return u, v
 
 
@@ -132,17 +132,17 @@ _OPTIONS = {"-s": 3, "-o": 3, "-t": 3, "-mm": 2, "-bm": 1, "-clamp": 1, "-blendu
 def _picture_of_line(words: list[str], raw: str) -> tuple[dict[str, list[str]], str]:
     """(option -> its arguments, picture name) of a map_ line; the name may contain spaces."""
     options: dict[str, list[str]] = {}
-    at = 0
-    while at < len(words) and words[at].lower() in _OPTIONS:
-        option = words[at].lower()
-        most, first = _OPTIONS[option], at + 1
-        at = first
-        while at - first < most and at < len(words):
-            if most > 1 and _mtl_number(words[at]) is None:
+    position = 0
+    while position < len(words) and words[position].lower() in _OPTIONS:
+        option = words[position].lower()
+        most, first = _OPTIONS[option], position + 1
+        position = first
+        while position - first < most and position < len(words):
+            if most > 1 and _mtl_number(words[position]) is None:
                 break
-            at += 1
-        options[option] = words[first:at]
-    return options, " ".join(words[at:]) if at else raw.split(None, 1)[1].strip()
+            position += 1
+        options[option] = words[first:position]
+    return options, " ".join(words[position:]) if position else raw.split(None, 1)[1].strip()
 
 
 def laid(mesh: Mesh, material: ObjMaterial | None) -> Mesh:

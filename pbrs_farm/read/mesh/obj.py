@@ -80,21 +80,21 @@ def parse_obj(data: bytes, file: str, *, max_triangles: int = 2_000_000) -> ObjM
     # Join continued lines.
     if b"\\\n" in data or b"\\\r\n" in data:
         data = data.replace(b"\\\r\n", b" ").replace(b"\\\n", b" ")
-    found = _statements(data)
+    statements = _statements(data)
     pools = (
-        _parse_rows(found.vertices, 3, file, "v"),
-        _parse_rows(found.uvs, 2, file, "vt"),
-        _parse_rows(found.normals, 3, file, "vn"),
+        _parse_rows(statements.vertices, 3, file, "v"),
+        _parse_rows(statements.uvs, 2, file, "vt"),
+        _parse_rows(statements.normals, 3, file, "vn"),
     )
     # Bound what n-gons triangulate to.
-    parts = found.parts.values()
+    parts = statements.parts.values()
     n_triangles = sum(max(0, len(x.split()) - 2) for p in parts for x in p.lines)
     if n_triangles > max_triangles:
         raise _too_many(file, n_triangles, b"", max_triangles)
     built = [_mesh_of_part(p, pools, file) for p in parts]
     meshes = tuple(mesh for mesh, _ in built if mesh is not None)
     n_dropped = sum(dropped for _, dropped in built)
-    return ObjModel(meshes, tuple(found.libraries), n_dropped, _is_cut(data))
+    return ObjModel(meshes, tuple(statements.libraries), n_dropped, _is_cut(data))
 
 
 def _is_cut(data: bytes) -> bool:
@@ -104,8 +104,8 @@ def _is_cut(data: bytes) -> bool:
 
 
 def _statements(data: bytes) -> _Statements:
-    found = _Statements()
-    pools = {b"v": found.vertices, b"vt": found.uvs, b"vn": found.normals}
+    statements = _Statements()
+    pools = {b"v": statements.vertices, b"vt": statements.uvs, b"vn": statements.normals}
     group, material, is_flat = "", "", False
     part: _Part | None = None  # where faces go, None after a change of group, material, shading
     for raw in data.splitlines():
@@ -115,10 +115,10 @@ def _statements(data: bytes) -> _Statements:
         elif key == b"f":
             if part is None:
                 name = (group, material, is_flat)
-                part = found.parts.setdefault(name, _Part(*name))
+                part = statements.parts.setdefault(name, _Part(*name))
             part.lines.append(rest)
             # Negative indices count back from the lines so far.
-            sizes = (len(found.vertices), len(found.uvs), len(found.normals))
+            sizes = (len(statements.vertices), len(statements.uvs), len(statements.normals))
             part.seen.append(sizes if b"-" in rest else (0, 0, 0))
         # A tab after a keyword: begin anew with blanks, which is faster than to split by both.
         elif b"\t" in key:
@@ -130,14 +130,14 @@ def _statements(data: bytes) -> _Statements:
         elif key == b"s":
             is_flat, part = rest.strip() in (b"off", b"0"), None
         elif key == b"mtllib":
-            found.libraries.append(_decoded_name(rest))
-    return found
+            statements.libraries.append(_decoded_name(rest))
+    return statements
 
 
 def _too_many(file: str, n: int, key: bytes, most: int) -> BadHouse:
-    what = "vertices" if key.startswith(b"\nv") else "triangles or more"
+    noun = "vertices" if key.startswith(b"\nv") else "triangles or more"
     return BadHouse(
-        file, "", f"{n} {what}, at most {most} triangles are read", hint="read.max_model_triangles"
+        file, "", f"{n} {noun}, at most {most} triangles are read", hint="read.max_model_triangles"
     )
 
 
@@ -197,24 +197,24 @@ def _indices(part: _Part, pools: tuple[F64, ...], file: str) -> I64:
         columns = 3
         flat = [c or b"0" for t in tokens for c in [*t.split(b"/"), b"0", b"0"][:3]]
     try:
-        given = np.array(flat).astype(np.int64).reshape(len(tokens), columns)
+        numbers = np.array(flat).astype(np.int64).reshape(len(tokens), columns)
     except (ValueError, OverflowError):
         lines = [line.replace(b"/", b" ") for line in part.lines]
         raise BadHouse(file, *_word_at_fault(lines, "f", int)) from None
     indices = np.zeros((len(tokens), 3), np.int64)
-    indices[:, :columns] = given
-    if (given < 0).any():
+    indices[:, :columns] = numbers
+    if (numbers < 0).any():
         # Negative indices are relative to the vertices read before the face.
         per_line = [len(x.split()) for x in part.lines]
-        seen = np.repeat(np.asarray(part.seen, np.int64).reshape(-1, 3), per_line, axis=0)
-        indices = np.where(indices < 0, indices + seen + 1, indices)
+        counts_before = np.repeat(np.asarray(part.seen, np.int64).reshape(-1, 3), per_line, axis=0)
+        indices = np.where(indices < 0, indices + counts_before + 1, indices)
     # A missing vertex is an error; missing textures and normals are tolerated.
-    for k, what in enumerate(("vertex", "texture", "normal")):
+    for k, noun in enumerate(("vertex", "texture", "normal")):
         low, high = int(indices[:, k].min()), int(indices[:, k].max())
         if low < (1 if k == 0 else 0) or high > len(pools[k]):
             if k == 0:
                 bad = low if low < 1 else high
-                text = f"{what} {bad} of {len(pools[k])} does not exist"
+                text = f"{noun} {bad} of {len(pools[k])} does not exist"
                 raise BadHouse(file, "an `f` line", text)
             indices[(indices[:, k] > len(pools[k])) | (indices[:, k] < 0), k] = 0
     return indices - 1

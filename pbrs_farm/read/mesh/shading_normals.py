@@ -65,8 +65,8 @@ def _smooth_links(welded: I64, unit: F64, min_cos: float) -> tuple[I64, I64]:
     # Sort the edges, so that those of one pair of vertices are neighbours.
     order = np.argsort(key, kind="stable")
     same = key[order[:-1]] == key[order[1:]]
-    one, other = order[:-1][same], order[1:][same]
+    first, second = order[:-1][same], order[1:][same]
     # Keep the pairs whose faces turn by less than the crease; edge k is of face k // 3.
-    is_smooth = (unit[one // 3] * unit[other // 3]).sum(1) >= min_cos
-    one, other = one[is_smooth], other[is_smooth]
-    return np.concatenate([low[one], high[one]]), np.concatenate([low[other], high[other]])
+    is_smooth = (unit[first // 3] * unit[second // 3]).sum(1) >= min_cos
+    first, second = first[is_smooth], second[is_smooth]
+    return np.concatenate([low[first], high[first]]), np.concatenate([low[second], high[second]])

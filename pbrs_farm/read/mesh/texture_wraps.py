@@ -81,8 +81,8 @@ def _cut_along(mesh: Mesh, axis: int, at: float) -> Mesh:
         return mesh
     # Turn each crossing triangle so that the corner alone on its side comes first.
     faces = mesh.faces[crosses].astype(np.int64)
-    own = sides[crosses]
-    alone = np.argmax(own == (own.sum(1) == 1)[:, None], axis=1)
+    is_on_side = sides[crosses]
+    alone = np.argmax(is_on_side == (is_on_side.sum(1) == 1)[:, None], axis=1)
     p, q, r = (np.take_along_axis(faces, ((alone + k) % 3)[:, None], 1)[:, 0] for k in range(3))
     n, k = len(mesh.positions), len(faces)
     a, b = n + np.arange(k), n + k + np.arange(k)
@@ -107,7 +107,7 @@ def _between(mesh: Mesh, axis: int, at: float, one: I64, other: I64) -> F64:
     rows = np.concatenate([mesh.positions, mesh.uvs, mesh.normals], axis=1)
     start, along = rows[first], rows[last] - rows[first]
     share = (at - start[:, 3 + axis]) / along[:, 3 + axis]
-    met = start + share[:, None] * along
-    length = np.linalg.norm(met[:, 5:], axis=1, keepdims=True)
-    met[:, 5:] /= np.where(length > 0, length, 1)
-    return np.asarray(met)
+    points = start + share[:, None] * along
+    length = np.linalg.norm(points[:, 5:], axis=1, keepdims=True)
+    points[:, 5:] /= np.where(length > 0, length, 1)
+    return np.asarray(points)

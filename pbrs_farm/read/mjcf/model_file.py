@@ -65,16 +65,16 @@ def read_mjcf(given: GivenFile, fields: ReadFields) -> House:
     model, data, collides = _compiled(given)
     scene = _Scene(model, data, collides, path.name, notes, fields)
     gltf = scene.gltf()
-    at = name.rpartition("/")[0]
-    mapping, rooms = (folder.name_from(at, beside) for beside in side_files(path))
-    own = folder.read(mapping, max_bytes=_MOST_JSON_BYTES)
+    parent = name.rpartition("/")[0]
+    mapping, rooms = (folder.name_from(parent, beside) for beside in side_files(path))
+    mapping_data = folder.read(mapping, max_bytes=_MOST_JSON_BYTES)
     return house_of_gltf(
         gltf,
         Source("mjcf", path.name, folder.sha256),
         path.stem,
         fields,
         notes,
-        mapping=Mapping() if own is None else mapping_from_json(own, mapping),
+        mapping=Mapping() if mapping_data is None else mapping_from_json(mapping_data, mapping),
         fetch=lambda number: png_of_texture(model, int(number)),
         rooms=folder.read(rooms, max_bytes=_MOST_JSON_BYTES),
     )
@@ -138,25 +138,25 @@ class _Scene:
     def _shown_geoms(self, collides: list[bool]) -> dict[int, list[int]]:
         """Body -> visible geoms; pure collision geoms are excluded if the item has visual ones."""
         model = self._model
-        found: dict[int, list[int]] = {}
+        shown: dict[int, list[int]] = {}
         for geom in range(model.ngeom):
             kind = mujoco.mjtGeom(int(model.geom_type[geom]))
             if is_shown(model, geom):
                 if kind in UNREAD_SHAPES:
                     self._unread[UNREAD_SHAPES[kind]] = self._unread.get(UNREAD_SHAPES[kind], 0) + 1
                 else:
-                    found.setdefault(int(model.geom_bodyid[geom]), []).append(geom)
+                    shown.setdefault(int(model.geom_bodyid[geom]), []).append(geom)
         # Visual geoms do not collide; items with visual geoms have separate colliders.
         drawn = {
             int(model.body_rootid[b])
-            for b, geoms in found.items()
+            for b, geoms in shown.items()
             if b and not all(collides[g] for g in geoms)
         }
         return {
             body: [g for g in geoms if not collides[g]]
             if int(model.body_rootid[body]) in drawn
             else geoms
-            for body, geoms in found.items()
+            for body, geoms in shown.items()
         }
 
     def gltf(self) -> Gltf:
@@ -209,12 +209,12 @@ class _Scene:
             return False
         if _names_room(name) and self._is_as_large_as_a_room(body):
             return True
-        seen = class_of_node_name(name)
-        if seen is not None and collection_of(name, seen) is None:
+        name_class = class_of_node_name(name)
+        if name_class is not None and collection_of(name, name_class) is None:
             return False
         below = self._children.get(body, [])
-        known = [b for b in below if class_of_node_name(self._body_name(b)) is not None]
-        return not self._geoms.get(body) and len(known) > 1
+        classified = [b for b in below if class_of_node_name(self._body_name(b)) is not None]
+        return not self._geoms.get(body) and len(classified) > 1
 
     def _is_as_large_as_a_room(self, body: int) -> bool:
         geoms = [g for b in self._below(body) for g in self._geoms.get(b, [])]
@@ -372,8 +372,8 @@ class _Scene:
         if model.geom_matid[geom] >= 0:
             names.append(name_of(model, _OBJECT.mjOBJ_MATERIAL, int(model.geom_matid[geom])))
         names = [name for name in names if name]
-        known = (name for name in names if class_of_node_name(name) is not None)
-        return next(known, names[0] if names else f"geom {geom}")
+        classified = (name for name in names if class_of_node_name(name) is not None)
+        return next(classified, names[0] if names else f"geom {geom}")
 
     def _bounds(self, geom: int) -> F64:
         """(2, 3) the corners of a geom's box along the model's axes."""

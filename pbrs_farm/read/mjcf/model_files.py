@@ -39,33 +39,35 @@ def files_of_model(folder: RootFolder, name: str) -> set[str]:
 
     Raises BadHouse for XML that cannot be read, and for a name that leads out of the root.
     """
-    found: set[str] = set()
+    names_read: set[str] = set()
     waiting = [(name, "")]  # with the folder that included files are named from
     while waiting:
-        own, base = waiting.pop()
-        if own in found:
+        file_name, base = waiting.pop()
+        if file_name in names_read:
             continue
-        found.add(own)
-        if len(found) > _MOST_FILES:
+        names_read.add(file_name)
+        if len(names_read) > _MOST_FILES:
             raise BadHouse(name, "", f"names more than {_MOST_FILES} files")
-        root = _parsed(folder, own)
-        at = base or posixpath.dirname(own)
+        root = _parsed(folder, file_name)
+        parent = base or posixpath.dirname(file_name)
         compilers = list(root.iter("compiler"))
         named = [str(c.get(key)) for c in compilers for key in _FOLDERS if c.get(key)]
-        folders = [at, *(posixpath.join(at, one) for one in named)]
+        folders = [parent, *(posixpath.join(parent, subfolder) for subfolder in named)]
         for row in root.iter():
             file = row.get("file")
             if not file:
                 continue
             is_model = row.tag in _MODELS
-            names = [_below(folder, f, file, own) for f in (folders[:1] if is_model else folders)]
-            there = [n for n in names if folder.path(n) is not None]
+            names = [
+                _below(folder, f, file, file_name) for f in (folders[:1] if is_model else folders)
+            ]
+            existing = [n for n in names if folder.path(n) is not None]
             if is_model:
                 # File names in an included file are relative to the including one.
-                waiting += [(n, at if row.tag == "include" else "") for n in there]
+                waiting += [(n, parent if row.tag == "include" else "") for n in existing]
             else:
-                found |= set(there)
-    return found
+                names_read |= set(existing)
+    return names_read
 
 
 def companions_of_mjcf(given: GivenFile, files: SourceFiles) -> str:

@@ -48,14 +48,14 @@ def find_models(paths: Sequence[Path]) -> list[ObjectModel]:
 
     Raises BadInput for a path that does not exist, holds no model or is a damaged library.
     """
-    found: dict[str, ObjectModel] = {}
+    models_by_id: dict[str, ObjectModel] = {}
     for path in paths:
         models = _models_at(path)
         if not models:
             raise BadInput(path, "", "no model found", hint="OBJ, GLB or .sh3f is looked for")
         for model in models:
-            found[model.id] = model
-    return [found[name] for name in sorted(found)]
+            models_by_id[model.id] = model
+    return [models_by_id[name] for name in sorted(models_by_id)]
 
 
 def pick_models(
@@ -67,11 +67,13 @@ def pick_models(
     no model has it. The choice depends on seed and ids alone: more models do not reorder the others.
     """
     # Refuse a category that no model has: a slip would give nothing, silently.
-    wanted = [c.strip().lower() for c in categories if c.strip()]
-    for category in wanted:
+    chosen_categories = [c.strip().lower() for c in categories if c.strip()]
+    for category in chosen_categories:
         if not any(_is_of(model, category) for model in models):
             raise BadInput("models", category, "no model of this category")
-    chosen = [m for m in models if not wanted or any(_is_of(m, c) for c in wanted)]
+    chosen = [
+        m for m in models if not chosen_categories or any(_is_of(m, c) for c in chosen_categories)
+    ]
     # Sort by a hash of seed and id: a random order, independent of the other models.
     chosen.sort(key=lambda m: hashlib.sha256(f"{seed}/{m.id}".encode()).digest())
     return chosen[:count]

@@ -97,8 +97,8 @@ def model_shape(model: ModelRef, fields: ReadFields) -> ModelShape:
         except BadHouse as error:
             raise BadInput(path, error.place, error.text, hint=error.hint) from None
     # Its class is the caller's category, whatever its nodes are called.
-    own = [note for note in notes.all() if note.kind != "unmapped-class"]
-    shape = replace(shape, notes=tuple(_with_file(note, path.name) for note in own))
+    kept_notes = [note for note in notes.all() if note.kind != "unmapped-class"]
+    shape = replace(shape, notes=tuple(_with_file(note, path.name) for note in kept_notes))
     return _check_shape_limits(path, _scaled(shape, model.scale), fields)
 
 
@@ -115,8 +115,8 @@ def companions_digest(path: Path) -> str:
     files, folder = SourceFiles(), RootFolder(path.parent)
     if _is_plain(path):
         return files.digest(folder, _pictures_of_ply(path))
-    own = ObjectModel(path.stem, path.stem, "", 0, path, path.parent)
-    return files.digest(folder, object_companions(own, files))
+    model = ObjectModel(path.stem, path.stem, "", 0, path, path.parent)
+    return files.digest(folder, object_companions(model, files))
 
 
 def _is_plain(path: Path) -> bool:
@@ -144,8 +144,8 @@ def _from_reader(
     path: Path, _data: bytes, model: ModelRef, fields: ReadFields, notes: Notes
 ) -> ModelShape:
     """glTF and OBJ go through the readers that know materials and hostile files."""
-    own = ObjectModel(model.id, model.id, model.category, model.nyu40, path, path.parent)
-    surfaces, library, _sha = model_surfaces(own, notes, fields)
+    object_model = ObjectModel(model.id, model.id, model.category, model.nyu40, path, path.parent)
+    surfaces, library, _sha = model_surfaces(object_model, notes, fields)
     return ModelShape(tuple(surfaces), library.materials, library.textures)
 
 
@@ -207,13 +207,13 @@ def _picture_of_ply(path: Path, library: MaterialLibrary, notes: Notes) -> Image
         text = f"names {len(names)} pictures; all of it has the last, {names[-1]}"
         notes.add("unread-part", path.name, text)
     name, folder = names[-1], RootFolder(path.parent)
-    found = library.texture(
+    picture = library.texture(
         name,
         name=name,
         place=path.name,
         load=lambda: folder.read(name, max_bytes=MAX_TEXTURE_BYTES),
     )
-    return None if found is None else Image.open(io.BytesIO(found.texture.data))
+    return None if picture is None else Image.open(io.BytesIO(picture.texture.data))
 
 
 def _normals_of(mesh: Any, data: bytes) -> Any:

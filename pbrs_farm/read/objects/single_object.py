@@ -164,9 +164,9 @@ def material_library(folder: RootFolder, name: str) -> str:
     """
     data = folder.read(name, max_bytes=MAX_SCENE_BYTES) or b""
     reference = posixpath.splitext(posixpath.basename(name))[0] + ".mtl"
-    at = data.find(b"mtllib ")
-    if at >= 0:
-        reference = data[at + 7 :].split(b"\n", 1)[0].decode("utf-8", "replace").strip()
+    start = data.find(b"mtllib ")
+    if start >= 0:
+        reference = data[start + 7 :].split(b"\n", 1)[0].decode("utf-8", "replace").strip()
     return folder.name_from(posixpath.dirname(name), reference)
 
 

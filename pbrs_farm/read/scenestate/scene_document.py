@@ -147,8 +147,8 @@ def scene_document(data: bytes, file: str, notes: Notes) -> SceneDocument:
     for i, raw in enumerate(arch.elements):
         place = f"scene.arch.elements[{i}]"
         raw = checked(dict, raw, file, place, error=BadHouse)
-        found = element_of(file, pictures.resolved(raw), place, arch.defaults)
-        if found is None:
+        element = element_of(file, pictures.resolved(raw), place, arch.defaults)
+        if element is None:
             notes.add(
                 "unknown-type", place, f"an element of the type {str(raw.get('type'))[:40]!r}"
             )
@@ -160,7 +160,7 @@ def scene_document(data: bytes, file: str, notes: Notes) -> SceneDocument:
         taken.add(name)
         elements.append(
             SceneElement(
-                name, _in_world(found, world_from_arch, arch_scale), _rooms_of_element(raw)
+                name, _in_world(element, world_from_arch, arch_scale), _rooms_of_element(raw)
             )
         )
     objects = []
@@ -216,13 +216,13 @@ def _rooms_of_element(raw: dict[str, Any]) -> tuple[str, ...]:
 
 
 def _types(arch: _Arch) -> dict[str, tuple[str, ...]]:
-    found: dict[str, tuple[str, ...]] = {}
+    words_of_id: dict[str, tuple[str, ...]] = {}
     for row in arch.rooms:
         if isinstance(row, dict) and row.get("id") is not None:
             types = row.get("types")
             words = tuple(str(t)[:60] for t in types[:8]) if isinstance(types, list) else ()
-            found[str(row["id"])[:60]] = words
-    return found
+            words_of_id[str(row["id"])[:60]] = words
+    return words_of_id
 
 
 class _Pictures:
@@ -239,25 +239,25 @@ class _Pictures:
         """The element with materials as arch.json has them, and its roomId as a text."""
         extra = {"extraHeight": raw["extra_height"]} if "extra_height" in raw else {}
         rows = raw.get("materials")
-        found = [self._material(row) for row in rows] if isinstance(rows, list) else []
-        if len(found) > 1 and str(found[0]["name"]).lower() in ("outside", "surface2"):
-            found.reverse()
+        materials = [self._material(row) for row in rows] if isinstance(rows, list) else []
+        if len(materials) > 1 and str(materials[0]["name"]).lower() in ("outside", "surface2"):
+            materials.reverse()
         # A thickness of 0 means not given.
         read = {k: v for k, v in raw.items() if not (k == "depth" and v in (0, None))}
-        return read | extra | {"materials": found, "roomId": "", "id": str(raw.get("id", ""))}
+        return read | extra | {"materials": materials, "roomId": "", "id": str(raw.get("id", ""))}
 
     def _material(self, row: Any) -> dict[str, Any]:
         row = row if isinstance(row, dict) else {}
         base = self._materials.get(str(row.get("materialId", "")), {})
         texture = _first(row, ("texture",)) or _first(base, ("texture", "map"))
         colour = row.get("diffuse") or base.get("diffuse") or base.get("color")
-        found = {"name": str(row.get("name", ""))}
+        material = {"name": str(row.get("name", ""))}
         if isinstance(colour, str) and colour.startswith("#"):
-            found["diffuse"] = colour
+            material["diffuse"] = colour
         if texture or ("materialId" in row and not colour):
-            found["texture"] = self._name(texture or str(row["materialId"]))
-            found.pop("diffuse", None)
-        return found
+            material["texture"] = self._name(texture or str(row["materialId"]))
+            material.pop("diffuse", None)
+        return material
 
     def _name(self, texture: str) -> str:
         if texture not in self._names:
@@ -269,11 +269,11 @@ class _Pictures:
 
 
 def _by_id(rows: Sequence[Any]) -> dict[str, dict[str, Any]]:
-    found: dict[str, dict[str, Any]] = {}
+    rows_of_id: dict[str, dict[str, Any]] = {}
     for row in rows:
         if isinstance(row, dict) and (name := _first(row, ("id", "uuid", "name"))):
-            found.setdefault(name, row)
-    return found
+            rows_of_id.setdefault(name, row)
+    return rows_of_id
 
 
 def _first(row: dict[str, Any], names: tuple[str, ...]) -> str:

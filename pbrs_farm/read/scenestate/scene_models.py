@@ -101,30 +101,30 @@ class SceneModels:
     def item(self, one: PlacedModel, item_id: str) -> Item | None:
         """The object as an item; as a box where its model is missing; None where nothing is known."""
         row = self._rows.get(one.model)
-        seen = class_by_words(row.category) if row else None
+        row_class = class_by_words(row.category) if row else None
         surfaces = self._surfaces(one.model, one.place)
         if not surfaces:
-            return self._box_only(one, row, seen, item_id)
+            return self._box_only(one, row, row_class, item_id)
         meshes = [_mesh_of_surface(s) for s in surfaces]
         world = one.world_from_scene @ one.scene_from_model @ _scene_from_file(one, meshes)
-        found = [
+        all_surfaces = [
             placed(m, world, name=s.name, material=s.material)
             for m, s in zip(meshes, surfaces, strict=True)
         ]
-        kept = tuple(s for s in found if s is not None)
-        if not kept:
+        surfaces_kept = tuple(s for s in all_surfaces if s is not None)
+        if not surfaces_kept:
             self._notes.add("empty-model", one.place, f"{one.model} has no area; left out")
             return None
-        seen = seen or GivenClass("object", OTHERPROP)
-        kind = ItemKind.OBJECT if seen.kind in _STRUCTURE else seen.item_kind
+        row_class = row_class or GivenClass("object", OTHERPROP)
+        kind = ItemKind.OBJECT if row_class.kind in _STRUCTURE else row_class.item_kind
         name = row.category if row else one.model
         item = Item(
             id=item_id,
             name=name.replace("_", " "),
             kind=kind,
             level_id="0",
-            surfaces=kept,
-            nyu40=seen.nyu40,
+            surfaces=surfaces_kept,
+            nyu40=row_class.nyu40,
             source_class=f"{one.source}.{one.model}",
             box=oriented_box(meshes, world),
             tags=("mirrored",) if np.linalg.det(world[:3, :3]) < 0 else (),
@@ -178,10 +178,10 @@ class SceneModels:
 
     def _parsed(self, data: bytes, name: str) -> tuple[Surface, ...]:
         gltf = gltf_document(data, name, lambda _name: None)
-        own = Notes(name, strict=False)
-        materials = SceneMaterials(gltf, lambda _name: None, own)
-        items = list(items_of_scene(gltf, Mapping(), materials, own, self._fields))
-        for note in own.all():
+        model_notes = Notes(name, strict=False)
+        materials = SceneMaterials(gltf, lambda _name: None, model_notes)
+        items = list(items_of_scene(gltf, Mapping(), materials, model_notes, self._fields))
+        for note in model_notes.all():
             if note.kind not in HARMLESS and note.kind != "outer-side":
                 self._notes.add(note.kind, f"{name} {note.place}", note.text)
         numbers = self._library.adopted(materials.library)
@@ -204,15 +204,15 @@ def _scene_from_file(one: PlacedModel, meshes: list[Mesh]) -> F64:
     up = one.up if one.asset.align.up is None else one.asset.align.up
     front = one.front if one.asset.align.front is None else one.asset.align.front
     lengths = [float(np.linalg.norm(v)) for v in (up, front)]
-    found = np.eye(4)
+    matrix = np.eye(4)
     if min(lengths) > 1e-9 and abs(up @ front) < 1e-3 * lengths[0] * lengths[1]:
         up, front = up / lengths[0], front / lengths[1]
-        found[:3, :3] = np.stack([np.cross(up, front), up, front], 1) / one.asset.scale
+        matrix[:3, :3] = np.stack([np.cross(up, front), up, front], 1) / one.asset.scale
     if one.asset.centre is not None:
-        points = np.concatenate([m.positions for m in meshes]) @ found[:3, :3].T
+        points = np.concatenate([m.positions for m in meshes]) @ matrix[:3, :3].T
         low, high = points.min(0), points.max(0)
-        found[:3, 3] = -(low + one.asset.centre * (high - low))
-    return found
+        matrix[:3, 3] = -(low + one.asset.centre * (high - low))
+    return matrix
 
 
 def _find_objects_csv(roots: list[RootFolder]) -> dict[str, _Row]:
@@ -230,7 +230,7 @@ def _find_objects_csv(roots: list[RootFolder]) -> dict[str, _Row]:
 
 def _parse_objects_csv(data: bytes) -> dict[str, _Row]:
     rows = csv.reader(io.StringIO(text_from_bytes(data, "replace")))
-    found: dict[str, _Row] = {}
+    rows_of_id: dict[str, _Row] = {}
     try:
         head = [h.strip().lower() for h in next(rows, [])]
         at_id = head.index("id") if "id" in head else 0
@@ -239,10 +239,10 @@ def _parse_objects_csv(data: bytes) -> dict[str, _Row]:
         for row in rows:
             if len(row) > max(at_id, at_category) and row[at_category].strip():
                 size = _parse_size_cm(row[at_size]) if 0 <= at_size < len(row) else None
-                found[row[at_id].strip()] = _Row(row[at_category].strip(), size)
+                rows_of_id[row[at_id].strip()] = _Row(row[at_category].strip(), size)
     except csv.Error:
-        return found
-    return found
+        return rows_of_id
+    return rows_of_id
 
 
 def _parse_size_cm(text: str) -> tuple[float, float, float] | None:

@@ -113,21 +113,21 @@ def _object_items(
     fields: ReadFields,
 ) -> tuple[list[Item], str]:
     """The objects, and what to say of those that have neither a model nor a known class."""
-    found = SceneModels(roots_of(path, models), shell.materials.library, notes, fields)
+    models_read = SceneModels(roots_of(path, models), shell.materials.library, notes, fields)
     items = []
     n_faces = 0
-    for k, one in enumerate(document.objects):
-        item = found.item(one, f"object_{k}")
+    for k, placed in enumerate(document.objects):
+        item = models_read.item(placed, f"object_{k}")
         if item is None:
             continue
         n_faces += item.n_faces
         if n_faces > fields.max_triangles:
             text = f"more than {fields.max_triangles} triangles"
-            raise BadHouse(path.name, one.place, text, hint="limit: read.max_triangles")
+            raise BadHouse(path.name, placed.place, text, hint="limit: read.max_triangles")
         items.append(item)
-    if not found.missing:
+    if not models_read.missing:
         return items, ""
-    n, most = sum(found.missing.values()), found.missing.most_common(1)[0][0]
+    n, most = sum(models_read.missing.values()), models_read.missing.most_common(1)[0][0]
     return (
         items,
         f"{n} objects are left out: no model ({most}.glb) and no objects.csv; --models DIR",
@@ -144,9 +144,9 @@ def _check_number(document: SceneDocument, file: str) -> None:
         (n_slabs, MAX_SLABS, "slabs"),
         (n_holes, MAX_HOLES, "holes"),
     )
-    for n, most, what in counts:
+    for n, most, noun in counts:
         if n > most:
-            raise BadHouse(file, "scene.arch.elements", f"{n} {what}, at most {most} are read")
+            raise BadHouse(file, "scene.arch.elements", f"{n} {noun}, at most {most} are read")
 
 
 def _sort_by_name_or_place(
@@ -154,12 +154,12 @@ def _sort_by_name_or_place(
 ) -> Item:
     """The item with its level and room, by the room's name in the file, else by position."""
     box = item.oriented_box if item.surfaces or item.box else None
-    at = np.zeros(3) if box is None else box.centre
-    low = at[1] if box is None else float(box.corners[:, 1].min())
+    centre = np.zeros(3) if box is None else box.centre
+    low = centre[1] if box is None else float(box.corners[:, 1].min())
     level = builder.level_of(low + (0.1 if item.kind is not ItemKind.CEILING else -1.0))
     room_id = id_of_room.get(item.room_id) if item.room_id is not None else None
     if item.room_id is None and not item.kind.is_structure:
-        room_id = builder.room_at(at)
+        room_id = builder.room_at(centre)
     tags = tuple(_renamed(tag, id_of_room) for tag in item.tags)
     return replace(item, level_id=level, room_id=room_id, tags=tags)
 
@@ -207,14 +207,16 @@ class _Shell:
 
     def walls(self) -> list[Item]:
         """An item for each wall."""
-        found = []
+        items = []
         for wall in self._standing:
             surfaces = wall_surfaces(_AS_IT_STANDS, wall.element, wall.frame, self.materials)
             if surfaces:
-                own = wall.rooms[0] if len(wall.rooms) == 1 else None
+                only_room = wall.rooms[0] if len(wall.rooms) == 1 else None
                 tags = tuple(f"boundary_of:{room}" for room in wall.rooms)
-                found.append(_scene_structure_item(wall.id, ItemKind.WALL, surfaces, own, tags))
-        return found
+                items.append(
+                    _scene_structure_item(wall.id, ItemKind.WALL, surfaces, only_room, tags)
+                )
+        return items
 
     def rooms(self, file: str) -> tuple[list[Room], list[Item]]:
         """The rooms in the file's order, and their floors and ceilings."""
@@ -233,10 +235,10 @@ class _Shell:
             if floors is None:
                 self._notes.add("empty-room", f"room {name}", "has no floor; left out")
                 continue
-            found = self._room(name, floors, ceilings, walls)
-            if found is not None:
-                rooms.append(found[0])
-                parts += found[1]
+            built = self._room(name, floors, ceilings, walls)
+            if built is not None:
+                rooms.append(built[0])
+                parts += built[1]
         if not rooms:
             hint = "rooms follow from elements of the type Floor"
             raise BadHouse(file, "scene.arch.elements", "has no floor", hint=hint)
@@ -254,10 +256,10 @@ class _Shell:
         walls: list[tuple[StandingWall, Surface]],
     ) -> tuple[Room, list[Item]] | None:
         parts = []
-        for k, one in enumerate(floors):
-            surfaces = slab_surfaces(_AS_IT_STANDS, one.element, self.materials)
+        for k, floor in enumerate(floors):
+            surfaces = slab_surfaces(_AS_IT_STANDS, floor.element, self.materials)
             if surfaces:
-                item_id = one.id if k == 0 else f"{one.id}.{k}"
+                item_id = floor.id if k == 0 else f"{floor.id}.{k}"
                 parts.append(_scene_structure_item(item_id, ItemKind.FLOOR, surfaces, name))
         faces = [s for part in parts for s in part.surfaces]
         low = floor_height(faces)
@@ -278,11 +280,11 @@ class _Shell:
             if shape.intersection(area).area > 0.3 * area.area
             and float(e.element.points[0][:, 1].min()) > low + 1.0
         ]
-        own = [e for e in ceilings if name in e[0].rooms]
+        own_ceilings = [e for e in ceilings if name in e[0].rooms]
         tops = sorted(w.frame.start[1] + w.element.height_m for w, _ in near)
         top = float(tops[len(tops) // 2]) if tops else low + _STOREY_M
-        if own:
-            for e, _ in own:
+        if own_ceilings:
+            for e, _ in own_ceilings:
                 surfaces = slab_surfaces(_AS_IT_STANDS, e.element, self.materials)
                 parts += (
                     [_scene_structure_item(e.id, ItemKind.CEILING, surfaces, name)]
@@ -290,11 +292,13 @@ class _Shell:
                     else []
                 )
         elif not above:
-            for k, one in enumerate(floors):
-                made = _ceiling_over(one.element, max(top, low + 1.0))
-                surfaces = slab_surfaces(_AS_IT_STANDS, made, self.materials)
+            for k, floor in enumerate(floors):
+                ceiling = _ceiling_over(floor.element, max(top, low + 1.0))
+                surfaces = slab_surfaces(_AS_IT_STANDS, ceiling, self.materials)
                 parts.append(
-                    _scene_structure_item(f"{one.id}_ceiling{k}", ItemKind.CEILING, surfaces, name)
+                    _scene_structure_item(
+                        f"{floor.id}_ceiling{k}", ItemKind.CEILING, surfaces, name
+                    )
                 )
         else:
             for e in above:
@@ -319,13 +323,13 @@ class _Shell:
 
     def holes(self, rooms: Sequence[Room]) -> list[Hole]:
         """The holes of all walls, clipped to them, each once."""
-        found = []
+        holes_found = []
         for wall in self._drawn:
             for k, hole in enumerate(wall.element.holes):
                 kind = wall.element.hole_types[k] if k < len(wall.element.hole_types) else ""
-                one = self._hole(wall, k, hole, kind, rooms)
-                found += [one] if one is not None else []
-        return merge_holes(found)
+                clipped_hole = self._hole(wall, k, hole, kind, rooms)
+                holes_found += [clipped_hole] if clipped_hole is not None else []
+        return merge_holes(holes_found)
 
     def _hole(
         self,
@@ -349,10 +353,10 @@ class _Shell:
         centre = frame.start + frame.axes @ [(u0 + u1) / 2, (v0 + v1) / 2, e.depth_m / 2]
         # A door begins at the floor, not below it.
         foot = float(frame.start[1] + v0)
-        here = next((r.floor_y for r in rooms if r.id == room_at(rooms, centre)), foot)
-        if not is_window and foot < here < foot + 0.3:
-            centre = centre + np.array([0.0, (here - foot) / 2, 0.0])
-            v0 += here - foot
+        floor_y = next((r.floor_y for r in rooms if r.id == room_at(rooms, centre)), foot)
+        if not is_window and foot < floor_y < foot + 0.3:
+            centre = centre + np.array([0.0, (floor_y - foot) / 2, 0.0])
+            v0 += floor_y - foot
         return Hole(
             id=f"{wall.id}_{'window' if is_window else 'door'}{k}",
             kind="window" if is_window else "door",

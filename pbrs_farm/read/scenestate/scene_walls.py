@@ -45,7 +45,7 @@ def standing_walls(
     """
     tree = shapely.STRtree(list(floors.values()))
     names = list(floors)
-    drawn = [w for one in elements if (w := _stand_wall(one, tree, names)) is not None]
+    drawn = [w for element in elements if (w := _stand_wall(element, tree, names)) is not None]
     lines: dict[tuple[int, int], list[int]] = defaultdict(list)
     for k, wall in enumerate(drawn):
         if wall.is_between:
@@ -68,16 +68,18 @@ def _stand_wall(one: SceneElement, tree: Any, names: list[str]) -> StandingWall 
     if length < _SAME_M or e.height_m <= 0:
         return None
     along /= length
-    left = np.array([along[2], 0.0, -along[0]])
-    sides = [_rooms_beside(start, end, sign * left, tree, names) for sign in (1, -1)]
-    own = [bool(set(side) & set(one.rooms)) for side in sides]
+    leftward = np.array([along[2], 0.0, -along[0]])
+    sides = [_rooms_beside(start, end, sign * leftward, tree, names) for sign in (1, -1)]
+    is_own_side = [bool(set(side) & set(one.rooms)) for side in sides]
     is_between = len(one.rooms) > 1 or all(sides)
     # Outward from the first room that lists it, else from the adjacent floor.
-    is_left_in = own[0] if own[0] != own[1] else bool(sides[0]) and not sides[1]
+    is_left_in = (
+        is_own_side[0] if is_own_side[0] != is_own_side[1] else bool(sides[0]) and not sides[1]
+    )
     first = one.rooms[:1]
-    if is_between and first and own == [True, True]:
+    if is_between and first and is_own_side == [True, True]:
         is_left_in = first[0] in sides[0]
-    outward = -left if is_left_in else left
+    outward = -leftward if is_left_in else leftward
     if is_between:
         start = start - outward * e.depth_m / 2
     up = np.array([0.0, 1.0, 0.0])
@@ -121,22 +123,24 @@ def _united(
     pieces: dict[int, list[tuple[float, float, tuple[int, ...]]]] = {k: [] for k in on_line}
     for low, high in pairwise(cuts):
         middle = (low + high) / 2
-        here = tuple(k for k in on_line if spans[k][0] < middle < spans[k][1])
-        here = tuple(k for k in here if _same_height(drawn[k], drawn[here[0]]))
-        if not here:
+        on_span = tuple(k for k in on_line if spans[k][0] < middle < spans[k][1])
+        on_span = tuple(k for k in on_span if _same_height(drawn[k], drawn[on_span[0]]))
+        if not on_span:
             continue
-        runs = pieces[here[0]]
-        if runs and runs[-1][2] == here and low - runs[-1][1] < _SAME_M:
-            runs[-1] = (runs[-1][0], high, here)
+        runs = pieces[on_span[0]]
+        if runs and runs[-1][2] == on_span and low - runs[-1][1] < _SAME_M:
+            runs[-1] = (runs[-1][0], high, on_span)
         else:
-            runs.append((low, high, here))
-    found = []
+            runs.append((low, high, on_span))
+    pieces_of_wall = []
     for k in on_line:
         runs = pieces[k]
         # A wall listed by one room only keeps its id and its ends.
         whole = len(runs) == 1 and runs[0][2] == (k,)
-        found.append((k, [drawn[k]] if whole else _cut_at_crossings(drawn, k, runs, origin, axis)))
-    return found
+        pieces_of_wall.append(
+            (k, [drawn[k]] if whole else _cut_at_crossings(drawn, k, runs, origin, axis))
+        )
+    return pieces_of_wall
 
 
 def _span(wall: StandingWall, origin: F64, axis: F64) -> tuple[float, float]:
@@ -159,11 +163,11 @@ def _cut_at_crossings(
 ) -> list[StandingWall]:
     wall = drawn[k]
     e, axes = wall.element, wall.frame.axes
-    found = []
-    for number, (low, high, here) in enumerate(runs):
-        others = [drawn[j] for j in here if j != k]
+    cut_walls = []
+    for number, (low, high, numbers) in enumerate(runs):
+        other_walls = [drawn[j] for j in numbers if j != k]
         # The other room's inside paint is this wall's outside paint.
-        back = next((o for o in others if o.frame.axes[:, 2] @ axes[:, 2] < 0), None)
+        back = next((o for o in other_walls if o.frame.axes[:, 2] @ axes[:, 2] < 0), None)
         overrides = e.overrides
         if back is not None and back.element.overrides and e.overrides:
             overrides = (e.overrides[0], back.element.overrides[0])
@@ -171,8 +175,8 @@ def _cut_at_crossings(
         ends = [low, high] if float(axes[:, 0] @ axis) > 0 else [high, low]
         offset = (origin - wall.frame.start) @ axes[:, 0]
         start = wall.frame.start + axes[:, 0] * (offset + ends[0] * float(axes[:, 0] @ axis))
-        top = max(w.frame.start[1] + w.element.height_m for w in (wall, *others))
-        depth = max(w.element.depth_m for w in (wall, *others))
+        top = max(w.frame.start[1] + w.element.height_m for w in (wall, *other_walls))
+        depth = max(w.element.depth_m for w in (wall, *other_walls))
         start = start + axes[:, 2] * (e.depth_m - depth) / 2
         piece = replace(
             e,
@@ -182,9 +186,9 @@ def _cut_at_crossings(
             holes=(),
             hole_types=(),
         )
-        rooms = tuple(dict.fromkeys(r for w in (wall, *others) for r in w.rooms))
+        rooms = tuple(dict.fromkeys(r for w in (wall, *other_walls) for r in w.rooms))
         name = wall.id if number == 0 else f"{wall.id}.{number}"
-        found.append(
+        cut_walls.append(
             StandingWall(name, piece, WallFrame(start, axes, high - low), rooms, is_between=True)
         )
-    return found
+    return cut_walls

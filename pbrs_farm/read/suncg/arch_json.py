@@ -45,12 +45,12 @@ def arch_from_json(data: bytes, file: str) -> Arch:
     """The elements of arch.json by room; BadHouse, naming the invalid element."""
     hint = "an arch.json has a list of elements"
     document = checked(_Document, json_from_bytes(data, file), file, error=BadHouse, hint=hint)
-    found: dict[str, list[Element]] = {}
+    elements: dict[str, list[Element]] = {}
     for i, raw in enumerate(document.elements):
         element = element_of(file, raw, f"element {i}", document.defaults)
         if element is not None:
-            found.setdefault(element.room_id, []).append(element)
-    return Arch(document.world_from_house(file), found)
+            elements.setdefault(element.room_id, []).append(element)
+    return Arch(document.world_from_house(file), elements)
 
 
 class _Document(Axes):
@@ -88,7 +88,7 @@ def arch_openings(
     arch: Arch, rooms: Iterable[tuple[Node, str]], items: Sequence[Item]
 ) -> tuple[Opening, ...]:
     """The holes of the walls of (node, room id), each with its door or window."""
-    found = []
+    results = []
     for node, room_id in rooms:
         for item_id, e, outline in _elements_of(arch, node, room_id):
             frame = wall_frame(e, outline)
@@ -96,15 +96,15 @@ def arch_openings(
                 continue
             for k, hole in enumerate(e.holes):
                 opening = opening_of_hole(arch, e, frame, hole, f"{item_id}_hole{k}", node.level_id)
-                found += [_with_leaf(opening, items)] if opening is not None else []
-    return tuple(found)
+                results += [_with_leaf(opening, items)] if opening is not None else []
+    return tuple(results)
 
 
 def _elements_of(arch: Arch, node: Node, room_id: str) -> Iterator[tuple[str, Element, F64 | None]]:
     """(item id, element, outline of the room's floor) of every element that is not hidden."""
     # Find the node's elements by its id, else by the room its model names.
-    known = _MODEL_ROOM.fullmatch(node.model_id)
-    named = [node.id, *([f"{known[1]}_{known[2]}"] if known else [])]
+    match = _MODEL_ROOM.fullmatch(node.model_id)
+    named = [node.id, *([f"{match[1]}_{match[2]}"] if match else [])]
     elements = next((arch.elements[n] for n in named if n in arch.elements), [])
     outline = next((e.points[0] for e in elements if e.kind == "Floor"), None)
     # Skip elements hidden by the node; wall numbers count the remaining ones.

@@ -77,15 +77,15 @@ def with_emitting_bulbs(
             LightPart(triple(c), r, ASSUMED_WATT, PowerUnit.WATT, share, emitting=(b,))
             for c, r, b in zip(centres, radii, bulbs, strict=True)
         )
-    at = np.array([light.position for light in lights])
+    positions = np.array([light.position for light in lights])
     # Give every bulb to its nearest light; a light left without shares its nearest bulb.
-    distance = np.linalg.norm(at[:, None] - centres[None], axis=2)
+    distance = np.linalg.norm(positions[:, None] - centres[None], axis=2)
     light_of_bulb = distance.argmin(0)
-    found = []
+    results = []
     for k, light in enumerate(lights):
         mine = np.flatnonzero(light_of_bulb == k)
         if not len(mine):
             mine = np.array([distance[k].argmin()])
         emitting = tuple(bulbs[int(m)] for m in mine)
-        found.append(replace(light, radius_m=radii[int(mine[0])], emitting=emitting))
-    return tuple(found)
+        results.append(replace(light, radius_m=radii[int(mine[0])], emitting=emitting))
+    return tuple(results)

@@ -105,11 +105,11 @@ def _parse_csv(name: str, data: bytes) -> list[dict[str, str]]:
 
 
 def _read_class_table(folder: RootFolder, notes: Notes) -> dict[str, ModelClass]:
-    found = _find_light_table(folder, *CLASS_TABLES)
-    if found is None:
+    table = _find_light_table(folder, *CLASS_TABLES)
+    if table is None:
         notes.add("missing-table", "metadata/ModelCategoryMapping.csv", "every object is otherprop")
         return {}
-    return {row["model_id"]: _class(row) for row in _parse_csv(*found) if row.get("model_id")}
+    return {row["model_id"]: _class(row) for row in _parse_csv(*table) if row.get("model_id")}
 
 
 def _class(row: dict[str, str]) -> ModelClass:
@@ -131,20 +131,20 @@ def _class(row: dict[str, str]) -> ModelClass:
 
 
 def _variants(folder: RootFolder) -> dict[str, tuple[str, ...]]:
-    found = _find_light_table(folder, VARIANT_TABLE)
-    if found is None:
+    table = _find_light_table(folder, VARIANT_TABLE)
+    if table is None:
         return {}
-    rows = [(row.get("id", ""), row.get("variantIds", "")) for row in _parse_csv(*found)]
+    rows = [(row.get("id", ""), row.get("variantIds", "")) for row in _parse_csv(*table)]
     return {model: tuple(v.strip() for v in ids.split(",")) for model, ids in rows if ids}
 
 
 def _lamps(folder: RootFolder, notes: Notes) -> dict[str, LampMaterials]:
-    found = _find_light_table(folder, LAMP_TABLE)
-    if found is None:
+    table = _find_light_table(folder, LAMP_TABLE)
+    if table is None:
         text = "no lamp's bulb material is known; repair adds bulbs"
         notes.add("missing-table", "metadata/light_geometry_compact.txt", text)
         return {}
-    name, data = found
+    name, data = table
     lamps = {}
     for number, line in enumerate(text_from_bytes(data, "replace").splitlines(), 1):
         words = line.split()
@@ -179,13 +179,13 @@ def _material_position(word: str) -> int:
 
 
 def _read_light_table(folder: RootFolder, notes: Notes) -> dict[str, tuple[LightPart, ...]]:
-    found = _find_light_table(folder, LIGHT_TABLE)
-    if found is None:
+    table_file = _find_light_table(folder, LIGHT_TABLE)
+    if table_file is None:
         text = "no lamp's light is known; bulbs get an assumed power"
         notes.add("missing-table", "metadata/suncgModelLights.json", text)
         return {}
     # Rows are model id -> its lamps; values that are not lists are ignored.
-    name, data = found
+    name, data = table_file
     table = checked(dict, json_from_bytes(data, name), name, error=BadHouse)
     return {
         model: tuple(

@@ -46,9 +46,9 @@ def _areas_of_slots(model: ParsedModel, across: int) -> dict[int, list[float]]:
         normals = area_vectors(triangle_corners(mesh.positions, mesh.faces))
         area = np.linalg.norm(normals, axis=1)
         flat = np.abs(normals[:, across]) >= _FLAT_COS * area
-        found = areas.setdefault(slot, [0.0, 0.0])
-        found[0] += float(area.sum())
-        found[1] += float(area[flat].sum())
+        sums = areas.setdefault(slot, [0.0, 0.0])
+        sums[0] += float(area.sum())
+        sums[1] += float(area[flat].sum())
     return areas
 
 

@@ -59,25 +59,25 @@ class ReaderContext:
 def object_item(context: ReaderContext, node: Node, room_id: str | None) -> Item | None:
     """An Object node; None (with a note) where its model is missing or has no area."""
     try:
-        found = _object_model(context, node)
+        loaded = _object_model(context, node)
     except DamagedModel as error:
         # A library is shared by many houses: one damaged model costs its objects only.
         context.notes.add("unreadable-model", node.place, f"{error.message}; left out")
         return None
-    if found is None:
+    if loaded is None:
         text = f"object/{node.model_id} does not exist; left out"
         context.notes.add("missing-model", node.place, text)
         return None
-    variant, model = found
-    known = _row_of_model(context.tables.classes, variant, node.model_id)
-    seen = known or ModelClass(node.model_id, OTHERPROP, ItemKind.OBJECT)
-    if known is None and context.tables.classes:
+    variant, model = loaded
+    model_row = _row_of_model(context.tables.classes, variant, node.model_id)
+    model_class = model_row or ModelClass(node.model_id, OTHERPROP, ItemKind.OBJECT)
+    if model_row is None and context.tables.classes:
         text = "is not in ModelCategoryMapping.csv; it is otherprop"
         context.notes.add("unmapped-class", f"object/{node.model_id}", text)
     # Place the meshes; bulbs stay apart, so that lights can own them.
     lamp = _row_of_model(context.tables.lamps, variant, node.model_id) or LampMaterials((), ())
     world_from_model = context.world_from_house @ node.house_from_model
-    surfaces, bulbs = _surfaces_and_bulbs(context, node, model, seen, lamp)
+    surfaces, bulbs = _surfaces_and_bulbs(context, node, model, model_class, lamp)
     if not surfaces:
         context.notes.add(
             "empty-model", node.place, f"object/{node.model_id} has no area; left out"
@@ -91,16 +91,16 @@ def object_item(context: ReaderContext, node: Node, room_id: str | None) -> Item
         placed_lights = with_emitting_bulbs(in_world, surfaces, bulbs)
     return Item(
         id=node.id,
-        name=seen.name.replace("_", " ") or node.model_id,
-        kind=seen.kind,
+        name=model_class.name.replace("_", " ") or node.model_id,
+        kind=model_class.kind,
         level_id=node.level_id,
         surfaces=surfaces,
-        nyu40=seen.nyu40,
+        nyu40=model_class.nyu40,
         source_class=node.model_id,
         room_id=room_id,
         lights=placed_lights,
         box=oriented_box(model.meshes, world_from_model),
-        tags=_tags(context, node, seen, is_known=known is not None),
+        tags=_tags(context, node, model_class, is_known=model_row is not None),
     )
 
 
@@ -257,7 +257,7 @@ def room_surfaces(
         context.notes.add("missing-room-part", node.place, f"{base}.obj does not exist")
         return []
     # Place each mesh; one that has no area in single precision is left out.
-    found = []
+    surfaces = []
     for mesh, slot in zip(model.meshes, model.slots, strict=True):
         mtl = model.mtl[slot] if slot >= 0 else None
         material = _room_material(context, node, mtl, default_walls=default_walls)
@@ -265,8 +265,8 @@ def room_surfaces(
         name = f"{mesh.group} {mesh.material}".strip()
         surface = placed(mesh, context.world_from_house, name=name, material=index)
         if surface is not None:
-            found.append((mesh.group, surface))
-    return found
+            surfaces.append((mesh.group, surface))
+    return surfaces
 
 
 def _room_material(
@@ -294,8 +294,8 @@ def room_items(context: ReaderContext, node: Node, room_id: str) -> Iterator[Ite
     walls: dict[str, list[Surface]] = {}
     if "Walls" not in node.hidden:
         for group, surface in room_surfaces(context, node, "w", default_walls=True):
-            found = _WALL_GROUP.fullmatch(group)
-            walls.setdefault(found[1] if found else "", []).append(surface)
+            match = _WALL_GROUP.fullmatch(group)
+            walls.setdefault(match[1] if match else "", []).append(surface)
     for number, parts_of_wall in walls.items():
         yield _suncg_structure_item(
             node, room_id, f"w{number}", ItemKind.WALL, tuple(parts_of_wall)

@@ -205,8 +205,8 @@ def _contents(
                 raise BadHouse(file, node.place, text, hint="limit: read.max_triangles")
             items.append(replace(item, id=unique))
     # Clear the room of items whose room was left out.
-    known = {room.id for room in rooms}
-    return rooms, [i if i.room_id in known else replace(i, room_id=None) for i in items]
+    room_ids = {room.id for room in rooms}
+    return rooms, [i if i.room_id in room_ids else replace(i, room_id=None) for i in items]
 
 
 def _unique(name: str, taken: set[str]) -> str:
@@ -256,7 +256,7 @@ def _room_nodes(record: HouseRecord) -> Iterator[tuple[Node, str]]:
 def _room_of_index(context: ReaderContext, number: int, nodes: tuple[Node, ...]) -> dict[int, str]:
     """The room of every node that one lists; the first wins, rooms are never inside rooms."""
     kinds = {node.index: node.kind for node in nodes}
-    found: dict[int, str] = {}
+    rooms: dict[int, str] = {}
     for node in nodes:
         for index in node.members if node.kind == "Room" else ():
             if kinds.get(index) == "Room":
@@ -264,8 +264,8 @@ def _room_of_index(context: ReaderContext, number: int, nodes: tuple[Node, ...])
                     "room-in-room", node.place, f"lists node {index}, a room; ignored"
                 )
             elif index in kinds:
-                found.setdefault(index, _room_id_of_node(number, node))
-    return found
+                rooms.setdefault(index, _room_id_of_node(number, node))
+    return rooms
 
 
 def _check_extent(item: Item, node: Node, fields: ReadFields, file: str) -> None:
@@ -323,10 +323,10 @@ def _levels_in_use(record: HouseRecord, rooms: list[Room], items: list[Item]) ->
 
 def _level(level_id: str, rooms: list[Room], items: list[Item]) -> Level:
     # Measure by the level's rooms, else by the lowest of its items.
-    here = [r for r in rooms if r.level_id == level_id]
-    if here:
-        elevation = min(r.floor_y for r in here)
-        height = float(np.median([r.ceiling_y - r.floor_y for r in here]))
+    level_rooms = [r for r in rooms if r.level_id == level_id]
+    if level_rooms:
+        elevation = min(r.floor_y for r in level_rooms)
+        height = float(np.median([r.ceiling_y - r.floor_y for r in level_rooms]))
         return Level(level_id, f"Level {level_id}", elevation, height, _FLOOR_SLAB_M)
     lows = [float(i.bounds[0, 1]) for i in items if i.level_id == level_id]
     return Level(level_id, f"Level {level_id}", min(lows, default=0.0), _STOREY_M, _FLOOR_SLAB_M)

@@ -48,8 +48,8 @@ class CeilingHeights:
         if level.index != self._top or edges is None:
             height = level.height if level.id else self._wall_height
             return np.full(len(points), height)
-        found = np.array([_nearest_wall_top(p, *edges) for p in points])
-        return np.full(len(points), found.max()) if is_flat else found
+        heights = np.array([_nearest_wall_top(p, *edges) for p in points])
+        return np.full(len(points), heights.max()) if is_flat else heights
 
     def highest(self, level: PlanLevel, ring: Points2, *, is_flat: bool) -> float:
         """The height of the ceiling's highest place over an outline (N, 2), a gable's ridge too."""

@@ -74,10 +74,10 @@ def _outlines(piece: PlanPiece, door: DoorFrame, materials: HomeMaterials) -> tu
     except ValueError as error:
         materials.notes.add("bad-cut-out", piece.place, f"cutOutShape: {error}; cut as a rectangle")
         outlines = ()
-    kept = tuple(
+    cut_outs = tuple(
         p for p in outlines if shapely.Polygon(p).is_valid and shapely.Polygon(p).area > 1e-6
     )
-    return kept or polygons_from_path(FULL_CUT_OUT)
+    return cut_outs or polygons_from_path(FULL_CUT_OUT)
 
 
 def _local_outline(outline: Points2, door: DoorFrame, frame: PieceFrame) -> Points2:

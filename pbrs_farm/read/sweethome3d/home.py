@@ -79,27 +79,27 @@ def check_plan_bounds(plan: HomePlan, file: str) -> None:
     Hidden levels do not count.
     """
     walls = _by_level(plan, plan.walls)
-    pieces = [p for found in _by_level(plan, plan.pieces).values() for p in found]
+    pieces = [p for drawn in _by_level(plan, plan.pieces).values() for p in drawn]
     n_walls = sum(map(len, walls.values()))
     if n_walls > MAX_WALLS:
         raise BadHouse(file, "", f"{n_walls} walls, at most {MAX_WALLS} are read", hint=HINT)
     if len(pieces) > MAX_PIECES:
         text = f"{len(pieces)} pieces, at most {MAX_PIECES} are read{_commonest(pieces)}"
         raise BadHouse(file, "", text, hint=HINT)
-    n_crossings = sum(_crossings(found) for found in walls.values())
+    n_crossings = sum(_crossings(drawn) for drawn in walls.values())
     if n_crossings > MAX_CROSSINGS:
         text = f"walls cross {n_crossings} times, at most {MAX_CROSSINGS} crossings are built"
         raise BadHouse(file, "walls", text, hint=HINT)
     rooms = _by_level(plan, plan.rooms)
-    check_outlines({level: [r.points for r in found] for level, found in rooms.items()}, file)
+    check_outlines({level: [r.points for r in drawn] for level, drawn in rooms.items()}, file)
 
 
 def _by_level(plan: HomePlan, drawn: Sequence[_Drawn]) -> dict[str, list[_Drawn]]:
     """Drawn elements of each visible level."""
-    found: dict[str, list[_Drawn]] = {}
-    for one in drawn:
-        found.setdefault(one.level, []).append(one)
-    return {level: ones for level, ones in found.items() if level_of(plan, level).is_visible}
+    by_level: dict[str, list[_Drawn]] = {}
+    for element in drawn:
+        by_level.setdefault(element.level, []).append(element)
+    return {level: ones for level, ones in by_level.items() if level_of(plan, level).is_visible}
 
 
 def _commonest(pieces: Sequence[PlanPiece]) -> str:
@@ -215,8 +215,8 @@ def _shown(plan: HomePlan, fields: ReadFields, notes: Notes) -> HomePlan:
     shown = [x.elevation for x in plan.levels if x.is_visible]
 
     def is_between(x: PlanLevel) -> bool:
-        apart = all(abs(x.elevation - y) > SAME_LEVEL_M for y in shown)
-        return bool(shown) and min(shown) < x.elevation < max(shown) and apart
+        is_apart = all(abs(x.elevation - y) > SAME_LEVEL_M for y in shown)
+        return bool(shown) and min(shown) < x.elevation < max(shown) and is_apart
 
     levels = []
     for level in plan.levels:
@@ -269,7 +269,7 @@ def _read_pieces(
 ) -> tuple[list[Item], tuple[Opening, ...]]:
     walls = _standing_walls(plan, outlines)
     cutter_material = materials.painted(Paint(), "cut", "")
-    found: list[StandingPiece] = []
+    placed_pieces: list[StandingPiece] = []
     openings: list[Opening] = []
     n_faces = n_pieces = 0
     for number, piece in enumerate(plan.pieces):
@@ -291,13 +291,13 @@ def _read_pieces(
                 f"more than {fields.max_triangles} triangles in the house",
                 hint="raise read.max_triangles",
             )
-        found.append(StandingPiece(piece, level, item, frame))
+        placed_pieces.append(StandingPiece(piece, level, item, frame))
         opening = piece_opening(piece, item, frame, walls, materials, cutter_material)
         if opening is not None:
             openings.append(opening)
     # A home that lost all its models is no home to render.
     missing = materials.notes.count("missing-model")
-    if n_pieces and missing and not found:
+    if n_pieces and missing and not placed_pieces:
         raise BadHouse(
             file,
             "",
@@ -305,8 +305,8 @@ def _read_pieces(
             hint="save the home as .sh3d with its contents, or fetch the program's: pbrs-farm homes",
         )
     if fields.doors == "open":
-        return opened_doors(found, models, materials, rooms, walls), tuple(openings)
-    return [placed.item for placed in found], tuple(openings)
+        return opened_doors(placed_pieces, models, materials, rooms, walls), tuple(openings)
+    return [placed.item for placed in placed_pieces], tuple(openings)
 
 
 def _standing_walls(plan: HomePlan, outlines: dict[str, Outline]) -> list[StandingWall]:

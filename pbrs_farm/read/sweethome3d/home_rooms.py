@@ -74,7 +74,7 @@ def rooms_between_walls(plan: HomePlan, outlines: dict[str, Outline]) -> tuple[H
 
     Gaps of ends that miss each other are closed, and rooms end at doorways; parapets and fences enclose nothing.
     """
-    found: list[HomeRoom] = []
+    home_rooms: list[HomeRoom] = []
     for level_id in dict.fromkeys(wall.level for wall in plan.walls):
         feet = [
             shapely.make_valid(shapely.Polygon(outlines[wall.id].polygon))
@@ -83,15 +83,15 @@ def rooms_between_walls(plan: HomePlan, outlines: dict[str, Outline]) -> tuple[H
             and wall.id in outlines
             and max(wall.height, wall.height_end or 0.0) >= LEAST_WALL_M
         ]
-        met = shapely.union_all(feet).buffer(GAP_M / 2, join_style="mitre")
-        standing = shapely.union_all([met.buffer(-GAP_M / 2, join_style="mitre"), *feet])
+        joined = shapely.union_all(feet).buffer(GAP_M / 2, join_style="mitre")
+        standing = shapely.union_all([joined.buffer(-GAP_M / 2, join_style="mitre"), *feet])
         ways = [*doorways(standing), *_door_lines(plan, level_id)]
         # The area within the outer edge of walls and doorways, minus the walls.
         closed = shapely.union_all([standing, *(way.buffer(ACROSS_M) for way in ways)])
         whole = shapely.union_all([shapely.Polygon(p.exterior) for p in _polygons(closed)])
         pieces = _polygons(shapely.difference(whole, standing))
         inside = [room for piece in pieces for room in parted_at_doorways(piece, ways)]
-        found += [
+        home_rooms += [
             HomeRoom(
                 place=f"walls of level {level_id or '0'}",
                 level=level_id,
@@ -106,7 +106,7 @@ def rooms_between_walls(plan: HomePlan, outlines: dict[str, Outline]) -> tuple[H
             for p in sorted(inside, key=lambda p: (p.bounds, p.area))
             if p.area >= LEAST_ROOM_M2
         ]
-    return tuple(found)
+    return tuple(home_rooms)
 
 
 def _door_lines(plan: HomePlan, level_id: str) -> list[shapely.LineString]:

@@ -74,20 +74,24 @@ def shut_leaves(
                 kind = hinges if word.startswith(HINGE) else leaves
                 kind.setdefault(joint, []).append(points)
                 break
-    found = [_find_leaf(j, leaves[j], hinges[j]) for j in sorted(leaves) if j in hinges]
-    return tuple(leaf for leaf in found if leaf is not None)
+    leaves_found = [_find_leaf(j, leaves[j], hinges[j]) for j in sorted(leaves) if j in hinges]
+    return tuple(leaf for leaf in leaves_found if leaf is not None)
 
 
 def _told_leaves(meshes: Sequence[Mesh], matrix: F64, told: Sequence[Joint]) -> Iterator[Leaf]:
     for number, joint in enumerate(told, 1):
-        own = joint.placed(matrix)
+        placed_joint = joint.placed(matrix)
         name = f"hinge_{number}"
         parts = [
             transform_points(matrix, m.positions) for m in meshes if hangs_on(m, frozenset([name]))
         ]
-        if own.kind is JointKind.REVOLUTE and abs(own.axis[1]) > _UPRIGHT and parts:
-            hinge = np.array(own.point)[[0, 2]]
-            yield Leaf(name, hinge, np.concatenate(parts), float(np.sign(own.axis[1])))
+        if (
+            placed_joint.kind is JointKind.REVOLUTE
+            and abs(placed_joint.axis[1]) > _UPRIGHT
+            and parts
+        ):
+            hinge = np.array(placed_joint.point)[[0, 2]]
+            yield Leaf(name, hinge, np.concatenate(parts), float(np.sign(placed_joint.axis[1])))
 
 
 def _find_leaf(joint: str, parts: list[F64], hinge_parts: list[F64]) -> Leaf | None:
@@ -218,8 +222,8 @@ def opened_doors(
                 materials.notes.add("door-without-hinge", piece.place, text)
             continue
         # Ask of each leaf how far it can go, and move it, or leave it out.
-        others = [i for n, i in enumerate(items) if n != k and i.level_id == item.level_id]
-        angles = [(leaf, opening_angle(leaf, door.frame, others, walls)) for leaf in leaves]
+        other_items = [i for n, i in enumerate(items) if n != k and i.level_id == item.level_id]
+        angles = [(leaf, opening_angle(leaf, door.frame, other_items, walls)) for leaf in leaves]
         turns = [(leaf.joint, swung(leaf, angle)) for leaf, angle in angles if angle is not None]
         out = frozenset(leaf.joint for leaf, angle in angles if angle is None)
         if out:

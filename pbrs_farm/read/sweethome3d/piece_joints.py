@@ -41,27 +41,27 @@ def piece_joints(
     to_world[:3, :3], to_world[:3, 3] = frame.axes, frame.origin
     moves: Mapping[str, tuple[float, ...]] = {joint_of(n): m for n, m in piece.transformations}
     if piece.joints:
-        told = {
+        read_joints = {
             f"{_HANGERS[joint.kind]}_{k}": joint.placed(matrix)
             for k, joint in enumerate(piece.joints, 1)
         }
         return {
             name: (_moved(joint, moves[name], matrix) if name in moves else joint).placed(to_world)
-            for name, joint in told.items()
+            for name, joint in read_joints.items()
             if moves.get(name) != ()
         }
     hung, fixed = _points_by_joint(meshes, matrix)
     word = "leaf" if piece.frame is not None else "door"
-    found: dict[str, Joint] = {}
+    joints: dict[str, Joint] = {}
     for name in sorted(hung.keys() & fixed.keys()):
         move = moves.get(name)
         if move == ():
             continue  # its leaf was left out
-        part = f"{word} {len(found) + 1}"
+        part = f"{word} {len(joints) + 1}"
         joint = _joint(part, name, hung[name], fixed[name])
         if joint is not None:
-            found[name] = (_moved(joint, move, matrix) if move else joint).placed(to_world)
-    return found
+            joints[name] = (_moved(joint, move, matrix) if move else joint).placed(to_world)
+    return joints
 
 
 def _points_by_joint(meshes: Sequence[Mesh], matrix: F64) -> tuple[dict[str, F64], dict[str, F64]]:
@@ -107,9 +107,9 @@ def _joint(part: str, name: str, hung: F64, fixed: F64) -> Joint | None:
 
 def _moved(joint: Joint, move: tuple[float, ...], matrix: F64) -> Joint:
     """The joint at the value by which a transformation of the model's frame, 3 x 4, moved its part."""
-    own = np.eye(4)
-    own[:3] = np.array(move).reshape(3, 4)
-    local, axis = matrix @ own @ np.linalg.inv(matrix), np.array(joint.axis)
+    moved = np.eye(4)
+    moved[:3] = np.array(move).reshape(3, 4)
+    local, axis = matrix @ moved @ np.linalg.inv(matrix), np.array(joint.axis)
     if joint.kind is JointKind.PRISMATIC:
         value = float(local[:3, 3] @ axis)
     else:

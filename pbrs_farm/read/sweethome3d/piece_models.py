@@ -32,8 +32,8 @@ _ROLES = (
 
 def joint_of(name: str) -> str:
     """The joint a transformation or a group names: "hinge_1", "rail_2", "unique_rail", or ""."""
-    found = _JOINT.search(name)
-    return found[1] if found else ""
+    match = _JOINT.search(name)
+    return match[1] if match else ""
 
 
 def moved(meshes: tuple[Mesh, ...], transformations: Transformations) -> tuple[Mesh, ...]:
@@ -69,8 +69,8 @@ def hanger_of(group: str) -> str:
 
 def fixed_joint_of(group: str) -> str:
     """The joint that a group is the hinge or rail of: "hinge_1"; "" for none."""
-    found = [joint_of(w) for w in group.split() if w.startswith(_FIXED)]
-    return found[0] if found else ""
+    joints = [joint_of(w) for w in group.split() if w.startswith(_FIXED)]
+    return joints[0] if joints else ""
 
 
 def hangs_on(mesh: Mesh, joints: frozenset[str]) -> bool:
@@ -166,20 +166,20 @@ class PieceModels:
         key = (*moves, *((f"out:{joint}", ()) for joint in sorted(out)))
         if (name, key) not in self._models:
             shut = self._models[(name, ())]
-            kept = tuple(m for m in parsed.meshes if not hangs_on(m, out))
-            opened = self._model(replace(parsed, meshes=moved(kept, moves)), name)
+            shown = tuple(m for m in parsed.meshes if not hangs_on(m, out))
+            opened = self._model(replace(parsed, meshes=moved(shown, moves)), name)
             self._models[(name, key)] = replace(opened, low=shut.low, high=shut.high)
         return key
 
     def _load(self, name: str, place: str) -> ObjModel | None:
-        note, what = self._materials.notes.add, f"{name[:120]!r}"
+        note, quoted = self._materials.notes.add, f"{name[:120]!r}"
         data = self._materials.contents.read(name)
         if data is None:
-            note("missing-model", place, f"no content {what}: left out")
+            note("missing-model", place, f"no content {quoted}: left out")
             return None
         kind = _model_format(data)
         if kind != "obj":
-            note("unsupported-model", place, f"{what} is {kind}, only OBJ is read: left out")
+            note("unsupported-model", place, f"{quoted} is {kind}, only OBJ is read: left out")
             return None
         # A model of too many triangles ends the reading; a damaged one is left out.
         try:

@@ -78,8 +78,8 @@ def local_from_model(piece: PlanPiece, model: PieceModel) -> F64:
     extent = high - low
     width, depth, height = piece.size
     # Scale it to the piece's size; axes without extent are kept.
-    wanted = np.array([width, height, depth])
-    scale = np.where(extent > _FLAT, wanted / np.maximum(extent, _FLAT), 1)
+    size = np.array([width, height, depth])
+    scale = np.where(extent > _FLAT, size / np.maximum(extent, _FLAT), 1)
     scale[0] *= -1.0 if piece.is_mirrored else 1.0
     matrix = np.eye(4)
     matrix[:3, :3] = scale[:, None] * turn

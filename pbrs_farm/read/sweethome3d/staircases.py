@@ -29,14 +29,14 @@ def staircase_cuts(
     for piece in plan.pieces:
         if not piece.staircase_cut_out or piece.staircase_cut_out.lower() == "false":
             continue
-        own = level_of(plan, piece.level)
-        if not own.is_visible:
+        own_level = level_of(plan, piece.level)
+        if not own_level.is_visible:
             continue
         # Cut the floors that it leads up to, and the ceilings it passes.
-        hole = _hole(piece, frame_of(piece, own), materials)
+        hole = _hole(piece, frame_of(piece, own_level), materials)
         if hole is None:
             continue
-        foot = own.elevation + piece.elevation
+        foot = own_level.elevation + piece.elevation
         top = foot + piece.size[2]
         for level in visible:
             reach = level.elevation - level.reach_down - TOLERANCE_M

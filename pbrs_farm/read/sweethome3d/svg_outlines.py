@@ -85,10 +85,10 @@ def _xy(point: Any) -> tuple[float, float]:
 
 def _without_repeats(points: list[tuple[float, float]]) -> list[tuple[float, float]]:
     """The points without those that repeat the one before, the last and first too."""
-    kept: list[tuple[float, float]] = []
+    distinct: list[tuple[float, float]] = []
     for p in points:
-        if not kept or math.dist(p, kept[-1]) > 1e-9:
-            kept.append(p)
-    while len(kept) > 1 and math.dist(kept[0], kept[-1]) <= 1e-9:
-        kept.pop()
-    return kept
+        if not distinct or math.dist(p, distinct[-1]) > 1e-9:
+            distinct.append(p)
+    while len(distinct) > 1 and math.dist(distinct[0], distinct[-1]) <= 1e-9:
+        distinct.pop()
+    return distinct

@@ -40,10 +40,10 @@ def outlines_of(walls: tuple[HomeWall, ...]) -> dict[str, Outline]:
         wall = by_id[wall_id]
         left, right = outline.left.copy(), outline.right.copy()
         for at_start, other_id in ((True, wall.at_start), (False, wall.at_end)):
-            other = by_id.get(other_id)
-            if other is None or other_id not in bare or other_id == wall_id:
+            neighbour = by_id.get(other_id)
+            if neighbour is None or other_id not in bare or other_id == wall_id:
                 continue
-            _join(wall, other, at_start, (left, right), bare, order)
+            _join(wall, neighbour, at_start, (left, right), bare, order)
         # Take the mitred outline where it is a simple polygon.
         mitred = Outline(left, right, outline.along)
         joined[wall_id] = mitred if _is_sound(mitred, outline) else outline
@@ -85,9 +85,9 @@ def _arc(wall: HomeWall, start: Points2, end: Points2, half: float) -> Outline:
     radius = float(np.linalg.norm(start - centre))
     # Turning clockwise on the plan (positive extent) keeps the centre on the right.
     sign = 1.0 if wall.arc > 0 else -1.0
-    left = centre + outward * max(0.0, radius + sign * half)
+    left_side = centre + outward * max(0.0, radius + sign * half)
     right = centre + outward * max(0.0, radius - sign * half)
-    return Outline(left, right, along)
+    return Outline(left_side, right, along)
 
 
 def _join(
@@ -104,8 +104,8 @@ def _join(
         return
     limit = MITRE_LIMIT * max(wall.thickness, other.thickness)
     mine, theirs = bare[wall.id], bare[other.id]
-    here, inner = (0, 1) if at_start else (-1, -2)
-    there, beyond = (0, 1) if other_at_start else (-1, -2)
+    end, inner = (0, 1) if at_start else (-1, -2)
+    other_end, beyond = (0, 1) if other_at_start else (-1, -2)
     # Two walls that both start (or both end) at the joint run against each other.
     swapped = at_start == other_at_start
     pairs = (
@@ -114,11 +114,11 @@ def _join(
     )
     for target, line, facing in pairs:
         # Cross the earlier wall's line with the later one's: both walls get the same bits.
-        a, b = (line[here], line[inner]), (facing[there], facing[beyond])
+        a, b = (line[end], line[inner]), (facing[other_end], facing[beyond])
         crossing = _crossing(*b, *a) if order[wall.id] > order[other.id] else _crossing(*a, *b)
         # Move the corner to the crossing unless the mitre would be too long.
-        if crossing is not None and math.dist(crossing, line[here]) < limit:
-            target[here] = crossing
+        if crossing is not None and math.dist(crossing, line[end]) < limit:
+            target[end] = crossing
 
 
 def _joins_at_start(wall: HomeWall, other: HomeWall, at_start: bool) -> bool | None:

@@ -106,10 +106,10 @@ class StageNodes:
         if prim.IsA(UsdGeom.PointInstancer):
             yield from self._instances(prim, above)
             return
-        here = self._node(
+        own_above = self._node(
             prim, above, self._matrix(prim), prim.GetName(), f"{above.name}/{prim.GetName()}"
         )
-        yield from ((child, here) for child in _children(prim))
+        yield from ((child, own_above) for child in _children(prim))
 
     def _matrix(self, prim: Any) -> Any:
         xformable = UsdGeom.Xformable(prim)
@@ -137,8 +137,8 @@ class StageNodes:
         mesh = self._mesh(prim)
         if mesh is not None:
             node["mesh"] = mesh
-        seen = self._class(prim, above, node)
-        in_lamp = above.in_lamp or (seen is not None and seen.kind is ItemKind.LAMP)
+        prim_class = self._class(prim, above, node)
+        in_lamp = above.in_lamp or (prim_class is not None and prim_class.kind is ItemKind.LAMP)
         in_lamp = in_lamp or bool(
             prim.GetAttribute(EXTRAS_ATTRIBUTE).Get()
         )  # says what its lights are
@@ -146,7 +146,11 @@ class StageNodes:
             self._light(prim, node, is_part=above.in_lamp)
         self._nodes[above.node]["children"].append(len(self._nodes))
         self._nodes.append(node)
-        label = seen if seen and seen.is_tagged and seen.kind in _STRUCTURE else above.structure
+        label = (
+            prim_class
+            if prim_class and prim_class.is_tagged and prim_class.kind in _STRUCTURE
+            else above.structure
+        )
         return _Above(len(self._nodes) - 1, above.depth + 1, path, in_lamp, label)
 
     def _class(self, prim: Any, above: _Above, node: _Row) -> NodeClass | None:
@@ -159,9 +163,9 @@ class StageNodes:
             node["extras"] |= extras if isinstance(extras, dict) else {}
             return class_of_node_name(str(node["extras"].get("class", "")))
         label = _own_label(prim)
-        seen = class_of_node_name(label) if label else None
+        label_class = class_of_node_name(label) if label else None
         is_shape = "mesh" in node
-        if seen is None:
+        if label_class is None:
             if (
                 is_shape
                 and above.structure is not None
@@ -175,30 +179,30 @@ class StageNodes:
                 return None
             return class_of_node_name(prim.GetName())
         # A label of walls on what holds many walls is each one's.
-        is_group = not is_shape and seen.kind in _STRUCTURE
+        is_group = not is_shape and label_class.kind in _STRUCTURE
         if not is_group:
-            self._tag(node, seen)
-        return NodeClass(seen.nyu40, seen.kind, is_tagged=True)
+            self._tag(node, label_class)
+        return NodeClass(label_class.nyu40, label_class.kind, is_tagged=True)
 
     def _is_group(self, prim: Any) -> bool:
         """True if a prim is a room's scope, or contains items with classes of their own."""
-        own = class_of_node_name(prim.GetName())
-        if own is not None and own.kind is ItemKind.LAMP:
+        own_class = class_of_node_name(prim.GetName())
+        if own_class is not None and own_class.kind is ItemKind.LAMP:
             return False
         return named_kind(prim.GetName()) is not None or str(prim.GetPath()) in self._holders
 
     def _component(self, prim: Any, node: _Row) -> None:
-        own = class_of_node_name(prim.GetName())
+        own_class = class_of_node_name(prim.GetName())
         inner = [class_of_node_name(p.GetName()) for p in _visible_children(prim)]
-        found = {seen for seen in inner if seen is not None}
-        if own is not None:
+        classes = {inner_class for inner_class in inner if inner_class is not None}
+        if own_class is not None:
             node["extras"]["by_name"] = True
-        elif len(found) == 1:
-            own = next(iter(found))
-        if own is None:
+        elif len(classes) == 1:
+            own_class = next(iter(classes))
+        if own_class is None:
             node["extras"]["one"] = True
-        elif own.kind not in _STRUCTURE:
-            self._tag(node, own)
+        elif own_class.kind not in _STRUCTURE:
+            self._tag(node, own_class)
 
     def _tag(self, node: _Row, seen: NodeClass) -> None:
         node["extras"] |= {"nyu40": seen.nyu40, "kind": seen.kind.value}
@@ -271,11 +275,11 @@ class StageNodes:
         binding = UsdShade.MaterialBindingAPI(prim)
         for subset in binding.GetMaterialBindSubsets() if prim.IsA(UsdGeom.Mesh) else ():
             chosen = np.asarray(subset.GetIndicesAttr().Get(self._time) or [], np.int64)
-            own = np.isin(shape.polygon, chosen) & rest
-            rest &= ~own
+            is_own = np.isin(shape.polygon, chosen) & rest
+            rest &= ~is_own
             material = self._bound_material(subset.GetPrim())
-            if own.any():
-                yield shape.faces[own], self._material(prim, material)
+            if is_own.any():
+                yield shape.faces[is_own], self._material(prim, material)
         if rest.any():
             yield shape.faces[rest], self._material(prim, bound)
 
@@ -373,8 +377,8 @@ class StageNodes:
             if not prototype or (len(mask) and not mask[k]):
                 continue
             name = prototype.GetName()
-            here = self._node(prototype, holder, np.array(place), name, f"{path}/{name}.{k}")
-            yield from ((child, here) for child in _children(prototype))
+            own_above = self._node(prototype, holder, np.array(place), name, f"{path}/{name}.{k}")
+            yield from ((child, own_above) for child in _children(prototype))
 
 
 def _children(prim: Any) -> list[Any]:
@@ -407,19 +411,21 @@ def _is_component(prim: Any) -> bool:
 
 def _holders(stage: Any) -> set[str]:
     """Paths of the prims that hold components, labels, lights or parts of the building."""
-    found: set[str] = set()
+    holders: set[str] = set()
     for prim in Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies()):
         parent = prim.GetParent()
-        if not parent or str(parent.GetPath()) in found or _is_no_place(prim):
+        if not parent or str(parent.GetPath()) in holders or _is_no_place(prim):
             continue
-        seen = class_of_node_name(prim.GetName()) if prim.IsA(UsdGeom.Gprim) else None
-        is_building = seen is not None and (seen.kind in _STRUCTURE or seen.kind is ItemKind.GROUND)
+        name_class = class_of_node_name(prim.GetName()) if prim.IsA(UsdGeom.Gprim) else None
+        is_building = name_class is not None and (
+            name_class.kind in _STRUCTURE or name_class.kind is ItemKind.GROUND
+        )
         is_light = prim.IsA(UsdLux.BoundableLightBase)
         if is_building or is_light or _is_component(prim) or _own_label(prim):
-            while parent and str(parent.GetPath()) not in found:
-                found.add(str(parent.GetPath()))
+            while parent and str(parent.GetPath()) not in holders:
+                holders.add(str(parent.GetPath()))
                 parent = parent.GetParent()
-    return found
+    return holders
 
 
 def _own_label(prim: Any) -> str:

@@ -122,8 +122,8 @@ class Shaders:
         """Whether a material has a surface of which more than a picture is read."""
         path = str(material.GetPath())
         if path not in self._understood:
-            known = surface_of(material)[1] is not None or bool(_omniverse(material))
-            self._understood[path] = known
+            is_known = surface_of(material)[1] is not None or bool(_omniverse(material))
+            self._understood[path] = is_known
         return self._understood[path]
 
     def uv_name(self, material: Any) -> str:
@@ -143,8 +143,8 @@ class Shaders:
             self._notes.add(UNREAD, place, "has no surface shader: it is a matte grey")
             row = _grey(name)
         self._uv_names[place] = self._uv_name
-        given = material.GetPrim().GetAttribute(KIND_ATTRIBUTE).Get()
-        return row | ({"extras": {"kind": str(given)}} if given else {})
+        kind = material.GetPrim().GetAttribute(KIND_ATTRIBUTE).Get()
+        return row | ({"extras": {"kind": str(kind)}} if kind else {})
 
     # UsdPreviewSurface and MaterialX
 
@@ -175,11 +175,11 @@ class Shaders:
         self._add_glow(row, shader, words)
         passes = _input_number(self._input(shader, words.transmission, 0.0)[0], 0.0)
         index = _finite(self._input(shader, "ior", _USUAL_IOR)[0], _USUAL_IOR)
-        own = {} if index == _USUAL_IOR else {"KHR_materials_ior": {"ior": index}}
+        extensions = {} if index == _USUAL_IOR else {"KHR_materials_ior": {"ior": index}}
         if passes > 0:
-            own |= {"KHR_materials_transmission": {"transmissionFactor": passes}}
+            extensions |= {"KHR_materials_transmission": {"transmissionFactor": passes}}
         self._note_unread(shader, is_specular=is_specular)
-        return row | ({"extensions": own} if own else {})
+        return row | ({"extensions": extensions} if extensions else {})
 
     def _note_unread(self, shader: Any, *, is_specular: bool) -> None:
         """A note for what the shader says of its surface and is not read."""
@@ -191,13 +191,13 @@ class Shaders:
                 self._notes.add(UNREAD, str(shader.GetPath()), f"{name} is not read")
 
     def _add_glow(self, row: _Row, shader: Any, words: SurfaceWords) -> None:
-        given, picture = self._input(shader, words.glow, None)
-        if given is None and picture is None and not words.glow_times:
+        value, picture = self._input(shader, words.glow, None)
+        if value is None and picture is None and not words.glow_times:
             return
         times = 1.0
         if words.glow_times:
             times = _finite(self._input(shader, words.glow_times, 0.0)[0], 0.0)
-        glow = _triple(given, (1.0, 1.0, 1.0)) if picture is None else picture.scale[:3]
+        glow = _triple(value, (1.0, 1.0, 1.0)) if picture is None else picture.scale[:3]
         if max(glow) > 0 and times > 0:
             row["emissiveFactor"] = [max(c, 0.0) / max(glow) for c in glow]
             if picture is not None:
@@ -261,25 +261,25 @@ class Shaders:
         if picture is None:
             level = np.mean(_triple(value, (1.0,) * 3)) if np.ndim(value) else value
             return _input_number(level, 1.0), colour, False
-        own = picture.info
+        info = picture.info
         channel = picture.channel if picture.channel in tuple("rgba") else "r"
         k = "rgba".index(channel)
         scale, bias = picture.scale[k], picture.bias[k]
-        if colour is not None and own.get("extensions") != colour.get("extensions"):
+        if colour is not None and info.get("extensions") != colour.get("extensions"):
             text = "the picture of its opacity lies otherwise than that of its colour: left out"
             self._notes.add("texture-layout", place, text)
             return 1.0, colour, False
         # The alpha of the colour's own picture is there already.
-        if own == colour and channel == "a" and bias == 0 and 0 < scale <= 1:
+        if info == colour and channel == "a" and bias == 0 and 0 < scale <= 1:
             return scale, colour, True
         colour_asset = None if colour is None else self._asset(colour)
-        mask = _Masked(colour_asset, self._asset(own), channel, scale, bias)
-        return 1.0, self._with_image(colour or own, self._masked_image(mask)), True
+        mask = _Masked(colour_asset, self._asset(info), channel, scale, bias)
+        return 1.0, self._with_image(colour or info, self._masked_image(mask)), True
 
     def _input(self, shader: Any, name: str, default: Any) -> tuple[Any, _Picture | None]:
         """(the value of an input, the picture that it is connected to or None)."""
-        found = shader.GetInput(name) if name else None
-        for attribute in found.GetValueProducingAttributes() if found else ():
+        source = shader.GetInput(name) if name else None
+        for attribute in source.GetValueProducingAttributes() if source else ():
             if UsdShade.Utils.GetType(attribute.GetName()) != UsdShade.AttributeType.Output:
                 value = attribute.Get(self._time)
                 return (default if value is None else value), None
@@ -308,10 +308,10 @@ class Shaders:
         if kind.startswith("UsdPrimvarReader"):
             value = self._input(node, "fallback", None)[0]
             return (default if value is None else value), None
-        for own in node.GetInputs() if node else ():
+        for node_input in node.GetInputs() if node else ():
             if kind.startswith("ND_constant_"):
-                return self._input(node, own.GetBaseName(), default)
-            value, picture = self._input(node, own.GetBaseName(), default)
+                return self._input(node, node_input.GetBaseName(), default)
+            value, picture = self._input(node, node_input.GetBaseName(), default)
             if picture is not None:
                 return value, self._through(picture, node, kind, channel)
         return default, None
@@ -388,8 +388,8 @@ class Shaders:
             if value := self._input(node, name, "")[0]:
                 return str(value)
         for name in ("in", "texcoord"):
-            found = node.GetInput(name)
-            for attribute in found.GetValueProducingAttributes() if found else ():
+            source = node.GetInput(name)
+            for attribute in source.GetValueProducingAttributes() if source else ():
                 if value := self._name_of_uvs(UsdShade.Shader(attribute.GetPrim()), depth - 1):
                     return value
         return ""
@@ -422,9 +422,9 @@ class Shaders:
 
     def _mdl(self, name: str, shader: Any, place: str) -> _Row:
         asset = shader.GetPrim().GetAttribute("info:mdl:sourceAsset").Get()
-        given = shader.GetPrim().GetAttribute("info:mdl:sourceAsset:subIdentifier").Get()
+        identifier = shader.GetPrim().GetAttribute("info:mdl:sourceAsset:subIdentifier").Get()
         path = asset.path if isinstance(asset, Sdf.AssetPath) else ""
-        stem = str(given or path.replace("\\", "/").rsplit("/", 1)[-1].removesuffix(".mdl"))
+        stem = str(identifier or path.replace("\\", "/").rsplit("/", 1)[-1].removesuffix(".mdl"))
         if stem.startswith("OmniGlass"):
             colour = _triple(self._input(shader, "glass_color", (1, 1, 1))[0], (1.0, 1.0, 1.0))
             return _pbr(name, [*colour, PANE_OPACITY], 0.0, 0.0) | {"alphaMode": "BLEND"}
@@ -463,14 +463,16 @@ class Shaders:
     def _mdl_opacity(self, shader: Any, colour: _Row | None) -> tuple[_Row | None, bool]:
         """(the picture of the colour with opacity as its alpha, whether a picture says it)."""
         is_on = self._input(shader, "enable_opacity_texture", False)[0]
-        own = self._mdl_picture(shader, "opacity_texture") if is_on else None
-        if own is None:
+        opacity_picture = self._mdl_picture(shader, "opacity_texture") if is_on else None
+        if opacity_picture is None:
             return colour, False
         mode = self._input(shader, "opacity_mode", 1)[0]
         colour_asset = self._asset(colour) if colour else None
         # Mode 0 is the alpha; the others are means and the like of the colours.
-        mask = _Masked(colour_asset, self._asset(own), "a" if mode == 0 else "l", 1.0, 0.0)
-        return self._with_image(colour or own, self._masked_image(mask)), True
+        mask = _Masked(
+            colour_asset, self._asset(opacity_picture), "a" if mode == 0 else "l", 1.0, 0.0
+        )
+        return self._with_image(colour or opacity_picture, self._masked_image(mask)), True
 
     def _mdl_picture(self, shader: Any, name: str) -> _Row | None:
         asset = self._input(shader, name, None)[0]
@@ -483,14 +485,14 @@ class Shaders:
         return self._info(asset) | turn
 
     def _other_mdl(self, name: str, asset: Any, stem: str, place: str) -> _Row:
-        found = _PICTURE_OF_MDL.search(self._text_of(asset))
+        match = _PICTURE_OF_MDL.search(self._text_of(asset))
         text = f"{stem or 'a shader'} is not read"
-        if found is None:
+        if match is None:
             self._notes.add(UNREAD, place, f"{text}: the surface is a matte grey")
             return _grey(name)
         self._notes.add(UNREAD, place, f"{text}: its first picture is the colour")
         folder = (asset.resolvedPath or asset.path).replace("\\", "/").rpartition("/")[0]
-        picture = Sdf.AssetPath(found[1], f"{folder}/{found[1].lstrip('./')}")
+        picture = Sdf.AssetPath(match[1], f"{folder}/{match[1].lstrip('./')}")
         row = _pbr(name, [1.0, 1.0, 1.0, 1.0], 0.5, 0.0)
         row["pbrMetallicRoughness"]["baseColorTexture"] = self._info(picture)
         return row
@@ -622,23 +624,23 @@ def _input_number(value: Any, default: float) -> float:
 
 def _finite(value: Any, default: float) -> float:
     try:
-        found = float(value)
+        number = float(value)
     except (TypeError, ValueError):
         return default
-    return found if np.isfinite(found) else default
+    return number if np.isfinite(number) else default
 
 
 def _triple(value: Any, default: tuple[float, ...]) -> tuple[float, ...]:
     try:
-        found = tuple(float(c) for c in value)[:3]
+        triple = tuple(float(c) for c in value)[:3]
     except (TypeError, ValueError):
         return default
-    return found if len(found) == 3 and np.isfinite(found).all() else default
+    return triple if len(triple) == 3 and np.isfinite(triple).all() else default
 
 
 def _pair(value: Any, default: tuple[float, float]) -> tuple[float, float]:
     try:
-        found = tuple(float(c) for c in value)[:2]
+        pair = tuple(float(c) for c in value)[:2]
     except (TypeError, ValueError):
         return default
-    return (found[0], found[1]) if len(found) == 2 and np.isfinite(found).all() else default
+    return (pair[0], pair[1]) if len(pair) == 2 and np.isfinite(pair).all() else default

@@ -55,8 +55,8 @@ def mesh_shape(prim: Any, time: Any, file: str, uv_name: str = "") -> Shape | No
     polygon = np.repeat(np.arange(len(sizes)), sizes)[triangles[:, 0]]
     holes = _ints(mesh.GetHoleIndicesAttr().Get(time))
     if len(holes):
-        kept = ~np.isin(polygon, holes)
-        triangles, polygon = triangles[kept], polygon[kept]
+        is_filled = ~np.isin(polygon, holes)
+        triangles, polygon = triangles[is_filled], polygon[is_filled]
     if not len(triangles):
         return None
     pairs = [_texture_coordinates(prim, time, uv_name), _normals(mesh, time)]
@@ -98,14 +98,16 @@ def _ints(value: Any) -> I64:
 
 def _texture_coordinates(prim: Any, time: Any, uv_name: str) -> tuple[F64 | None, str]:
     """(values, interpolation) of the texture coordinates of that name, else those called st before others."""
-    found = [p for p in UsdGeom.PrimvarsAPI(prim).GetPrimvarsWithValues() if _is_pair(p)]
+    primvars = [p for p in UsdGeom.PrimvarsAPI(prim).GetPrimvarsWithValues() if _is_pair(p)]
     names = (uv_name, "st", "UVMap", "st0", "st_0", "uv", "map1", "Texture_uv")
     order = {name: k for k, name in reversed(list(enumerate(names)))}
-    found.sort(key=lambda p: order.get(p.GetPrimvarName(), len(names)))
-    if not found:
+    primvars.sort(key=lambda p: order.get(p.GetPrimvarName(), len(names)))
+    if not primvars:
         return None, ""
-    values = found[0].ComputeFlattened(time)
-    return (None, "") if values is None else (_float_rows(values, 2), found[0].GetInterpolation())
+    values = primvars[0].ComputeFlattened(time)
+    return (
+        (None, "") if values is None else (_float_rows(values, 2), primvars[0].GetInterpolation())
+    )
 
 
 def _is_pair(primvar: Any) -> bool:
@@ -154,9 +156,9 @@ def solid_shape(prim: Any, time: Any) -> Shape | None:
     """Triangulate a UsdGeom primitive (cube, sphere, cylinder, cone, capsule, plane); None for any other prim."""
 
     def value(name: str, default: float) -> float:
-        found = prim.GetAttribute(name).Get(time)
-        found = default if found is None else float(found)
-        return found if np.isfinite(found) and abs(found) < 1e9 else default
+        number = prim.GetAttribute(name).Get(time)
+        number = default if number is None else float(number)
+        return number if np.isfinite(number) and abs(number) < 1e9 else default
 
     kind, origin = prim.GetTypeName(), np.zeros(3)
     r, h = value("radius", 1.0), value("height", 2.0)
@@ -191,9 +193,9 @@ def _turned_to_axis(surface: Surface, prim: Any) -> Shape:
     """The shape turned about y, turned to the prim's axis."""
     axis = str(prim.GetAttribute("axis").Get() or "Z")
     order = {"Z": [2, 0, 1], "X": [1, 2, 0]}.get(axis, [0, 1, 2])
-    found = _of_surface(surface)
-    normals = None if found.normals is None else found.normals[:, order]
-    return Shape(found.positions[:, order], found.faces, found.polygon, found.uvs, normals)
+    shape = _of_surface(surface)
+    normals = None if shape.normals is None else shape.normals[:, order]
+    return Shape(shape.positions[:, order], shape.faces, shape.polygon, shape.uvs, normals)
 
 
 def _of_surface(surface: Surface) -> Shape:
@@ -223,8 +225,8 @@ def light_shape(prim: Any, time: Any) -> Shape | None:
         r = float(prim.GetAttribute("inputs:radius").Get(time) or 0.5)
         h = float(prim.GetAttribute("inputs:length").Get(time) or 1.0) / 2
         profile = np.array([[0, -h], [r, -h], [r, h], [0, h]], np.float64)
-        found = _of_surface(lathe("", profile, np.zeros(3), 0, n=_ROUND))
-        return Shape(found.positions[:, [1, 2, 0]], found.faces, found.polygon)
+        shape = _of_surface(lathe("", profile, np.zeros(3), 0, n=_ROUND))
+        return Shape(shape.positions[:, [1, 2, 0]], shape.faces, shape.polygon)
     else:
         return None
     points = np.column_stack([ring, np.full(len(ring), -_OFF_M)])

@@ -88,8 +88,8 @@ def companions_of_usd(given: GivenFile, files: SourceFiles) -> str:
         names = [name for name, _ in files_of_stage(folder)]
     except BadHouse:
         names = []
-    own = folder.name_of(str(folder.path))
-    return files.digest(folder.root, [n for n in (*names, *beside) if n != own])
+    own_name = folder.name_of(str(folder.path))
+    return files.digest(folder.root, [n for n in (*names, *beside) if n != own_name])
 
 
 def _time() -> Any:
@@ -112,8 +112,8 @@ def _material_text(folder: StageFolder, asset: Any) -> str:
 
 def _name_beside_stage(folder: StageFolder, path: Path, name: str) -> str:
     """The name below the root of a file beside the stage."""
-    own = folder.name_of(str(folder.path)) or path.name
-    return str(Path(own).with_name(name))
+    own_name = folder.name_of(str(folder.path)) or path.name
+    return str(Path(own_name).with_name(name))
 
 
 def _mapping(folder: StageFolder, path: Path) -> Mapping:
@@ -127,9 +127,9 @@ def _given_rooms(
 ) -> list[dict[str, Any]]:
     """Rooms in the form of a glTF scene's room file; [] if no source has any."""
     prim = stage.GetDefaultPrim()
-    own = prim.GetAttribute(ROOMS_ATTRIBUTE).Get() if prim else None
-    if own:
-        value = json_from_bytes(str(own).encode(), path.name)
+    text = prim.GetAttribute(ROOMS_ATTRIBUTE).Get() if prim else None
+    if text:
+        value = json_from_bytes(str(text).encode(), path.name)
         return value if isinstance(value, list) else []
     name = side_files(path)[1]
     data = folder.root.read(_name_beside_stage(folder, path, name), max_bytes=_MOST_JSON_BYTES)

@@ -64,8 +64,8 @@ class StageFolder:
             return None
         if not is_inside:
             return self.root.read(self.name_of(resolved) or "", max_bytes=_PICTURE_BYTES)
-        found = Ar.GetResolver().OpenAsset(Ar.ResolvedPath(resolved))
-        return bytes(found.GetBuffer()) if found and found.GetSize() < _PICTURE_BYTES else None
+        opened = Ar.GetResolver().OpenAsset(Ar.ResolvedPath(resolved))
+        return bytes(opened.GetBuffer()) if opened and opened.GetSize() < _PICTURE_BYTES else None
 
 
 def files_of_stage(folder: StageFolder) -> Iterator[tuple[str, bool]]:
@@ -75,21 +75,21 @@ def files_of_stage(folder: StageFolder) -> Iterator[tuple[str, bool]]:
     """
     first = folder.name_of(str(folder.path))
     assert first is not None
-    seen, todo = {first}, [first]
+    visited, todo = {first}, [first]
     while todo:
         name = todo.pop()
         yield name, True
         for asset in _with_tiles(folder.root.root / name):
-            found = _name_below_root(folder, name, asset)
-            if found is None or found in seen:
+            below_root = _name_below_root(folder, name, asset)
+            if below_root is None or below_root in visited:
                 continue
-            seen.add(found)
-            if len(seen) > _MOST_LAYERS:
+            visited.add(below_root)
+            if len(visited) > _MOST_LAYERS:
                 raise BadHouse(folder.path, "", f"names more than {_MOST_LAYERS} files")
-            if Path(found).suffix.lower() in LAYERS:
-                todo.append(found)
+            if Path(below_root).suffix.lower() in LAYERS:
+                todo.append(below_root)
             else:
-                yield found, False
+                yield below_root, False
 
 
 def _named_in(path: Path) -> list[str]:
@@ -150,7 +150,7 @@ def opened_stage(folder: StageFolder, notes: Notes) -> Any:
         raise BadHouse(path, "", f"is larger than {MAX_SCENE_BYTES / 1e6:.0f} MB")
     try_out(folder)
     layers = [name for name, is_layer in files_of_stage(folder) if is_layer]
-    said = UsdUtils.CoalescingDiagnosticDelegate()  # else the library writes to our terminal
+    diagnostics = UsdUtils.CoalescingDiagnosticDelegate()  # else the library writes to our terminal
     try:
         n_references = _check_size(folder, layers)
         stage = Usd.Stage.Open(str(path))
@@ -160,7 +160,7 @@ def opened_stage(folder: StageFolder, notes: Notes) -> Any:
         real = layer.realPath.partition("[")[0]
         if real and folder.name_of(real) is None:
             raise BadHouse(path, "", f"{real!r} leads out of the folder", hint=_HINT)
-    missing = _note_missing(said, notes)
+    missing = _note_missing(diagnostics, notes)
     if missing > _MISSING_SHARE * max(n_references, missing):
         text = f"{missing} of {max(n_references, missing)} references do not resolve"
         hint = "they name another machine's files: get them, too; " + _HINT
@@ -223,12 +223,12 @@ FAULTS: Final = (Tf.ErrorException, UnicodeDecodeError)
 def damaged(path: Path, error: Exception) -> BadHouse:
     """The library's error message for a damaged file, in one line."""
     try:
-        found = _SAID.search(str(error))
+        match = _SAID.search(str(error))
     except UnicodeDecodeError:
-        found = None
-    text = " ".join((found[1] if found else "is no USD file").split())
-    for known in {str(path), str(path.parent) + "/"}:
-        text = text.replace(known, "")
+        match = None
+    text = " ".join((match[1] if match else "is no USD file").split())
+    for path_text in {str(path), str(path.parent) + "/"}:
+        text = text.replace(path_text, "")
     return BadHouse(path, "", f"damaged: {text.strip(': ')}")
 
 
@@ -237,10 +237,10 @@ def _note_missing(said: Any, notes: Notes) -> int:
     n = 0
     for row in said.TakeUncoalescedDiagnostics():
         text = " ".join(str(row.commentary).split())
-        found = _UNOPENED.search(text)
-        n += found is not None
-        if found is not None:
-            notes.add("missing-model", found[1], f"{found[2]} does not exist; left out")
+        match = _UNOPENED.search(text)
+        n += match is not None
+        if match is not None:
+            notes.add("missing-model", match[1], f"{match[2]} does not exist; left out")
         elif "Cycle detected" in text:
             notes.add(
                 "reference-cycle", text.partition(">")[0].removeprefix("In <"), "names itself"
@@ -260,19 +260,21 @@ def _check_size(folder: StageFolder, names: list[str]) -> int:
     n_references = 0
 
     def references(layer: Any, spec: Any) -> list[tuple[Any, str]]:
-        found = []
+        targets = []
         for key in ("referenceList", "payloadList"):
             arcs = getattr(spec, key)
             for arc in (*arcs.explicitItems, *arcs.prependedItems, *arcs.appendedItems):
-                other = layer
+                other_layer = layer
                 if arc.assetPath:
                     where = layer.ComputeAbsolutePath(arc.assetPath)
-                    other = by_path.get(where) or by_path.get(str(real_path(Path(where))))
+                    other_layer = by_path.get(where) or by_path.get(str(real_path(Path(where))))
                 target = (
-                    str(arc.primPath) if arc.primPath else f"/{getattr(other, 'defaultPrim', '')}"
+                    str(arc.primPath)
+                    if arc.primPath
+                    else f"/{getattr(other_layer, 'defaultPrim', '')}"
                 )
-                found.append((other, target))
-        return found
+                targets.append((other_layer, target))
+        return targets
 
     def below(spec: Any) -> Iterator[Any]:
         yield from spec.nameChildren
@@ -284,20 +286,22 @@ def _check_size(folder: StageFolder, names: list[str]) -> int:
     for layer in by_path.values():
         stack = [(layer, spec, False) for spec in layer.rootPrims]
         while stack:
-            here, spec, is_done = stack.pop()
-            key = (here.identifier, str(spec.path))
+            visited_layer, spec, is_done = stack.pop()
+            key = (visited_layer.identifier, str(spec.path))
             if key in counted and not is_done:
                 continue
-            arcs = references(here, spec) if spec.hasReferences or spec.hasPayloads else []
+            arcs = references(visited_layer, spec) if spec.hasReferences or spec.hasPayloads else []
             targets = [(o, s) for o, t in arcs if o is not None and (s := o.GetPrimAtPath(t))]
             if not is_done:
                 n_references += len(arcs)
                 counted[key] = 1  # also what a cycle sees
-                stack.append((here, spec, True))
+                stack.append((visited_layer, spec, True))
                 stack += [(o, s, False) for o, s in targets]
-                stack += [(here, child, False) for child in below(spec)]
+                stack += [(visited_layer, child, False) for child in below(spec)]
                 continue
-            n = 1 + sum(counted.get((here.identifier, str(c.path)), 1) for c in below(spec))
+            n = 1 + sum(
+                counted.get((visited_layer.identifier, str(c.path)), 1) for c in below(spec)
+            )
             n += sum(counted.get((o.identifier, str(s.path)), 1) for o, s in targets)
             counted[key] = n
             if n > MOST_PRIMS:

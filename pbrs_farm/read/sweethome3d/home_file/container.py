@@ -56,10 +56,10 @@ def needs_program(data: bytes, file: str) -> bool:
     """Whether a home names models or pictures that its file does not hold: the program's own."""
     try:
         root = open_container(data, file, None).root
-        held = ZipResources(data, file).names() if data.startswith(b"PK") else ()
+        archived = ZipResources(data, file).names() if data.startswith(b"PK") else ()
         # Models and pictures are all that a home names.
         named = {e.get(key) for e in root.iter() for key in ("model", "image")}
-        return not {posixpath.normpath(name) for name in named if name} <= set(held)
+        return not {posixpath.normpath(name) for name in named if name} <= set(archived)
     except BadHouse:
         return False  # the reader reports the fault
 
@@ -70,8 +70,10 @@ def _parse_xml(xml: bytes, file: str, entry: str) -> Element:
     try:
         root: Element = fromstring(xml, forbid_dtd=False, forbid_entities=True)
     except DefusedXmlException as error:
-        what = type(error).__name__
-        raise BadHouse(file, entry, f"XML with entity definitions is refused ({what})") from None
+        error_name = type(error).__name__
+        raise BadHouse(
+            file, entry, f"XML with entity definitions is refused ({error_name})"
+        ) from None
     except ParseError as error:
         raise BadHouse(file, entry, f"XML is not well-formed: {error}", hint=RESAVE) from None
     except (ValueError, LookupError, RecursionError):

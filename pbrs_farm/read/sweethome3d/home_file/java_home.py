@@ -51,12 +51,12 @@ def root_from_java(data: bytes, file: str) -> Element:
     Raises BadHouse for a damaged stream, or one whose object is no home.
     """
     try:
-        found = java_objects(data)
+        objects = java_objects(data)
     except JavaStreamError as error:
         raise BadHouse(
             file, "Home", f"{_ALONE} and that is damaged: {error}", hint=RESAVE
         ) from None
-    home = next((o for o in found if _is(o, "Home")), None)
+    home = next((o for o in objects if _is(o, "Home")), None)
     if home is None:
         raise BadHouse(file, "Home", f"{_ALONE} and that holds no home", hint=RESAVE)
     return _Converter(home).root()
@@ -143,9 +143,9 @@ class _Converter:
 
     def _id(self, thing: JavaObject) -> str:
         # Old versions wrote no ids.
-        own = thing.fields.get("id")
+        given_id = thing.fields.get("id")
         number = f"java-{len(self._ids)}"
-        return self._ids.setdefault(id(thing), own if isinstance(own, str) else number)
+        return self._ids.setdefault(id(thing), given_id if isinstance(given_id, str) else number)
 
     def _refer(self, element: Element, name: str, thing: Any) -> None:
         if isinstance(thing, JavaObject):
@@ -158,13 +158,13 @@ class _Converter:
         pieces = next((x for x in lists if x is not None), None)
         # Walk the groups without recursion; an object that comes again is left out.
         stack = [(piece, root, 0) for piece in reversed(_elements_of_list(pieces))]
-        seen: set[int] = set()
+        visited: set[int] = set()
         while stack:
             piece, parent, depth = stack.pop()
             tag = next((t for name, t in _TAGS.items() if _is(piece, name)), None)
-            if tag is None or id(piece) in seen or depth > _MAX_GROUP_DEPTH:
+            if tag is None or id(piece) in visited or depth > _MAX_GROUP_DEPTH:
                 continue
-            seen.add(id(piece))
+            visited.add(id(piece))
             element = SubElement(parent, tag)
             if tag == "furnitureGroup":
                 _fields(element, piece, "name visible")

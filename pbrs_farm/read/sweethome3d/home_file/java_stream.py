@@ -71,13 +71,13 @@ def java_objects(data: bytes) -> list[Any]:
     if not data.startswith(_MAGIC):
         raise JavaStreamError("byte 0: no Java serialisation stream")
     reader = _Reader(data)
-    found = []
+    contents = []
     try:
         while not reader.is_done:
-            found.append(_run_calls(reader.content()))
+            contents.append(_run_calls(reader.content()))
     except struct.error:
         raise JavaStreamError(f"byte {reader.at}: the stream ends early") from None
-    return found
+    return contents
 
 
 def _run_calls(call: _Call) -> Any:
@@ -186,10 +186,10 @@ class _Reader:
             return None
         if code == _CLASSDESC:
             return (yield self._new_class())
-        found = self._referred() if code == _REFERENCE else None
-        if not isinstance(found, _ClassDesc):
+        desc = self._referred() if code == _REFERENCE else None
+        if not isinstance(desc, _ClassDesc):
             raise self._fail("expected a class")
-        return found
+        return desc
 
     def _new_class(self) -> _Call:
         desc = _ClassDesc(self._utf(self._number("H")))
@@ -222,7 +222,7 @@ class _Reader:
         desc = yield self._class_desc()
         if desc is None:
             raise self._fail("an object without a class")
-        made = self._remember(JavaObject(desc.name))
+        instance = self._remember(JavaObject(desc.name))
         # Read the fields of the topmost class first.
         chain: list[_ClassDesc] = []
         up: _ClassDesc | None = desc
@@ -235,14 +235,14 @@ class _Reader:
             if part.flags & _IS_EXTERNALIZABLE and not part.flags & _HAS_BLOCKS:
                 raise self._fail(f"{part.name[:80]} writes a form of its own")
             for letter, name in part.fields if part.flags & _IS_SERIALIZABLE else ():
-                made.fields[name] = yield self._value(letter)
+                instance.fields[name] = yield self._value(letter)
             if part.flags & (_HAS_WRITE_METHOD | _IS_EXTERNALIZABLE):
-                yield self._until_end(made.written)
-        return made
+                yield self._until_end(instance.written)
+        return instance
 
     def _array(self) -> _Call:
         desc = yield self._class_desc()
-        made: list[Any] = self._remember([])
+        array: list[Any] = self._remember([])
         count, letter = self._number("i"), desc.name[1:2] if desc is not None else ""
         # Every element takes a byte or more, so a larger count is damage.
         if not 0 <= count <= len(self._data) - self.at:
@@ -250,12 +250,12 @@ class _Reader:
         # "[I" names an array of int; its numbers follow without type codes.
         if letter in _PRIMITIVES:
             form = f">{count}{_PRIMITIVES[letter]}"
-            made += struct.unpack_from(form, self._data, self.at)
+            array += struct.unpack_from(form, self._data, self.at)
             self.at += struct.calcsize(form)
-            return made
+            return array
         for _ in range(count):
-            made.append((yield self.content()))
-        return made
+            array.append((yield self.content()))
+        return array
 
     def _enum(self) -> _Call:
         yield self._class_desc()

@@ -54,23 +54,23 @@ def _is_opening(a: Attributes) -> bool:
 
 
 def _materials(a: Attributes) -> tuple[tuple[str, Paint], ...]:
-    found = []
+    materials = []
     for element in a.element.findall("material"):
         name = element.get("name", "")
         inner = Attributes(a.file, f"{a.place} material '{name}'", element, a.max_extent_m)
-        found.append((name, piece_paint(inner)))
-    return tuple(found)
+        materials.append((name, piece_paint(inner)))
+    return tuple(materials)
 
 
 def _transformations(a: Attributes) -> tuple[tuple[str, tuple[float, ...]], ...]:
-    found = []
+    transformations = []
     for element in a.element.findall("transformation"):
         name = element.get("name", "")
         inner = Attributes(a.file, f"{a.place} transformation '{name}'", element, a.max_extent_m)
         matrix = inner.numbers("matrix", 12)
         if matrix is not None:
-            found.append((name, matrix))
-    return tuple(found)
+            transformations.append((name, matrix))
+    return tuple(transformations)
 
 
 def _joints(a: Attributes) -> tuple[Joint, ...]:

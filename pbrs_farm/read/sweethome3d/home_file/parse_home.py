@@ -100,13 +100,13 @@ def _furniture_elements(root: Element, file: str) -> Iterator[tuple[Element, str
 
 def _parse_levels(elements: list[Attributes]) -> tuple[PlanLevel, ...]:
     # Sort by height, then by the order that the program keeps for levels of one height.
-    found = [
+    rows = [
         (a.metres("elevation", 0.0), a.number("elevationIndex", 0.0), k)
         for k, a in enumerate(elements)
     ]
-    lowest = min((f[0] for f in found), default=0.0)
+    lowest = min((f[0] for f in rows), default=0.0)
     levels = []
-    for index, (elevation, _, k) in enumerate(sorted(found)):
+    for index, (elevation, _, k) in enumerate(sorted(rows)):
         a = elements[k]
         thickness = a.length("floorThickness", 0.12)
         levels.append(
