@@ -80,18 +80,22 @@ def with_offices(plans: tuple[Plan, ...], n: int) -> tuple[Plan, ...]:
     rooms = [
         (storey, number) for storey, plan in enumerate(plans) for number in range(len(plan.rooms))
     ]
-    bedrooms = [at for at in rooms if plans[at[0]].rooms[at[1]].type is RoomType.BEDROOM]
+    bedrooms = [
+        place for place in rooms if plans[place[0]].rooms[place[1]].type is RoomType.BEDROOM
+    ]
 
-    def rank(at: tuple[int, int]) -> tuple[bool, float]:
-        plan = plans[at[0]]
-        guests = (o for o in plan.openings if o.other == at[1] and o.room != at[1])
+    def rank(place: tuple[int, int]) -> tuple[bool, float]:
+        plan = plans[place[0]]
+        guests = (o for o in plan.openings if o.other == place[1] and o.room != place[1])
         private = (RoomType.WARDROBE, RoomType.BATHROOM)
-        return any(plan.rooms[o.room].type in private for o in guests), plan.rooms[at[1]].area
+        return any(plan.rooms[o.room].type in private for o in guests), plan.rooms[place[1]].area
 
-    largest = max(bedrooms, key=lambda at: plans[at[0]].rooms[at[1]].area, default=None)
-    chosen = sorted((at for at in bedrooms if at != largest), key=rank)[:n]
+    largest = max(bedrooms, key=lambda place: plans[place[0]].rooms[place[1]].area, default=None)
+    chosen = sorted((place for place in bedrooms if place != largest), key=rank)[:n]
     label = RoomType.OFFICE.label
-    names = {at: label if n == 1 else f"{label} {k + 1}" for k, at in enumerate(sorted(chosen))}
+    names = {
+        place: label if n == 1 else f"{label} {k + 1}" for k, place in enumerate(sorted(chosen))
+    }
     return tuple(
         replace(
             plan,

@@ -50,9 +50,9 @@ def generate_home(
     rng = np.random.default_rng(keys.seed("made", home.version, *words))
     shelf = catalogue if home.furniture else EMPTY
     drawn = drawn_home(rng, shelf, wishes=wishes, programme=programme, style=home.style)
-    said = origin_of_home(home, shelf, programme)
-    contents = home_contents(drawn.storeys, shelf, rng, drawn.stair, name=home.name, origin=said)
-    return GeneratedHome(drawn.storeys, contents, said, drawn.stair)
+    origin = origin_of_home(home, shelf, programme)
+    contents = home_contents(drawn.storeys, shelf, rng, drawn.stair, name=home.name, origin=origin)
+    return GeneratedHome(drawn.storeys, contents, origin, drawn.stair)
 
 
 def origin_of_home(home: MadeHome, catalogue: Catalogue, programme: Programme | None = None) -> str:
@@ -78,16 +78,16 @@ def furnish_storeys(
     """
     rng = np.random.default_rng(keys.seed("own plan", VERSION, seed, style, key))
     storeys = []
-    for plan, own in zip(plans, given_pieces, strict=True):
+    for plan, given in zip(plans, given_pieces, strict=True):
         grounds = [Polygon(room.polygon).buffer(0.02) for room in plan.rooms]
-        taken = {piece.room for piece in own}
+        taken = {piece.room for piece in given}
         drawn = [
             p
             for p in furnished(plan, catalogue, rng, style)
             if p.room not in taken and grounds[p.room].contains(Polygon(p.corners))
         ]
-        storeys.append(Storey(plan, (*own, *drawn)))
-    words = [repr(own) for own in given_pieces if own]
+        storeys.append(Storey(plan, (*given, *drawn)))
+    words = [repr(given) for given in given_pieces if given]
     digest = keys.digest("own plan", VERSION, seed, style, key, catalogue.digest, *words)
     contents = home_contents(storeys, catalogue, rng, name=name, origin=f"plan {digest}")
     return GeneratedHome(tuple(storeys), contents, f"plan {digest}")

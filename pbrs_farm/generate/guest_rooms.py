@@ -57,15 +57,15 @@ def hosts_of(programme: Programme) -> dict[int, int]:
     first = next(bathrooms, -1)
     cut_from = _CUT_FROM if first >= 0 else {**_CUT_FROM, RoomType.WC: _WC_BELOW}
     # A room with required neighbours keeps a separate rectangle.
-    wished = {k for room, others in programme.adjacent for k in (room, *others)}
+    wished = {k for room, partners in programme.adjacent for k in (room, *partners)}
     for number, wish in enumerate(programme.rooms):
         types = cut_from.get(wish.type, ()) if number not in wished else ()
         if wish.type is RoomType.BATHROOM and first == number:
             continue
         free = [
             i
-            for i, other in enumerate(programme.rooms)
-            if other.type in types and i not in hosts.values() and i not in hosts
+            for i, host_wish in enumerate(programme.rooms)
+            if host_wish.type in types and i not in hosts.values() and i not in hosts
         ]
         if free:
             # The largest room can spare most.
@@ -106,11 +106,11 @@ def cut_guests(
             )
             and _keeps_rules((inner, rest), parts, programme, (guest, host), brief, notch)
         )
-        found = next(fitting, None)
-        if found is None:
+        cut = next(fitting, None)
+        if cut is None:
             uncut.add(guest)
         else:
-            parts[guest], parts[host] = (found[0],), found[1]
+            parts[guest], parts[host] = (cut[0],), cut[1]
     return uncut
 
 
@@ -160,8 +160,8 @@ def _opens_to_hall(wish: RoomWish, host: RoomWish) -> bool:
 
 def hall_wall_m(host: RoomWish, guest: RoomWish | None) -> float:
     """Metres of wall that a room and its guest need at the hall, for their doors."""
-    own = door_m(host.type)
-    return own + door_m(guest.type) if guest and _opens_to_hall(guest, host) else own
+    own_m = door_m(host.type)
+    return own_m + door_m(guest.type) if guest and _opens_to_hall(guest, host) else own_m
 
 
 def _shared_length(rects: tuple[IntRect, ...], others: tuple[IntRect, ...]) -> float:
@@ -206,8 +206,8 @@ def _corner_cuts(whole: IntRect, wish: RoomWish) -> Iterator[Cut]:
                 beside = (xb, x1) if xa == x0 else (x0, xa)
                 for za, zb in ((z0, z0 + d), (z1 - d, z1)):
                     rest = (zb, z1) if za == z0 else (z0, za)
-                    left = (x0, rest[0], x1, rest[1]), (beside[0], za, beside[1], zb)
-                    yield (xa, za, xb, zb), left
+                    rest_of_whole = (x0, rest[0], x1, rest[1]), (beside[0], za, beside[1], zb)
+                    yield (xa, za, xb, zb), rest_of_whole
 
 
 def _rectangles(rest: tuple[IntRect, ...], inner: IntRect) -> Iterator[IntRect]:

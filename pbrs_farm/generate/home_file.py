@@ -283,7 +283,7 @@ def _add_levels(
     if len(storeys) == 1:
         return [{}]
     slab = stair.slab_m if stair is not None else SLAB_M
-    found, elevation = [], 0.0
+    levels, elevation = [], 0.0
     for number, storey in enumerate(storeys):
         name = f"level-{number}"
         ET.SubElement(
@@ -298,9 +298,9 @@ def _add_levels(
                 "elevationIndex": "0",
             },
         )
-        found.append({"level": name})
+        levels.append({"level": name})
         elevation += storey.plan.height + slab
-    return found
+    return levels
 
 
 def _add_stairs(
@@ -497,9 +497,12 @@ def _straight_parts(wall: PlanWall) -> list[PlanWall]:
         return [wall]
     return [
         replace(
-            wall, start=wall.at(low), end=wall.at(high), tops=((0.0, here), (high - low, there))
+            wall,
+            start=wall.at(low),
+            end=wall.at(high),
+            tops=((0.0, low_top), (high - low, high_top)),
         )
-        for (low, here), (high, there) in pairwise(wall.tops)
+        for (low, low_top), (high, high_top) in pairwise(wall.tops)
         if high - low > _STEP_M
     ]
 

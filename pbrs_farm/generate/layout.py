@@ -64,21 +64,21 @@ def layout(programme: Programme, rng: np.random.Generator, *, is_fixed: bool = F
     is_fixed: nothing may be dropped, as for a user's programme. Raises BadInput if there is no plan,
     with the nearest programme that has one.
     """
-    said = f"{len(programme.rooms)} rooms in {programme.area:.0f} m2"
+    size_text = f"{len(programme.rooms)} rooms in {programme.area:.0f} m2"
     for left_out, tried in _easier(programme):
         n_tries = N_TRIES * (_FIXED_TRIES if is_fixed else 1)
-        found = _solved_layout(tried, rng, is_fixed=is_fixed, n_tries=n_tries)
-        if found is None:
+        solution = _solved_layout(tried, rng, is_fixed=is_fixed, n_tries=n_tries)
+        if solution is None:
             continue
         if is_fixed and left_out:
             raise BadInput(
-                "programme", "", f"{said} have no plan with {left_out}", hint="leave it out"
+                "programme", "", f"{size_text} have no plan with {left_out}", hint="leave it out"
             )
-        return found
+        return solution
     raise BadInput(
         "programme",
         "",
-        f"{said} have no plan",
+        f"{size_text} have no plan",
         hint="fewer rooms, or areas nearer to those of docs/homes.md",
     )
 
@@ -146,10 +146,10 @@ def _solved_layout(
     n_solved = 0
     hall = owner.index(first_of(programme, RoomType.HALL))
     for _ in range(n_tries):
-        found = solved(tuple(leaves), contacts, hall, lit, rng, outline, n_moves, ratios)
-        if found is None:
+        solution = solved(tuple(leaves), contacts, hall, lit, rng, outline, n_moves, ratios)
+        if solution is None:
             continue
-        brief, rects = found
+        brief, rects = solution
         parts: list[tuple[IntRect, ...]] = [
             tuple(r for r, o in zip(rects, owner, strict=False) if o == number)
             for number in range(len(programme.rooms))
@@ -221,7 +221,7 @@ def _contacts(programme: Programme, owner: list[int], hosts: dict[int, int]) -> 
             contacts.append(Contact(i, (*halls, *living), DOOR_WALL_M))
         elif o in en_suites:
             # Its door is its bedroom's; guests reach the only one from the hall, where they can.
-            beds = tuple(j for j, other in enumerate(owner) if other in en_suites[o])
+            beds = tuple(j for j, leaf_owner in enumerate(owner) if leaf_owner in en_suites[o])
             contacts.append(Contact(i, beds, DOOR_WALL_M))
             if n_bathrooms == 1:
                 contacts.append(Contact(i, halls, DOOR_WALL_M, is_hard=False))
@@ -230,11 +230,11 @@ def _contacts(programme: Programme, owner: list[int], hosts: dict[int, int]) -> 
             contacts.append(Contact(i, leaves_of(*programme.entered_from(type_)), wall))
         # Keep pipes short.
         wet = leaves_of(RoomType.KITCHEN, RoomType.BATHROOM, RoomType.WC)
-        others = tuple(j for j in wet if j != i)
-        if type_ in (RoomType.BATHROOM, RoomType.WC) and others:
-            contacts.append(Contact(i, others, 0.9, is_hard=False))
-    for room, others in programme.adjacent:
-        near = tuple(i for i, o in enumerate(owner) if o in others)
+        partners = tuple(j for j in wet if j != i)
+        if type_ in (RoomType.BATHROOM, RoomType.WC) and partners:
+            contacts.append(Contact(i, partners, 0.9, is_hard=False))
+    for room, partners in programme.adjacent:
+        near = tuple(i for i, o in enumerate(owner) if o in partners)
         contacts.append(Contact(owner.index(room), near, _BESIDE_M))
     return tuple(contacts)
 

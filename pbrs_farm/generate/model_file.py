@@ -46,8 +46,8 @@ class WrittenSurface:
 
 def written_surfaces(shape: Shape) -> Iterator[WrittenSurface]:
     """The surfaces that obj_file writes, without writing them; equal to what parsing gives, bit by bit."""
-    for number, given in enumerate(shape.surfaces):
-        surface = _visible_surface(given)
+    for number, given_surface in enumerate(shape.surfaces):
+        surface = _visible_surface(given_surface)
         if len(surface.faces):
             yield WrittenSurface(
                 _group_name(shape, surface, number),
@@ -122,8 +122,8 @@ def hanger(joint: Joint, number: int) -> str:
 
 def _obj_lines(shape: Shape) -> Iterator[str]:
     n_points = n_uvs = n_normals = 1
-    for number, given in enumerate(shape.surfaces):
-        surface = _visible_surface(given)
+    for number, given_surface in enumerate(shape.surfaces):
+        surface = _visible_surface(given_surface)
         yield f"g {_group_name(shape, surface, number)}"
         yield f"usemtl {material_name(shape, surface.material)}"
         yield from (
@@ -151,8 +151,8 @@ def _visible_surface(surface: Surface) -> Surface:
     The program, and every reader, fits the box of all vertices to the piece's size.
     """
     written = np.asarray(surface.positions, np.float64).round(_DECIMALS)
-    seen = surface.faces[face_areas(written[surface.faces]) > 0]
-    used, faces = np.unique(seen, return_inverse=True)
+    visible = surface.faces[face_areas(written[surface.faces]) > 0]
+    used, faces = np.unique(visible, return_inverse=True)
     return replace(
         surface,
         positions=surface.positions[used],

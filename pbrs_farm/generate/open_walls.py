@@ -72,28 +72,28 @@ class WallDrawing:
         for opening in self.openings:
             wall = self.walls[opening.wall]
             x, z = wall.at(opening.along)
-            here, along = (x, z) if run.is_vertical else (z, x)
+            across, along = (x, z) if run.is_vertical else (z, x)
             if (wall.start[0] == wall.end[0]) == run.is_vertical and (
-                abs(here - run.line * STEP_M) < 1e-6
+                abs(across - run.line * STEP_M) < 1e-6
             ):
                 spans.append((along - opening.width / 2, along + opening.width / 2))
         # Nothing opens where a parapet meets the wall.
         half = PARAPET_M / 2
         for x, z in self.rims:
-            here, along = (x, z) if run.is_vertical else (z, x)
-            if abs(here - run.line * STEP_M) < OUTER_M:
+            across, along = (x, z) if run.is_vertical else (z, x)
+            if abs(across - run.line * STEP_M) < OUTER_M:
                 spans.append((along - half, along + half))
         return spans
 
     def gaps(self, run: WallRun) -> list[tuple[float, float]]:
         """Free intervals of a run between its corners, the longest first."""
         low, high = self.free(run)
-        found = []
+        gaps = []
         for a, b in sorted(self.taken(run)):
             if a < high and b > low:
-                found.append((low, a))
+                gaps.append((low, a))
                 low = b
-        return sorted([*found, (low, high)], key=lambda g: (g[0] - g[1], g[0]))
+        return sorted([*gaps, (low, high)], key=lambda g: (g[0] - g[1], g[0]))
 
     def swing(self, run: WallRun, at: float, width: float, room: int) -> Rect:
         """The square of a room that the leaf of a door sweeps: x0, z0, x1, z1, metres.
@@ -109,10 +109,10 @@ class WallDrawing:
     def meets_swing(self, room: int, rect: Rect) -> bool:
         """Whether a leaf would hit another one of the room."""
         return any(
-            other == room
+            swing_room == room
             and min(rect[2], r[2]) - max(rect[0], r[0]) > _LEAVES_M
             and min(rect[3], r[3]) - max(rect[1], r[1]) > _LEAVES_M
-            for other, r in self.swings
+            for swing_room, r in self.swings
         )
 
 

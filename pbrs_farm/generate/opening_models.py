@@ -108,17 +108,17 @@ def opening_model(opening: PlanOpening, wall_m: float, design: OpeningDesign) ->
         handles = _handles(w, d, opening.hinge_at_start, design.handle)
         # It hangs at the front of its leaf, which swings into the room.
         side = -1.0 if opening.hinge_at_start else 1.0
-        at = (side * (w / 2 - _FRAME_M - _GAP_M), 0.0, d / 2 - 0.005)
-        hung = Joint("leaf 1", JointKind.REVOLUTE, at, (0.0, side, 0.0), _WIDE_OPEN_RAD)
+        hinge = (side * (w / 2 - _FRAME_M - _GAP_M), 0.0, d / 2 - 0.005)
+        hung = Joint("leaf 1", JointKind.REVOLUTE, hinge, (0.0, side, 0.0), _WIDE_OPEN_RAD)
         moving = [boxes_surface("leaf", leaf, 0), boxes_surface("handle", handles, 1)]
         return _with_joints([boxes_surface("frame", frame, 0)], [(hung, moving)], (paint, metal))
     hung_sashes = []
     for k, (x, bars, panes, catches) in enumerate(_sashes(w, h, design)):
         # Its catch is at the right of even sashes, the hinges at the other end, in front.
-        left = k % 2 == 0
-        at = (x[0] if left else x[1], 0.0, _SASH_DEPTH_M)
-        axis = (0.0, -1.0 if left else 1.0, 0.0)
-        hung = Joint(f"sash {k + 1}", JointKind.REVOLUTE, at, axis, _WIDE_OPEN_RAD)
+        is_left = k % 2 == 0
+        hinge = (x[0] if is_left else x[1], 0.0, _SASH_DEPTH_M)
+        axis = (0.0, -1.0 if is_left else 1.0, 0.0)
+        hung = Joint(f"sash {k + 1}", JointKind.REVOLUTE, hinge, axis, _WIDE_OPEN_RAD)
         boxes = [("bars", bars, 0), ("pane", panes, 1), ("catch", catches, 2)]
         hung_sashes.append((hung, [boxes_surface(*row) for row in boxes]))
     return _with_joints([boxes_surface("frame", frame, 0)], hung_sashes, (paint, glass, metal))
@@ -204,7 +204,7 @@ def _panels(x: float, top: float, kind: str) -> list[tuple[float, float, float, 
 def _handles(w: float, d: float, hinge_at_start: bool, kind: str) -> list[_Box]:
     # On either side, away from the hinges.
     side = 1.0 if hinge_at_start else -1.0
-    at, front = side * (w / 2 - _FRAME_M - 0.06), d / 2 - 0.005
+    handle_x, front = side * (w / 2 - _FRAME_M - 0.06), d / 2 - 0.005
     boxes: list[_Box] = []
     for face, out in ((front, 1.0), (front - _LEAF_M, -1.0)):
 
@@ -220,20 +220,30 @@ def _handles(w: float, d: float, hinge_at_start: bool, kind: str) -> list[_Box]:
 
         y = _HANDLE_M
         if kind == "knob":
-            boxes.append(box((at - 0.01, at + 0.01), (y - 0.01, y + 0.01), (0.0, 0.04)))
-            boxes.append(box((at - 0.026, at + 0.026), (y - 0.026, y + 0.026), (0.04, 0.065)))
-            boxes.append(box((at - 0.03, at + 0.03), (y - 0.03, y + 0.03), (0.0, 0.008)))
+            boxes.append(box((handle_x - 0.01, handle_x + 0.01), (y - 0.01, y + 0.01), (0.0, 0.04)))
+            boxes.append(
+                box((handle_x - 0.026, handle_x + 0.026), (y - 0.026, y + 0.026), (0.04, 0.065))
+            )
+            boxes.append(
+                box((handle_x - 0.03, handle_x + 0.03), (y - 0.03, y + 0.03), (0.0, 0.008))
+            )
         elif kind == "bar":
             boxes += [
-                box((at - 0.008, at + 0.008), (low, low + 0.02), (0.0, 0.045))
+                box((handle_x - 0.008, handle_x + 0.008), (low, low + 0.02), (0.0, 0.045))
                 for low in (y - 0.14, y + 0.12)
             ]
-            boxes.append(box((at - 0.01, at + 0.01), (y - 0.17, y + 0.17), (0.04, 0.06)))
+            boxes.append(
+                box((handle_x - 0.01, handle_x + 0.01), (y - 0.17, y + 0.17), (0.04, 0.06))
+            )
         else:
             if kind == "plate":
-                boxes.append(box((at - 0.02, at + 0.02), (y - 0.15, y + 0.07), (0.0, 0.006)))
-            boxes.append(box((at - 0.01, at + 0.01), (y - 0.01, y + 0.01), (0.0, 0.05)))
-            boxes.append(box((at, at - side * 0.11), (y - 0.01, y + 0.01), (0.035, 0.05)))
+                boxes.append(
+                    box((handle_x - 0.02, handle_x + 0.02), (y - 0.15, y + 0.07), (0.0, 0.006))
+                )
+            boxes.append(box((handle_x - 0.01, handle_x + 0.01), (y - 0.01, y + 0.01), (0.0, 0.05)))
+            boxes.append(
+                box((handle_x, handle_x - side * 0.11), (y - 0.01, y + 0.01), (0.035, 0.05))
+            )
     return boxes
 
 
@@ -268,17 +278,20 @@ def _sashes(
 
 def _catch(x: float, y: float, kind: str) -> list[_Box]:
     """Handle of a sash, on the room side of its upright bar that begins at x."""
-    at, front = x + _SASH_M * 0.4, _SASH_DEPTH_M
+    handle_x, front = x + _SASH_M * 0.4, _SASH_DEPTH_M
     if kind == "knob":
-        return [((at - 0.012, y - 0.012, front), (at + 0.012, y + 0.012, front + 0.03))]
-    rose = ((at - 0.013, y - 0.03, front), (at + 0.013, y + 0.03, front + 0.008))
+        return [((handle_x - 0.012, y - 0.012, front), (handle_x + 0.012, y + 0.012, front + 0.03))]
+    rose = ((handle_x - 0.013, y - 0.03, front), (handle_x + 0.013, y + 0.03, front + 0.008))
     if kind == "bar":
         return [rose]
     reach = 0.11 if kind == "lever" else 0.075
     return [
         rose,
-        ((at - 0.009, y - reach, front + 0.022), (at + 0.009, y + 0.01, front + 0.036)),
-        ((at - 0.006, y - 0.006, front + 0.008), (at + 0.006, y + 0.006, front + 0.022)),
+        ((handle_x - 0.009, y - reach, front + 0.022), (handle_x + 0.009, y + 0.01, front + 0.036)),
+        (
+            (handle_x - 0.006, y - 0.006, front + 0.008),
+            (handle_x + 0.006, y + 0.006, front + 0.022),
+        ),
     ]
 
 

@@ -41,13 +41,13 @@ def plan_faults(plan: Plan) -> list[str]:
 
 
 def _dark_rooms(plan: Plan) -> list[str]:
-    found = []
+    faults = []
     for number, room in enumerate(plan.rooms):
         glass = sum(o.width * o.height for o in plan.openings_of(number) if _is_window(o))
-        wanted = room.area * GLASS_SHARE
-        if room.type.is_habitable and glass < _TOLERANCE * wanted:
-            found.append(f"{room.name}: {glass:.2f} m2 of glass, {wanted:.2f} wanted")
-    return found
+        glass_wanted = room.area * GLASS_SHARE
+        if room.type.is_habitable and glass < _TOLERANCE * glass_wanted:
+            faults.append(f"{room.name}: {glass:.2f} m2 of glass, {glass_wanted:.2f} wanted")
+    return faults
 
 
 def _unreached_rooms(plan: Plan) -> list[str]:
@@ -125,12 +125,12 @@ def _add_doors(drawing: WallDrawing, room: int) -> None:
     is_living = type_ in (RoomType.LIVING, RoomType.STUDIO)
     if is_living and drawing.rng.random() < drawing.family.passage and _add_passage(drawing, room):
         return
-    for others in _doors_to(drawing, type_):
+    for entries in _doors_to(drawing, type_):
         # Two leaves that hit each other are the last choice.
         if any(
             _add_door(drawing, run, room, OpeningKind.DOOR, width, may_meet=may_meet)
             for may_meet in (False, True)
-            for run in _runs_between(drawing, room, others)
+            for run in _runs_between(drawing, room, entries)
         ):
             break
     # A closed kitchen often has a second door, to the living room; a bedroom of some families.
@@ -169,11 +169,11 @@ def _runs_between(drawing: WallDrawing, room: int, others: Iterable[int]) -> lis
 
 def _add_doors_of_en_suite(drawing: WallDrawing, room: int, bedrooms: tuple[int, ...]) -> None:
     """Add a bathroom's door to its bedroom; the home's only bathroom gets another to the hall if it fits."""
-    wanted: list[tuple[Iterable[int], bool]] = [(bedrooms, True)]
+    targets: list[tuple[Iterable[int], bool]] = [(bedrooms, True)]
     if drawing.types.count(RoomType.BATHROOM) == 1:
-        wanted.append((rooms_of_types(drawing.types, RoomType.HALL), False))
-    for others, may_meet in wanted:
-        for run in _runs_between(drawing, room, others):
+        targets.append((rooms_of_types(drawing.types, RoomType.HALL), False))
+    for entries, may_meet in targets:
+        for run in _runs_between(drawing, room, entries):
             if _add_door(drawing, run, room, OpeningKind.DOOR, _WET_DOOR_M, may_meet=may_meet):
                 break
 
@@ -189,7 +189,10 @@ def _doors_to(drawing: WallDrawing, type_: RoomType) -> Iterable[list[int]]:
         return halls, rooms_of_types(types, RoomType.KITCHEN)
     if type_ is RoomType.BATHROOM:
         return halls, rooms_of_types(types, RoomType.BEDROOM)
-    return [rooms_of_types(types, one) for one in drawing.layout.programme.entered_from(type_)]
+    return [
+        rooms_of_types(types, entry_type)
+        for entry_type in drawing.layout.programme.entered_from(type_)
+    ]
 
 
 def _add_door(
@@ -214,20 +217,20 @@ def _add_door(
     places = [(at_low, True), (at_high, False)]
     if drawing.rng.random() < 0.5:
         places.reverse()
-    other = next((r for r in run.rooms if r != room), OUTSIDE)
+    neighbour = next((r for r in run.rooms if r != room), OUTSIDE)
     # Doors of small rooms open outwards, since the leaf would fill the room.
-    opens_out = other != OUTSIDE and drawing.types[room] in _OPENS_OUT
-    into, behind = (other, room) if opens_out else (room, other)
-    for at, hinge_at_start in places:
-        span = (at - width / 2 - 0.02, at + width / 2 + 0.02)
+    opens_out = neighbour != OUTSIDE and drawing.types[room] in _OPENS_OUT
+    into, behind = (neighbour, room) if opens_out else (room, neighbour)
+    for middle, hinge_at_start in places:
+        span = (middle - width / 2 - 0.02, middle + width / 2 + 0.02)
         if any(a < span[1] and b > span[0] for a, b in drawing.taken(run)):
             continue
         if kind is not OpeningKind.PASSAGE:
-            swing = drawing.swing(run, at, width, into)
+            swing = drawing.swing(run, middle, width, into)
             if not may_meet and drawing.meets_swing(into, swing):
                 continue
             drawing.swings.append((into, swing))
-        wall, along = drawing.wall_of(run, at)
+        wall, along = drawing.wall_of(run, middle)
         drawing.openings.append(
             PlanOpening(
                 kind,

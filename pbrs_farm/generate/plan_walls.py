@@ -45,8 +45,8 @@ class WallRun:
 
     def point(self, along: float) -> Point:
         """The point `along` steps on the grid's axis."""
-        here, there = self.line * STEP_M, along * STEP_M
-        return (here, there) if self.is_vertical else (there, here)
+        across, lengthwise = self.line * STEP_M, along * STEP_M
+        return (across, lengthwise) if self.is_vertical else (lengthwise, across)
 
 
 def runs_of(layout: Layout) -> list[WallRun]:
@@ -71,13 +71,13 @@ def _runs_on_line(
     before: NDArray[np.int32], after: NDArray[np.int32], line: int, is_vertical: bool
 ) -> list[WallRun]:
     # The rim shifts cells by one: cell k is between the coordinates k - 1 and k.
-    found, start = [], 0
+    runs, start = [], 0
     for (a, b), group in groupby(zip(before.tolist(), after.tolist(), strict=True)):
         stop = start + len(list(group))
         if a != b:
-            found.append(WallRun(is_vertical, line, start - 1, stop - 1, a, b))
+            runs.append(WallRun(is_vertical, line, start - 1, stop - 1, a, b))
         start = stop
-    return found
+    return runs
 
 
 def thickness(run: WallRun, types: list[RoomType]) -> float:
@@ -116,13 +116,13 @@ def walls_of(layout: Layout, runs: list[WallRun]) -> tuple[PlanWall, ...]:
 def open_pairs(layout: Layout) -> frozenset[frozenset[int]]:
     """Each two rooms without a wall between: an open kitchen, stairs and their hall."""
     types = [wish.type for wish in layout.programme.rooms]
-    found = []
+    pairs = []
     if layout.programme.open_kitchen and RoomType.KITCHEN in types:
         living = next(i for i, t in enumerate(types) if t in (RoomType.LIVING, RoomType.STUDIO))
-        found.append(frozenset((living, types.index(RoomType.KITCHEN))))
+        pairs.append(frozenset((living, types.index(RoomType.KITCHEN))))
     if RoomType.STAIRS in types:
-        found.append(frozenset((types.index(RoomType.HALL), types.index(RoomType.STAIRS))))
-    return frozenset(found)
+        pairs.append(frozenset((types.index(RoomType.HALL), types.index(RoomType.STAIRS))))
+    return frozenset(pairs)
 
 
 def rooms_of(layout: Layout, walls: tuple[PlanWall, ...]) -> tuple[PlanRoom, ...]:
@@ -164,14 +164,17 @@ def corners(shape: BaseGeometry) -> tuple[Point, ...]:
     # Leave out all but one of those at one place: beside itself no corner turns, and it would go.
     points = [p for i, p in enumerate(points) if p != points[i - 1]]
     # Drop collinear points.
-    kept = [
+    kept_points = [
         p
         for i, p in enumerate(points)
         if abs(_turn(points[i - 1], p, points[(i + 1) % len(points)])) > 1e-6
     ]
     # The shoelace sum is positive for a ring that runs anticlockwise.
-    area = sum(_turn((0.0, 0.0), a, b) for a, b in zip(kept, kept[1:] + kept[:1], strict=True))
-    return tuple(kept if area > 0 else kept[::-1])
+    area = sum(
+        _turn((0.0, 0.0), a, b)
+        for a, b in zip(kept_points, kept_points[1:] + kept_points[:1], strict=True)
+    )
+    return tuple(kept_points if area > 0 else kept_points[::-1])
 
 
 def _turn(a: Point, b: Point, c: Point) -> float:

@@ -81,10 +81,10 @@ class Programme:
     def entered_from(self, type_: RoomType) -> tuple[RoomType, ...]:
         """The rooms that the door of a room may open to, the preferred one first."""
         family, types = self.family, {wish.type for wish in self.rooms}
-        found: tuple[RoomType, ...] = (RoomType.HALL,)
+        entries: tuple[RoomType, ...] = (RoomType.HALL,)
         if type_ is RoomType.BEDROOM and family.bedrooms_at != "hall" and types & set(_LIVING):
-            found = _LIVING if family.bedrooms_at == "living" else (*_LIVING, RoomType.HALL)
-        return found
+            entries = _LIVING if family.bedrooms_at == "living" else (*_LIVING, RoomType.HALL)
+        return entries
 
     @property
     def area(self) -> float:
@@ -98,15 +98,15 @@ class Programme:
         If several bathrooms qualify, the last is en suite: the first serves the whole home.
         """
         types = [wish.type for wish in self.rooms]
-        found: dict[int, tuple[int, ...]] = {}
-        for room, others in self.adjacent:
-            kinds = {types[k] for k in others}
+        suites: dict[int, tuple[int, ...]] = {}
+        for room, partners in self.adjacent:
+            kinds = {types[k] for k in partners}
             if types[room] is RoomType.BATHROOM and kinds == {RoomType.BEDROOM}:
-                found[room] = others
+                suites[room] = partners
             if types[room] is RoomType.BEDROOM and kinds == {RoomType.BATHROOM}:
-                left = [k for k in others if k not in found] or list(others)
-                found[left[-1]] = (room,)
-        return found
+                free_bedrooms = [k for k in partners if k not in suites] or list(partners)
+                suites[free_bedrooms[-1]] = (room,)
+        return suites
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,7 +176,7 @@ def _draw_programme(rng: np.random.Generator, bedrooms: tuple[int, int], plans: 
     # The hall takes its share of the area of adjacent rooms.
     total = sum(r.area for r in rooms)
     doors = Programme(tuple(rooms), plans=plans)
-    n_doors = sum(RoomType.HALL in found for found in map(doors.entered_from, types))
+    n_doors = sum(RoomType.HALL in entries for entries in map(doors.entered_from, types))
     hall = max(total * rng.uniform(*family.hall_share), 3.0 + 0.95 * n_doors)
     rooms.append(RoomWish(RoomType.HALL, float(hall)))
     # Many rooms need many sides with daylight.
@@ -204,14 +204,14 @@ def drawn_area(rng: np.random.Generator, type_: RoomType, larger: float = 1.0) -
 def scaled_rooms(wishes: Sequence[RoomWish], area: float) -> list[RoomWish]:
     """The rooms with that area in all, as near as the bounds of each let them; stairs stay."""
     # Scale all alike, then give what a bound refused to the others.
-    found = list(wishes)
+    resized = list(wishes)
     for _ in range(20):
-        fixed = sum(w.area for w in found if w.type not in AREA_RANGE)
-        factor = (area - fixed) / (sum(w.area for w in found) - fixed)
+        fixed = sum(w.area for w in resized if w.type not in AREA_RANGE)
+        factor = (area - fixed) / (sum(w.area for w in resized) - fixed)
         if abs(factor - 1) < 1e-3:
             break
-        found = [_resize_wish(wish, factor) for wish in found]
-    return found
+        resized = [_resize_wish(wish, factor) for wish in resized]
+    return resized
 
 
 def _resize_wish(wish: RoomWish, factor: float) -> RoomWish:

@@ -46,18 +46,18 @@ _PAIR: Final = TypeAdapter(Annotated[tuple[str, str], exactly(2, "rooms")])
 
 def programme_from_json(path: Path) -> Programme:
     """Read a programme from a file. Raises BadInput, naming the violated rule and a remedy."""
-    given = checked(_File, json_from_file(path), path, hint=_FORM)
-    wishes = [_wish(path, k, row) for k, row in enumerate(given.rooms)]
-    wishes = _with_area(path, given.area, _complete(path, wishes))
+    file_fields = checked(_File, json_from_file(path), path, hint=_FORM)
+    wishes = [_wish(path, k, row) for k, row in enumerate(file_fields.rooms)]
+    wishes = _with_area(path, file_fields.area, _complete(path, wishes))
     most_notch = 0.2 * sum(w.area for w in wishes)
     return Programme(
         tuple(wishes),
-        open_kitchen=given.open_kitchen,
-        n_blind_sides=int(given.n_blind_sides),
-        notch=_number_within(path, "notch", given.notch, (0, most_notch)),
-        l_shaped=given.l_shaped,
-        balcony=given.balcony,
-        adjacent=_adjacent(path, given.adjacent, wishes),
+        open_kitchen=file_fields.open_kitchen,
+        n_blind_sides=int(file_fields.n_blind_sides),
+        notch=_number_within(path, "notch", file_fields.notch, (0, most_notch)),
+        l_shaped=file_fields.l_shaped,
+        balcony=file_fields.balcony,
+        adjacent=_adjacent(path, file_fields.adjacent, wishes),
     )
 
 
@@ -80,7 +80,7 @@ def _adjacent(
     path: Path, rows: list[Any], wishes: list[RoomWish]
 ) -> tuple[tuple[int, tuple[int, ...]], ...]:
     """Pairs of rooms by name or type: the first shares a wall with one that the second names."""
-    found = []
+    adjacent = []
     for number, row in enumerate(rows):
         place = f"adjacent {number + 1}"
         words = checked(_PAIR, row, path, place, hint='["Ada", "bathroom"]')
@@ -88,20 +88,20 @@ def _adjacent(
         if len(firsts) > 1:
             text = f"{words[0]!r} is {len(firsts)} rooms"
             raise BadInput(path, place, text, hint="name the room and write its name here")
-        others = tuple(k for k in seconds if k != firsts[0])
-        if not others:
+        partners = tuple(k for k in seconds if k != firsts[0])
+        if not partners:
             raise BadInput(path, place, f"{words[0]!r} is one room")
-        found.append((firsts[0], others))
-    return tuple(found)
+        adjacent.append((firsts[0], partners))
+    return tuple(adjacent)
 
 
 def _called(path: Path, place: str, word: str, wishes: list[RoomWish]) -> list[int]:
-    found = [k for k, w in enumerate(wishes) if w.name == word]
-    found = found or [k for k, w in enumerate(wishes) if w.type.value == word]
-    if not found:
+    matches = [k for k, w in enumerate(wishes) if w.name == word]
+    matches = matches or [k for k, w in enumerate(wishes) if w.type.value == word]
+    if not matches:
         names = ", ".join(dict.fromkeys(w.name or w.type.value for w in wishes))
         raise BadInput(path, place, f"no room is called {word[:40]!r}", hint=f"one of {names}")
-    return found
+    return matches
 
 
 def _number_within(
@@ -136,12 +136,14 @@ def _complete(path: Path, wishes: list[RoomWish]) -> list[RoomWish]:
     if RoomType.KITCHEN not in types:
         raise BadInput(path, "", "has no kitchen", hint='add {"type": "kitchen"}')
     # A hall without a given area takes its share of the adjacent rooms.
-    others = [w for w in wishes if w.type is not RoomType.HALL]
-    share = max(_ASKED_HALL_SHARE * sum(w.area for w in others), 3.0 + 0.95 * len(others))
-    given = next((w for w in wishes if w.type is RoomType.HALL), RoomWish(RoomType.HALL, 0.0))
-    hall = RoomWish(RoomType.HALL, given.area or share, given.name)
-    others.sort(key=lambda w: w.type not in (RoomType.LIVING, RoomType.STUDIO))
-    return [*others, hall]
+    other_wishes = [w for w in wishes if w.type is not RoomType.HALL]
+    share = max(
+        _ASKED_HALL_SHARE * sum(w.area for w in other_wishes), 3.0 + 0.95 * len(other_wishes)
+    )
+    hall_wish = next((w for w in wishes if w.type is RoomType.HALL), RoomWish(RoomType.HALL, 0.0))
+    hall = RoomWish(RoomType.HALL, hall_wish.area or share, hall_wish.name)
+    other_wishes.sort(key=lambda w: w.type not in (RoomType.LIVING, RoomType.STUDIO))
+    return [*other_wishes, hall]
 
 
 def _with_area(path: Path, area: float | None, wishes: list[RoomWish]) -> list[RoomWish]:

@@ -49,9 +49,9 @@ def _with_slanted_side(plan: Plan, rng: np.random.Generator) -> Plan:
         axis, outwards = sides[int(k)]
         grows = bool(rng.random() < 0.5)
         for share in _LESS:
-            found = _slanted(plan, axis, outwards, math.tan(angle) * share, grows=grows)
-            if found is not None and not plan_faults(found):
-                return found
+            slanted = _slanted(plan, axis, outwards, math.tan(angle) * share, grows=grows)
+            if slanted is not None and not plan_faults(slanted):
+                return slanted
     return plan
 
 
@@ -110,8 +110,8 @@ def _relit(old: Plan, new: Plan) -> Plan:
             continue
         ratio = new.rooms[o.room].area / old.rooms[o.room].area
         wider = replace(o, width=round(math.ceil(o.width * ratio * 100 - 1e-6) / 100, 2))
-        others = [p for j, p in enumerate(openings) if j != k and p.wall == o.wall]
-        if _fits(new, wider, others):
+        other_openings = [p for j, p in enumerate(openings) if j != k and p.wall == o.wall]
+        if _fits(new, wider, other_openings):
             openings[k] = wider
     return replace(new, openings=tuple(openings))
 
@@ -144,9 +144,9 @@ def _with_bay(plan: Plan, rng: np.random.Generator) -> Plan:
             and wall.is_outer
             and _is_level(wall)
         ):
-            found = _bay(plan, int(k), depth, spread)
-            if found is not None:
-                return found
+            with_bay = _bay(plan, int(k), depth, spread)
+            if with_bay is not None:
+                return with_bay
     return plan
 
 
@@ -165,9 +165,11 @@ def _bay(plan: Plan, number: int, depth: float, spread: float) -> Plan | None:
     half = opening.width / 2 + _BESIDE_PANE_M + wall.thickness / 2
     low, high = opening.along - half - spread, opening.along + half + spread
     mouth = replace(opening, width=high - low)
-    others = [o for k, o in enumerate(plan.openings) if k != number and o.wall == opening.wall]
+    other_openings = [
+        o for k, o in enumerate(plan.openings) if k != number and o.wall == opening.wall
+    ]
     clear = replace(mouth, width=mouth.width + 2 * (_FROM_CORNER_M - _BESIDE_PANE_M))
-    if low < 0 or high > wall.length or not _fits(plan, clear, others):
+    if low < 0 or high > wall.length or not _fits(plan, clear, other_openings):
         return None
     # The side of the wall that the room is not on.
     nx, nz = wall.normal
@@ -214,14 +216,14 @@ def _bay(plan: Plan, number: int, depth: float, spread: float) -> Plan | None:
 
 def _inner_faces(line: Sequence[Point], by: float) -> list[Point]:
     """The inner corners of a line of points, moved to the right of it by `by` metres, mitred."""
-    found = []
+    points = []
     for a, b, c in zip(line, line[1:], line[2:], strict=False):
         (ux, uz), (vx, vz) = _direction(a, b), _direction(b, c)
         # The mitre halves the turn: as long as keeps both faces `by` away.
         mx, mz = -uz - vz, ux + vx
         scale = 2 * by / (mx * mx + mz * mz)
-        found.append((round(b[0] + mx * scale, 4), round(b[1] + mz * scale, 4)))
-    return found
+        points.append((round(b[0] + mx * scale, 4), round(b[1] + mz * scale, 4)))
+    return points
 
 
 def _direction(a: Point, b: Point) -> Point:

@@ -240,19 +240,19 @@ _Limit = tuple[int, bool, float]  # of a cut: a side, whether it is the least on
 
 def _limits(tree: _Tree, brief: Brief, order: list[int]) -> dict[int, list[_Limit]]:
     """Bounds for the cuts around leaves with a given place; those of the pinned leaf last."""
-    found: dict[int, list[_Limit]] = {}
+    limits: dict[int, list[_Limit]] = {}
     n_cuts = len(tree.children)
     for leaf, place, is_exact in brief.places:
-        wanted = n_cuts + tree.leaf_at.index(leaf)
+        node = n_cuts + tree.leaf_at.index(leaf)
         # Process cuts from leaves to root: the order lists every cut before its children.
         for k in reversed(order):
-            if wanted in tree.children[k]:
-                is_first = wanted == tree.children[k][0]
+            if node in tree.children[k]:
+                is_first = node == tree.children[k][0]
                 side = place[2 * is_first + (not tree.vertical[k])]
-                reach = 0 if not is_exact else math.inf if wanted >= n_cuts else _SNAP
-                found.setdefault(k, []).append((side, is_first, reach))
-                wanted = k
-    return found
+                reach = 0 if not is_exact else math.inf if node >= n_cuts else _SNAP
+                limits.setdefault(k, []).append((side, is_first, reach))
+                node = k
+    return limits
 
 
 def _kept_off(cut: int, limits: list[_Limit]) -> int:

@@ -104,10 +104,10 @@ class Rules:
             if missing > 0:
                 total += _UNMET + missing
                 unmet += 1
-        for leaf_number, others, length, is_hard in self._contacts:
+        for leaf_number, partners, length, is_hard in self._contacts:
             rect, missing = rects[leaf_number], math.inf
-            for other in others:
-                missing = min(missing, _missing_contact(rect, rects[other], length))
+            for partner in partners:
+                missing = min(missing, _missing_contact(rect, rects[partner], length))
                 if missing <= 0:
                     break
             if missing > 0:

@@ -120,10 +120,10 @@ def _level_rail(side: float, w: float, d: float, rise: float) -> list[_Box]:
     low, high = sorted((side * _POST_M, side * w / 2))
     z0, z1 = d / 2 - 0.02 - _POST_M, d / 2 - 0.02
     n = max(round((high - low) / _APART_M), 2)
-    at = np.linspace(low + _POST_M / 2, high - _POST_M / 2, n + 1)
+    post_positions = np.linspace(low + _POST_M / 2, high - _POST_M / 2, n + 1)
     posts: list[_Box] = [
         ((x - 0.01, rise - 0.1, z0 + 0.008), (x + 0.01, rise + RAIL_M - 0.04, z1 - 0.008))
-        for x in at.tolist()
+        for x in post_positions.tolist()
     ]
     return [
         *posts,

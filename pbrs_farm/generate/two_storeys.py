@@ -46,10 +46,10 @@ def drawn_storeys(rng: np.random.Generator, wishes: Wishes) -> tuple[tuple[Plan,
         # Generate the upper storey only once the lower one has a plan.
         layouts = []
         for programme, n_tries in zip((lower, upper), _STOREY_TRIES, strict=True):
-            found = storey_layout(programme, core, n_tries, rng)
-            if found is None:
+            storeys = storey_layout(programme, core, n_tries, rng)
+            if storeys is None:
                 break
-            layouts.append(found)
+            layouts.append(storeys)
         if len(layouts) < 2:
             continue
         height = drawn_height(layouts[0], rng)
@@ -129,11 +129,19 @@ def _drawn_core(rng: np.random.Generator, lower: Programme, upper: Programme) ->
     is_sideways = bool(rng.random() < 0.5)
     w, d = (_STAIRS[1], _STAIRS[0]) if is_sideways else _STAIRS
     if is_sideways:
-        at = _drawn_start(rng, along, w + _LANDING, w)
-        stairs, landing, front = (at, 0, at + w, d), (at + w, 0, at + w + _LANDING, d), (1, 0)
+        start = _drawn_start(rng, along, w + _LANDING, w)
+        stairs, landing, front = (
+            (start, 0, start + w, d),
+            (start + w, 0, start + w + _LANDING, d),
+            (1, 0),
+        )
     else:
-        at = _drawn_start(rng, along, w, w)
-        stairs, landing, front = (at, 0, at + w, d), (at, d, at + w, d + _LANDING), (0, 1)
+        start = _drawn_start(rng, along, w, w)
+        stairs, landing, front = (
+            (start, 0, start + w, d),
+            (start, d, start + w, d + _LANDING),
+            (0, 1),
+        )
     # Turn the frame onto that side of the outline.
     origin, tip = (_on_side(side, (x, z), across) for x, z in ((0, 0), front))
     places = [_turn_rect(side, rect, across) for rect in (stairs, landing)]

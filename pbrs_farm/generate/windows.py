@@ -65,29 +65,29 @@ def add_balcony(drawing: WallDrawing) -> None:
 
 def add_windows(drawing: WallDrawing, room: int) -> None:
     """Windows until a room's glass is an eighth of its floor; small ones where water runs."""
-    here, usual = drawing.rooms[room], drawing.family.window
+    own_room, usual = drawing.rooms[room], drawing.family.window
     runs = [r for r in drawing.runs if r.rooms == {room, OUTSIDE} and is_lit(r, drawing.layout)]
     runs.sort(key=lambda r: (-r.length, r.line, r.low))
-    if here.type in (RoomType.BATHROOM, RoomType.WC):
+    if own_room.type in (RoomType.BATHROOM, RoomType.WC):
         if runs and drawing.rng.random() < 0.75:
             _add_window(drawing, runs[0], room, (0.6, 0.6, 1.5))
         return
-    if not here.type.is_habitable and here.type is not RoomType.HALL:
+    if not own_room.type.is_habitable and own_room.type is not RoomType.HALL:
         return
-    if here.type is RoomType.HALL:
+    if own_room.type is RoomType.HALL:
         # A hall has a window where its outer wall is long.
         if runs and runs[0].length > 2.6 and drawing.rng.random() < 0.5:
             _add_window(drawing, runs[0], room, (0.8, usual.height, usual.sill))
         return
-    is_living = here.type in (RoomType.LIVING, RoomType.STUDIO)
+    is_living = own_room.type in (RoomType.LIVING, RoomType.STUDIO)
     height, sill = usual.height, usual.sill
     if is_living and drawing.rng.random() < drawing.family.french:
         height, sill = drawing.family.french_height, _FRENCH_SILL_M
     glass = sum(o.width * o.height for o in drawing.openings if _is_window_of(o, room))
-    wanted = here.area * GLASS_SHARE * float(drawing.rng.uniform(*drawing.family.glass))
+    glass_wanted = own_room.area * GLASS_SHARE * float(drawing.rng.uniform(*drawing.family.glass))
     # Fill the longest wall first, with two windows at most; make them wider where it is short.
     for run in runs:
-        missing = wanted - glass
+        missing = glass_wanted - glass
         if missing <= 0:
             break
         for gap in drawing.gaps(run):
@@ -96,8 +96,8 @@ def add_windows(drawing: WallDrawing, room: int) -> None:
             glass, missing = glass + added, missing - added
             if missing <= 0:
                 break
-    if wanted - glass > 0.05 * wanted:
-        _widen(drawing, room, here.area * GLASS_SHARE)
+    if glass_wanted - glass > 0.05 * glass_wanted:
+        _widen(drawing, room, own_room.area * GLASS_SHARE)
 
 
 def _is_window_of(opening: PlanOpening, room: int) -> bool:
@@ -124,10 +124,10 @@ def _add_row(
             continue
         # Round to the sizes that windows come in.
         width = math.floor(width * 10 + 0.999) / 10 if width + 0.1 <= room_each else width
-        apart = (high - low - count * width) / (count + 1)
+        spacing = (high - low - count * width) / (count + 1)
         glass = 0.0
         for k in range(count):
-            middle = low + apart * (k + 1) + width * (k + 0.5)
+            middle = low + spacing * (k + 1) + width * (k + 0.5)
             glass += _add_window(drawing, run, room, (width, height, sill), middle)
         if glass:
             return glass
@@ -160,9 +160,9 @@ def _add_window(
 
 def _widen(drawing: WallDrawing, room: int, wanted: float) -> None:
     """Make a room's windows French ones where plain ones give too little light."""
-    own = [i for i, o in enumerate(drawing.openings) if _is_window_of(o, room)]
-    for i in own:
-        glass = sum(drawing.openings[j].width * drawing.openings[j].height for j in own)
+    window_numbers = [i for i, o in enumerate(drawing.openings) if _is_window_of(o, room)]
+    for i in window_numbers:
+        glass = sum(drawing.openings[j].width * drawing.openings[j].height for j in window_numbers)
         old = drawing.openings[i]
         if glass >= wanted:
             return

@@ -18,11 +18,11 @@ def tubs(shelf: Shelf) -> tuple[Template, ...]:
     """Baths and showers in a corner; a bath before a shower where there is room."""
     baths = shelf.of("bathtub", width=(1.4, 1.85), depth=(0.65, 0.85))[:MAX_CHOICES]
     showers = shelf.of("shower", width=(0.7, 1.0), depth=(0.7, 1.2))[:MAX_CHOICES]
-    found = [_cornered(p, 0.4) for p in baths] + [_cornered(p, 0.0) for p in showers]
+    templates = [_cornered(p, 0.4) for p in baths] + [_cornered(p, 0.0) for p in showers]
     # Bathtubs are sold in shorter sizes too.
-    found += [_cornered(p, 0.1, length=1.5) for p in baths if p.size[0] > 1.55]
+    templates += [_cornered(p, 0.1, length=1.5) for p in baths if p.size[0] > 1.55]
     small = [_cornered(p, -0.3, length=0.75) for p in showers if p.size[0] > 0.8]
-    return tuple(found + small[:1])
+    return tuple(templates + small[:1])
 
 
 def _cornered(piece: Piece, rank: float, length: float | None = None) -> Template:
@@ -43,11 +43,11 @@ def _cornered(piece: Piece, rank: float, length: float | None = None) -> Templat
 
 def toilets(shelf: Shelf, *, beside: float = _BESIDE_TOILET_M) -> tuple[Template, ...]:
     """Toilets, .60 m free in front."""
-    found = shelf.of("toilet", depth=(0.4, 0.85))[:MAX_CHOICES]
-    found.sort(key=lambda p: p.size[1] > 0.72)
+    toilet_pieces = shelf.of("toilet", depth=(0.4, 0.85))[:MAX_CHOICES]
+    toilet_pieces.sort(key=lambda p: p.size[1] > 0.72)
     return tuple(
         single(p, before=0.6, corner=0.0, gap=_GAP, beside=beside, rank=-0.3 * p.size[1])
-        for p in found
+        for p in toilet_pieces
     )
 
 
@@ -57,7 +57,7 @@ def basins(shelf: Shelf, *, small: bool = False, before: float = 0.6) -> tuple[T
     pieces = shelf.of("washbasin", width=(0.4, widest), depth=(0.3, 0.72))
     if small:
         pieces.sort(key=lambda p: p.size[1])
-    found = []
+    templates = []
     for k, piece in enumerate(pieces[:6]):
         hangs = piece.place is Place.WALL
         lift = max(_RIM_M - piece.size[2] * 0.85, 0.3) if hangs else 0.0
@@ -65,7 +65,7 @@ def basins(shelf: Shelf, *, small: bool = False, before: float = 0.6) -> tuple[T
         # Wall-mounted pieces touch their wall.
         slot = backed(piece, gap=_HUNG_GAP if hangs else _GAP, elevation=lift)
         front = d + _GAP
-        found.append(
+        templates.append(
             Template(
                 "washbasin",
                 (slot,),
@@ -76,7 +76,7 @@ def basins(shelf: Shelf, *, small: bool = False, before: float = 0.6) -> tuple[T
                 stands_off_floor=hangs,
             )
         )
-    return tuple(found)
+    return tuple(templates)
 
 
 def washers(shelf: Shelf) -> tuple[Template, ...]:
@@ -89,9 +89,11 @@ def washers(shelf: Shelf) -> tuple[Template, ...]:
 
 def small_things(shelf: Shelf) -> tuple[Template, ...]:
     """Bins, baskets, a bidet, narrow shelves."""
-    found = [single(p, before=0.0, corner=0.5) for p in shelf.of("bin", height=(0.2, 0.6))[:2]]
-    found += [single(p, before=0.0, corner=0.5) for p in shelf.of("basket", width=(0.3, 0.6))[:2]]
-    return tuple(found)
+    templates = [single(p, before=0.0, corner=0.5) for p in shelf.of("bin", height=(0.2, 0.6))[:2]]
+    templates += [
+        single(p, before=0.0, corner=0.5) for p in shelf.of("basket", width=(0.3, 0.6))[:2]
+    ]
+    return tuple(templates)
 
 
 def narrow_shelves(shelf: Shelf) -> tuple[Template, ...]:

@@ -16,11 +16,11 @@ _BED_LIKES = Liking(corner=0.0, door=0.12, window_wall=-0.5)
 
 def double_beds(shelf: Shelf) -> tuple[Template, ...]:
     """Beds for two with their heads at a wall, two nightstands, one, or none; largest first."""
-    found = []
+    templates = []
     for bed in _beds(shelf, (1.3, 2.1))[:6]:
         for n in (2, 1, 0):
-            found.append(_double(bed, shelf, n))
-    return tuple(found)
+            templates.append(_double(bed, shelf, n))
+    return tuple(templates)
 
 
 def _double(bed: Piece, shelf: Shelf, n_stands: int) -> Template:
@@ -29,8 +29,8 @@ def _double(bed: Piece, shelf: Shelf, n_stands: int) -> Template:
     stands = shelf.of("nightstand", width=(0.3, 0.55))
     if stands:
         w = stands[0].size[0]
-        at = (width + w) / 2 + 0.03
-        slots += [backed(stands[0], u) for u in (-at, at)[:n_stands]]
+        offset = (width + w) / 2 + 0.03
+        slots += [backed(stands[0], u) for u in (-offset, offset)[:n_stands]]
     end = _HEAD_GAP + length
     sides = (
         (-width / 2 - _SIDE_M, 0.0, -width / 2, end),
@@ -59,7 +59,7 @@ def single_beds(shelf: Shelf, *, child: bool = False) -> tuple[Template, ...]:
         ]
         beds = liked + [b for b in beds if b not in liked]
     stands = shelf.of("nightstand", width=(0.3, 0.55))
-    found = []
+    templates = []
     for bed in beds[:4]:
         width, length, _ = bed.size
         side = (width / 2, 0.0, width / 2 + _SIDE_M, _HEAD_GAP + length)
@@ -69,7 +69,7 @@ def single_beds(shelf: Shelf, *, child: bool = False) -> tuple[Template, ...]:
             if stand is not None:
                 slots.append(backed(stand, (width + stand.size[0]) / 2 + 0.03))
             rank = 0.4 * (stand is not None)
-            found.append(
+            templates.append(
                 Template(
                     "in a corner",
                     tuple(slots),
@@ -83,7 +83,7 @@ def single_beds(shelf: Shelf, *, child: bool = False) -> tuple[Template, ...]:
         # Turn it: its long side at the wall, its head in the corner.
         along = slot(bed, 0.0, 0.02 + width / 2, turns=-1)
         front = (-length / 2 + 0.3, 0.02 + width, length / 2, 0.02 + width + _SIDE_M)
-        found.append(
+        templates.append(
             Template(
                 "along a wall",
                 (along,),
@@ -94,7 +94,7 @@ def single_beds(shelf: Shelf, *, child: bool = False) -> tuple[Template, ...]:
                 liking=_BED_LIKES,
             )
         )
-    return tuple(found)
+    return tuple(templates)
 
 
 def _beds(shelf: Shelf, widths: tuple[float, float]) -> list[Piece]:
@@ -112,14 +112,14 @@ def wardrobes(shelf: Shelf, wanted: float, *, height: float = 2.4) -> tuple[Temp
     """Rows of one to three wardrobes of a kind, `wanted` metres long at best."""
     pieces = shelf.of("wardrobe", height=(1.4, height - 0.02))
     pieces = pieces or shelf.of("cabinet", height=(1.4, height - 0.02), depth=(0.3, 0.7))
-    found = []
+    templates = []
     for piece in pieces[:MAX_CHOICES]:
         for n in (1, 2, 3):
             length = n * piece.size[0]
             if length > max(wanted, 1.0) + 0.5:
                 continue
-            found.append(_row_of_wardrobes(piece, n, -abs(length - wanted) * 0.6, 0.7))
-    return tuple(found)
+            templates.append(_row_of_wardrobes(piece, n, -abs(length - wanted) * 0.6, 0.7))
+    return tuple(templates)
 
 
 def _row_of_wardrobes(piece: Piece, n: int, rank: float, before: float) -> Template:
@@ -142,7 +142,7 @@ def desks(shelf: Shelf, *, widest: float = 1.65) -> tuple[Template, ...]:
     office = [c for c in chairs if "office" in c.id.lower() or "desk" in c.id.lower()]
     office = [c for c in shelf.of("office_chair") if shelf.likes(c, _SWIVEL_SHARE)] + office
     chairs = office + chairs
-    found = []
+    templates = []
     for desk in shelf.of("desk", width=(0.9, widest), depth=(0.5, 0.95), height=(0.6, 1.1))[:4]:
         w, d, _ = desk.size
         slots = [backed(desk)]
@@ -150,7 +150,7 @@ def desks(shelf: Shelf, *, widest: float = 1.65) -> tuple[Template, ...]:
             out = chairs[0].size[1] / 2 - shelf.under_m(chairs[0], desk, 0.0, 2, 0.12)
             slots.append(slot(chairs[0], 0.0, 0.02 + d + out, turns=2))
         room = (-0.4, 0.02 + d, 0.4, 0.02 + d + 0.85)
-        found.append(
+        templates.append(
             Template(
                 "desk",
                 tuple(slots),
@@ -160,13 +160,13 @@ def desks(shelf: Shelf, *, widest: float = 1.65) -> tuple[Template, ...]:
                 liking=Liking(corner=0.2, daylight=0.3),
             )
         )
-    return tuple(found)
+    return tuple(templates)
 
 
 def toys(shelf: Shelf) -> tuple[Template, ...]:
     """Large toys and a child's table on the floor."""
     large = [p for p in shelf.of("toy") if max(p.size[:2]) > 0.45 and p.size[2] > 0.3]
-    found = [single(p, before=0.3, corner=0.4, rank=0.3) for p in large]
+    templates = [single(p, before=0.3, corner=0.4, rank=0.3) for p in large]
     tables = [p for p in shelf.of("coffee_table") if "child" in p.name.lower()]
     stools = shelf.of("chair", height=(0.3, 0.6))
     if tables and stools:
@@ -177,5 +177,5 @@ def toys(shelf: Shelf) -> tuple[Template, ...]:
             slot(stools[0], -w / 2 - seat / 2 + 0.08, 0.02 + d / 2, turns=-1),
             slot(stools[0], w / 2 + seat / 2 - 0.08, 0.02 + d / 2, turns=1),
         )
-        found.append(Template("child's table", slots, rank=0.4))
-    return tuple(found)
+        templates.append(Template("child's table", slots, rank=0.4))
+    return tuple(templates)

@@ -123,7 +123,7 @@ def brief_of(
 
     def groups_of(groups: Iterable[_PieceGroup]) -> tuple[PieceGroup, ...]:
         # Draw only for what the room is large enough for.
-        wanted = [
+        suitable = [
             g
             for g in groups
             if g.where in facts
@@ -137,14 +137,14 @@ def brief_of(
                 or _templates(g.instead, space, shelf, measures, rng),
                 g.must,
             )
-            for g in wanted
+            for g in suitable
         )
 
     brief = _BRIEFS[name]  # type: ignore[index]
-    made = RoomBrief(
+    room_brief = RoomBrief(
         groups_of(brief.groups), groups_of(brief.fillers), brief.density, brief.least_share
     )
-    return _with_kitchen(made, space, shelf, rng) if type_ is RoomType.KITCHEN else made
+    return _with_kitchen(room_brief, space, shelf, rng) if type_ is RoomType.KITCHEN else room_brief
 
 
 def _is_childs(plan: Plan, space: FurnishSpace, rng: np.random.Generator) -> bool:
@@ -168,7 +168,7 @@ def _facts_of_room(plan: Plan, space: FurnishSpace, type_: RoomType) -> set[_Fac
 
 def _measures(space: FurnishSpace, type_: RoomType, rng: np.random.Generator) -> dict[str, Any]:
     x0, z0, x1, z1 = space.bounds
-    found: dict[str, Any] = {
+    measures: dict[str, Any] = {
         "bounds": space.bounds,
         "area": space.area,
         "row": max(x1 - x0, z1 - z0) - 0.2,
@@ -177,8 +177,8 @@ def _measures(space: FurnishSpace, type_: RoomType, rng: np.random.Generator) ->
     if type_ in (RoomType.LIVING, RoomType.STUDIO):  # dining rooms too
         # Large rooms have tables for eight, small ones for four.
         most = 8 if space.area > _FOR_EIGHT_M2 else 6 if space.area > _FOR_SIX_M2 else 4
-        found["seats"] = most if rng.random() < _LARGE_TABLES else max(most - 2, 4)
-    return found
+        measures["seats"] = most if rng.random() < _LARGE_TABLES else max(most - 2, 4)
+    return measures
 
 
 def _is_for(some: _ForSome, space: FurnishSpace) -> bool:
@@ -192,13 +192,13 @@ def _templates(
     measures: Mapping[str, Any],
     rng: np.random.Generator,
 ) -> tuple[Template, ...]:
-    found: list[Template] = []
-    for one in some:
-        if _is_for(one, space) and (one.chance == 1.0 or rng.random() < one.chance):
-            given = {k: measures[v] if isinstance(v, str) else v for k, v in one.given.items()}
-            made = _TEMPLATES_BY_NAME[one.make](shelf, **given)[: one.first]
-            found += [replace(t, rank=t.rank - one.lower) if one.lower else t for t in made]
-    return tuple(found)
+    templates: list[Template] = []
+    for row in some:
+        if _is_for(row, space) and (row.chance == 1.0 or rng.random() < row.chance):
+            arguments = {k: measures[v] if isinstance(v, str) else v for k, v in row.given.items()}
+            variants = _TEMPLATES_BY_NAME[row.make](shelf, **arguments)[: row.first]
+            templates += [replace(t, rank=t.rank - row.lower) if row.lower else t for t in variants]
+    return tuple(templates)
 
 
 def _with_kitchen(
@@ -206,11 +206,11 @@ def _with_kitchen(
 ) -> RoomBrief:
     """The brief with the places of the one row of units that its home has."""
     units = units_of(shelf)
-    wanted = min(max(1.6 + 0.26 * space.area, 3.0), 5.2)
-    found = kitchen_places(units, space, rng, wanted=wanted) if units else []
+    length = min(max(1.6 + 0.26 * space.area, 3.0), 5.2)
+    kitchen = kitchen_places(units, space, rng, wanted=length) if units else []
     # Without units nobody misses a kitchen.
     groups = tuple(
         replace(g, is_required=units is not None) if g.name == "kitchen" else g
         for g in brief.groups
     )
-    return replace(brief, groups=groups, kitchen=fixed_places(found))
+    return replace(brief, groups=groups, kitchen=fixed_places(kitchen))

@@ -28,12 +28,12 @@ def ceiling_lamps(
     piece = _choose_lamp(shelf, type_)
     if piece is None:
         return []
-    found = []
+    lamp_pieces = []
     for x, z in _middles(space, type_):
         lamp = _hung(piece, x, z, space, standing)
         if lamp is not None:
-            found.append(lamp)
-    return found
+            lamp_pieces.append(lamp)
+    return lamp_pieces
 
 
 def _choose_lamp(shelf: Shelf, type_: RoomType) -> Piece | None:

@@ -47,11 +47,11 @@ def _fitted(
     before: free in front of it. Rank grows with length: the longest wall that leaves a way is filled.
     """
     pieces = shelf.of(group, depth=(0.1, deepest))
-    found = []
+    templates = []
     for width in dict.fromkeys(min(s - 2 * BESIDE_M - 0.004, longest) for s in stretches):
         fits = [p for p in pieces if _STRETCH[0] <= width / p.size[0] <= _STRETCH[1]]
-        found += [_filling(p, width, before) for p in fits[:_CHOICES]]
-    return tuple(found)
+        templates += [_filling(p, width, before) for p in fits[:_CHOICES]]
+    return tuple(templates)
 
 
 def _filling(piece: Piece, width: float, before: float) -> Template:

@@ -46,17 +46,21 @@ def furnished(
     """
     shelf = Shelf(catalogue, rng, style_of(style, rng))
     seeds = rng.integers(2**63, size=len(plan.rooms))
-    found: dict[int, list[PlacedPiece]] = {}
-    wanted = range(len(plan.rooms)) if rooms is None else rooms
-    numbers = sorted(wanted, key=lambda i: (_rank(plan.rooms[i].type), i))
+    pieces_of_room: dict[int, list[PlacedPiece]] = {}
+    room_numbers = range(len(plan.rooms)) if rooms is None else rooms
+    numbers = sorted(room_numbers, key=lambda i: (_rank(plan.rooms[i].type), i))
     for number in numbers:
         room_rng = np.random.default_rng(int(seeds[number]))
         taken = list((standing or {}).get(number, ()))
         space = with_bodies(room_space(plan, number), taken)
-        others = [ground(p) for pieces in found.values() for p in pieces if p.elevation < 0.4]
+        standing_grounds = [
+            ground(p) for pieces in pieces_of_room.values() for p in pieces if p.elevation < 0.4
+        ]
         brief = brief_of(plan, space, shelf, room_rng, (uses or {}).get(number))
         brief = brief.without((present or {}).get(number, ()))
-        placed = arrangement_of(brief, space, [*others, *taken], room_rng, n_standing=len(taken))
+        placed = arrangement_of(
+            brief, space, [*standing_grounds, *taken], room_rng, n_standing=len(taken)
+        )
         # A low ceiling makes tall pieces lower.
         pieces = [
             replace(p, height=min(p.height, round(plan.height - p.elevation - 0.02, 4)))
@@ -64,8 +68,8 @@ def furnished(
             for p in s.pieces(number)
         ]
         pieces += ceiling_lamps(space, plan.rooms[number].type, pieces, shelf)
-        found[number] = pieces
-    return tuple(p for number in sorted(found) for p in found[number])
+        pieces_of_room[number] = pieces
+    return tuple(p for number in sorted(pieces_of_room) for p in pieces_of_room[number])
 
 
 def _rank(type_: RoomType) -> int:
@@ -132,11 +136,11 @@ def _add_fillers(
     """Add fillers until the room is as full as people's are, or one could hardly walk."""
     filled = start
     for group in brief.fillers:
-        wanted = brief.density * space.area
+        most_pieces = brief.density * space.area
         n = n_standing + sum(
             s.elevation < _ON_FLOOR_M for p in filled.standing for s in p.template.slots
         )
-        if n + 0.5 > wanted or not group.templates:
+        if n + 0.5 > most_pieces or not group.templates:
             continue
         optional = replace(group, is_required=False)
         tried = arranged(

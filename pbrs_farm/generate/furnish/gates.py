@@ -59,8 +59,11 @@ def furnish_report(
     broken, walked, area = [], 0.0, 0.0
     grounds = [_ground_rect(p) for p in pieces]
     for number, room in enumerate(plan.rooms):
-        here = [p for p in pieces if p.room == number]
-        broken += [f"{room.name}: no {what}" for what in missing(room.type, here, catalogue)]
+        room_pieces = [p for p in pieces if p.room == number]
+        broken += [
+            f"{room.name}: no {group_names}"
+            for group_names in missing(room.type, room_pieces, catalogue)
+        ]
         space = room_space(plan, number)
         standing = [r for p, r in zip(pieces, grounds, strict=True) if p.elevation < 0.4]
         walk = WalkMap(space, standing)
@@ -69,7 +72,7 @@ def furnish_report(
             broken.append(f"{room.name}: its doors are not joined")
         walked += walk.share(region) * room.area if region is not None else 0.0
         area += room.area
-        broken += _blocked(space, here)
+        broken += _blocked(space, room_pieces)
     broken += _overlapping_pieces(pieces, grounds)
     n = sum(p.elevation < _ON_FLOOR_M for p in pieces)
     return FurnishReport(tuple(broken), n / area, walked / area)
@@ -78,45 +81,49 @@ def furnish_report(
 def missing(type_: RoomType, here: list[PlacedPiece], catalogue: Catalogue) -> list[str]:
     """The groups that a room of that type lacks."""
     has = {p.piece.group for p in here}
-    wanted = MUST_HAVES.get(type_, ())
+    required = MUST_HAVES.get(type_, ())
     if type_ not in (RoomType.BALCONY, RoomType.STAIRS):
-        wanted = (*wanted, ("ceiling_lamp", "floor_lamp"))
+        required = (*required, ("ceiling_lamp", "floor_lamp"))
     return [
-        " or ".join(groups) for groups in wanted if not has & set(groups) and catalogue.of(*groups)
+        " or ".join(groups)
+        for groups in required
+        if not has & set(groups) and catalogue.of(*groups)
     ]
 
 
 def _blocked(space: FurnishSpace, here: list[PlacedPiece]) -> list[str]:
     """Furniture before doors, above window sills, or outside the room."""
-    found = []
+    faults = []
     for piece in here:
         ground = _ground_rect(piece)
         if piece.elevation < 1.9 and any(_meet(ground, d) for d in space.doors.tolist()):
-            found.append(f"{piece.piece.name} stands before a door")
+            faults.append(f"{piece.piece.name} stands before a door")
         if any(_meet(ground, o) for o in space.outside.tolist()):
-            found.append(f"{piece.piece.name} stands in a wall")
+            faults.append(f"{piece.piece.name} stands in a wall")
         top = piece.elevation + piece.height
         if piece.piece.group == "sink":
             top = 0.9
         for window in space.windows:
             if top > window.sill + 0.1 and piece.elevation < 1.9 and _meet(ground, window.zone):
-                found.append(f"{piece.piece.name} hides a window")
-    return found
+                faults.append(f"{piece.piece.name} hides a window")
+    return faults
 
 
 def _overlapping_pieces(pieces: tuple[PlacedPiece, ...], grounds: list[Rect]) -> list[str]:
-    found = []
+    faults = []
     for (a, ra), (b, rb) in combinations(zip(pieces, grounds, strict=True), 2):
         if a.room != b.room or not _meet(ra, rb):
             continue
-        apart = min(a.elevation + a.height, b.elevation + b.height) - max(a.elevation, b.elevation)
+        shared_height = min(a.elevation + a.height, b.elevation + b.height) - max(
+            a.elevation, b.elevation
+        )
         pair = frozenset((a.piece.group, b.piece.group))
-        if apart > _DEEP_M and pair not in _MAY_OVERLAP:
+        if shared_height > _DEEP_M and pair not in _MAY_OVERLAP:
             # Allow a television inside the edge of its cabinet, and taps below wall cabinets.
-            if "tv" in pair and apart < 0.3:
+            if "tv" in pair and shared_height < 0.3:
                 continue
-            found.append(f"{a.piece.name} and {b.piece.name} overlap")
-    return found
+            faults.append(f"{a.piece.name} and {b.piece.name} overlap")
+    return faults
 
 
 def _meet(a: Rect | list[float], b: Rect | list[float]) -> bool:

@@ -78,7 +78,7 @@ def units_of(shelf: Shelf) -> Units | None:
         if not (bases and fridges and cookers):
             continue
         uppers = shelf.of("upper_cabinet", width=(0.5, 0.7), depth=(0.2, 0.5), height=(0.4, 0.9))
-        own = _sold_with(sink, uppers, alone=True)
+        uppers_of_set = _sold_with(sink, uppers, alone=True)
         hoods = shelf.of("hood", width=(0.5, 0.7), height=(0.1, 0.95))
         washers = _sold_with(sink, shelf.of("dishwasher", width=(0.55, 0.65)))
         blinds = _sold_with(sink, shelf.of("blind_cabinet"), alone=True)
@@ -91,7 +91,7 @@ def units_of(shelf: Shelf) -> Units | None:
             tuple(bases[:3]),
             bases[0].size[2],
             hoods[0] if hoods else None,
-            tuple(own or uppers)[:2],
+            tuple(uppers_of_set or uppers)[:2],
             washers[0] if washers else None,
             blinds[0] if blinds else None,
         )
@@ -114,7 +114,7 @@ def kitchen_places(
     units: sink, cooker, fridge and cabinets of one depth. wanted: metres of modules that the run should
     have; shorter runs score less. A run keeps doors free and its cooker off windows.
     """
-    found: list[Standing] = []
+    standings: list[Standing] = []
     for arms in run_shapes(space):
         length = sum(a.length for a in arms)
         best = _best_run(arms, units, space)
@@ -125,8 +125,8 @@ def kitchen_places(
         if not allowed(template, frames_array([frame]), space)[0]:
             continue
         score -= 0.8 * abs(length - wanted) - 0.4 * (len(arms) - 1)
-        found.append(Standing(template, frame, score + 0.3 * float(rng.random())))
-    return found
+        standings.append(Standing(template, frame, score + 0.3 * float(rng.random())))
+    return standings
 
 
 def _best_run(
@@ -164,12 +164,12 @@ def _orders(
         widths = {"sink": units.sink.size[0], "cooker": units.cooker.size[0]}
         # Where two arms meet nothing opens: fronts and what opens them would be in each other's way.
         blind = 0.0 if len(arms) == 1 else (CORNER_M, FILLER_M)[k]
-        left = arm.length - blind - sum(fixed) - sum(widths[m] for m in movable)
-        if left < -1e-6:
+        remaining = arm.length - blind - sum(fixed) - sum(widths[m] for m in movable)
+        if remaining < -1e-6:
             return
-        n = int(left / MODULE_M + 0.5) if left > 0.28 else 0
+        n = int(remaining / MODULE_M + 0.5) if remaining > 0.28 else 0
         # A remainder too narrow for a cabinet stays open at the free end.
-        width = left / n if n else 0.0
+        width = remaining / n if n else 0.0
         rows.append(
             list(
                 _arm_rows(
@@ -211,13 +211,13 @@ def _arm_rows(
         # A fridge is deeper than the filler next to it is wide.
         if kinds[:2] == ["filler", "fridge"]:
             continue
-        at, row = arm.low, []
+        start, row = arm.low, []
         if kinds[-1] == "corner":
             # The remainder stays open at the free end.
-            at = arm.high - sum((fixed | widths)[kind] for kind in kinds)
+            start = arm.high - sum((fixed | widths)[kind] for kind in kinds)
         for kind in kinds:
-            row.append(_Module(kind, k, at, (fixed | widths)[kind]))
-            at = row[-1].high
+            row.append(_Module(kind, k, start, (fixed | widths)[kind]))
+            start = row[-1].high
         yield row
 
 
@@ -297,7 +297,7 @@ def _hung(
     modules: list[_Module], units: Units, arms: tuple[Arm, ...], space: FurnishSpace
 ) -> list[PieceSlot]:
     """The hood and the wall cabinets, and no two of them before each other's fronts."""
-    found: list[tuple[_Module, PieceSlot]] = []
+    slots_of_modules: list[tuple[_Module, PieceSlot]] = []
     for number, module in enumerate(modules):
         slot = _above(module, units, arms, space, number)
         if slot is None:
@@ -311,17 +311,19 @@ def _hung(
             right = _STRIP if module.kind == "corner" else right
             module = replace(module, low=module.low + left, width=module.width - left - right)
             slot = replace(slot, width=module.width)
-        found.append((module, slot))
+        slots_of_modules.append((module, slot))
     # In a corner the main arm's cabinet opens before where the side arm's would hang.
     reach = UPPER_DEPTH_M + CORNER_M + PULL_M
-    is_cooked_there = any(m.kind == "cooker" and m.arm == 1 and m.low < reach for m, _ in found)
-    kept = [
+    is_cooked_there = any(
+        m.kind == "cooker" and m.arm == 1 and m.low < reach for m, _ in slots_of_modules
+    )
+    free_slots = [
         (m, s)
-        for m, s in found
+        for m, s in slots_of_modules
         if not (m.kind == "corner" and is_cooked_there)
         and not (m.kind != "cooker" and m.arm == 1 and m.low < reach and not is_cooked_there)
     ]
-    return [_place_unit(slot, module, arms, _HUNG_GAP) for module, slot in kept]
+    return [_place_unit(slot, module, arms, _HUNG_GAP) for module, slot in free_slots]
 
 
 def _above(

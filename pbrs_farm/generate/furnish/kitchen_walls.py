@@ -67,8 +67,8 @@ def _next(space: FurnishSpace, k: int) -> int | None:
     if not wall.is_right_corner:
         return None
     end = wall.frame.point(wall.length, 0.0)
-    for n, other in enumerate(space.walls):
-        if abs(other.frame.x - end[0]) + abs(other.frame.z - end[1]) < 0.02:
+    for n, next_wall in enumerate(space.walls):
+        if abs(next_wall.frame.x - end[0]) + abs(next_wall.frame.z - end[1]) < 0.02:
             return n
     return None
 
@@ -90,12 +90,12 @@ def _starts(low: float, high: float, corner: float) -> list[float]:
 def _cuts(low: float, high: float, wall: RoomWall) -> list[tuple[float, float]]:
     if high - low < _LEAST_M:
         return []
-    found = [(low, high)] if high - low <= _LONGEST_ARM_M + 0.5 else []
+    cuts = [(low, high)] if high - low <= _LONGEST_ARM_M + 0.5 else []
     for n in (4, 5, 6, 7):
         length = n * MODULE_M
         if length < high - low - 0.01:
-            found += [(low, low + length), (high - length, high)]
-    return found
+            cuts += [(low, low + length), (high - length, high)]
+    return cuts
 
 
 def _free(space: FurnishSpace, wall: RoomWall) -> list[tuple[float, float]]:
@@ -109,14 +109,14 @@ def _free(space: FurnishSpace, wall: RoomWall) -> list[tuple[float, float]]:
         if along is not None:
             taken.append(along)
     # Sweep along the wall; a unit needs 0.6 m.
-    found, start = [], 0.0
+    stretches, start = [], 0.0
     for low, high in sorted(taken):
         if low - start > 0.6:
-            found.append((start, low))
+            stretches.append((start, low))
         start = max(start, high)
     if wall.length - start > 0.6:
-        found.append((start, wall.length))
-    return found
+        stretches.append((start, wall.length))
+    return stretches
 
 
 def _span_along_wall(rect: Rect, strip: Rect, wall: RoomWall) -> tuple[float, float] | None:
@@ -129,5 +129,5 @@ def _span_along_wall(rect: Rect, strip: Rect, wall: RoomWall) -> tuple[float, fl
     if min(rect[3], strip[3]) - max(rect[1], strip[1]) < 0.01:
         return None
     f = wall.frame
-    at = [(x - f.x) * f.dx + (z - f.z) * f.dz for x, z in (rect[:2], rect[2:])]
-    return max(min(at), 0.0), min(max(at), wall.length)
+    along = [(x - f.x) * f.dx + (z - f.z) * f.dz for x, z in (rect[:2], rect[2:])]
+    return max(min(along), 0.0), min(max(along), wall.length)

@@ -27,7 +27,7 @@ def lounges(shelf: Shelf, bounds: Rect, area: float) -> tuple[Template, ...]:
     tables = shelf.of("coffee_table", width=(0.8, 1.5), depth=(0.4, 0.85), without="child")
     chairs = shelf.of("armchair", width=(0.5, 1.0), depth=(0.5, 1.0))
     sides = bounds[2] - bounds[0], bounds[3] - bounds[1]
-    found = []
+    templates = []
     for sofa in dict.fromkeys((sofas[0], sofas[min(1, len(sofas) - 1)], small)):
         for stand in stands[:2] or [[]]:
             depth = max((s.v + s.depth / 2 for s in stand), default=0.0)
@@ -36,8 +36,8 @@ def lounges(shelf: Shelf, bounds: Rect, area: float) -> tuple[Template, ...]:
             fits = [d for d in exact if 2.0 <= d <= 3.4]
             for distance in (*fits, *_VIEWING_M):
                 for n in (2, 1, 0) if area > 15 and chairs else (0,):
-                    found.append(_lounge(stand, sofa, tables[:1], chairs[:1] * n, distance))
-    return tuple(found)
+                    templates.append(_lounge(stand, sofa, tables[:1], chairs[:1] * n, distance))
+    return tuple(templates)
 
 
 def _television_stands(shelf: Shelf) -> list[list[PieceSlot]]:
@@ -45,7 +45,7 @@ def _television_stands(shelf: Shelf) -> list[list[PieceSlot]]:
     low = shelf.of("tv_stand", height=(0.2, 0.75), depth=(0.3, 0.7))[:MAX_CHOICES]
     low += shelf.of("dresser", height=(0.4, 0.7), depth=(0.3, 0.6))[: MAX_CHOICES - len(low)]
     screens = shelf.of("tv", width=(0.7, 1.3))
-    found = []
+    stands = []
     for base in low:
         slots = [backed(base)]
         # A screen is neither wider nor deeper than what carries it.
@@ -53,8 +53,8 @@ def _television_stands(shelf: Shelf) -> list[list[PieceSlot]]:
         if fitting:
             middle = slots[0].v
             slots.append(slot(fitting[0], 0.0, middle, elevation=shelf.top(base)))
-        found.append(slots)
-    return found
+        stands.append(slots)
+    return stands
 
 
 def _lounge(
@@ -71,8 +71,8 @@ def _lounge(
         slots.append(slot(tables[0], 0.0, middle, turns=2))
         # Armchairs look at each other over the table.
         for side, chair in zip((-1, 1), chairs, strict=False):
-            at = max(tw / 2 + _TO_TABLE_M, w / 2 - 0.3) + chair.size[1] / 2
-            slots.append(slot(chair, side * at, middle - 0.1, turns=side))
+            offset = max(tw / 2 + _TO_TABLE_M, w / 2 - 0.3) + chair.size[1] / 2
+            slots.append(slot(chair, side * offset, middle - 0.1, turns=side))
         near = middle - td / 2
     front = (-0.5, depth + 0.1, 0.5, near - 0.05)
     clear: tuple[Rect, ...] = ((-half, depth, half, depth + distance),)
@@ -92,7 +92,7 @@ def dining(shelf: Shelf, seats: int, *, at_wall: bool = False) -> tuple[Template
     chairs = shelf.of("chair", height=(0.7, 1.2), width=(0.38, 0.56), without="office desk child")
     if not chairs:
         return ()
-    found = []
+    templates = []
     for table in tables:
         w = table.size[0]
         n = _seats(table, at_wall=at_wall)
@@ -105,12 +105,12 @@ def dining(shelf: Shelf, seats: int, *, at_wall: bool = False) -> tuple[Template
         if not narrow:
             continue
         make = _at_wall if at_wall else _free
-        found.append(make(shelf, table, narrow[0], 0.35 * n))
+        templates.append(make(shelf, table, narrow[0], 0.35 * n))
         if has_heads:
-            found.append(_free(shelf, table, narrow[0], 0.35 * (n + 2), heads=True))
-        if len(found) >= 8:
+            templates.append(_free(shelf, table, narrow[0], 0.35 * (n + 2), heads=True))
+        if len(templates) >= 8:
             break
-    return tuple(found)
+    return tuple(templates)
 
 
 def _seats(table: Piece, *, at_wall: bool) -> int:
@@ -187,8 +187,8 @@ def _out(
     u: position along that edge, in the table's frame. most: limit set by other chairs, negative if
     the chair must keep off.
     """
-    at = -u if turns == 2 else u
-    under = shelf.under_m(chair, table, at, turns, _UNDER_TABLE_M)
+    offset = -u if turns == 2 else u
+    under = shelf.under_m(chair, table, offset, turns, _UNDER_TABLE_M)
     return chair.size[1] / 2 - min(under, most)
 
 
@@ -225,14 +225,14 @@ def _chair_offsets(width: float, n: int) -> list[float]:
 
 def shelves(shelf: Shelf, *, widest: float = 1.8) -> tuple[Template, ...]:
     """Bookcases, one or two side by side, and shelves."""
-    found = []
+    templates = []
     for piece in shelf.of("bookcase", "shelves", width=(0.4, widest), height=(0.7, 2.3))[:6]:
-        found.append(single(piece, before=0.5, corner=0.4, rank=0.1))
+        templates.append(single(piece, before=0.5, corner=0.4, rank=0.1))
         w = piece.size[0]
         if 2 * w <= widest and piece.group == "bookcase":
             pair = (backed(piece, -w / 2 - 0.003), backed(piece, w / 2 + 0.003))
             depth = piece.size[1] + 0.02
-            found.append(
+            templates.append(
                 Template(
                     "two bookcases",
                     pair,
@@ -242,7 +242,7 @@ def shelves(shelf: Shelf, *, widest: float = 1.8) -> tuple[Template, ...]:
                     liking=Liking(corner=0.4),
                 )
             )
-    return tuple(found)
+    return tuple(templates)
 
 
 def dressers(shelf: Shelf, *, deepest: float = 0.6) -> tuple[Template, ...]:
@@ -255,7 +255,7 @@ def dressers(shelf: Shelf, *, deepest: float = 0.6) -> tuple[Template, ...]:
 def armchairs(shelf: Shelf) -> tuple[Template, ...]:
     """An armchair to read in, near a window, a lamp beside it where there is one."""
     lamps = shelf.of("floor_lamp", width=(0.2, 0.5), depth=(0.2, 0.6))
-    found = []
+    templates = []
     for chair in shelf.of("armchair", width=(0.5, 1.0))[:3]:
         w, d, _ = chair.size
         clear = ((-w / 2, 0.1 + d, w / 2, d + 0.5),)
@@ -264,11 +264,11 @@ def armchairs(shelf: Shelf) -> tuple[Template, ...]:
         like = Liking(corner=0.1, daylight=0.2)
         if lamps:
             lamp = lamps[0]
-            at = w / 2 + lamp.size[0] / 2 + 0.05
-            slots = (plain, slot(lamp, at, 0.08 + lamp.size[1] / 2))
-            found.append(Template("reading corner", slots, clear, front, rank=0.5, liking=like))
-        found.append(Template("armchair", (plain,), clear, front, liking=like))
-    return tuple(found)
+            offset = w / 2 + lamp.size[0] / 2 + 0.05
+            slots = (plain, slot(lamp, offset, 0.08 + lamp.size[1] / 2))
+            templates.append(Template("reading corner", slots, clear, front, rank=0.5, liking=like))
+        templates.append(Template("armchair", (plain,), clear, front, liking=like))
+    return tuple(templates)
 
 
 def plants(shelf: Shelf) -> tuple[Template, ...]:
@@ -281,18 +281,18 @@ def plants(shelf: Shelf) -> tuple[Template, ...]:
 
 def lamps(shelf: Shelf) -> tuple[Template, ...]:
     """Floor lamps."""
-    found = shelf.of("floor_lamp", width=(0.2, 0.6))
-    return tuple(single(p, before=0.0, corner=0.7, gap=0.05) for p in found[:2])
+    lamp_pieces = shelf.of("floor_lamp", width=(0.2, 0.6))
+    return tuple(single(p, before=0.0, corner=0.7, gap=0.05) for p in lamp_pieces[:2])
 
 
 def pianos(shelf: Shelf) -> tuple[Template, ...]:
     """An upright piano with its bench."""
-    found = []
+    templates = []
     benches = [p for p in shelf.of("stool", height=(0.4, 0.6)) if "piano" in p.name.lower()]
     for piano in shelf.of("piano", depth=(0.3, 0.7)):
         d = piano.size[1]
         slots = [backed(piano)]
         slots += [slot(b, 0.0, d + 0.1 + b.size[1] / 2) for b in benches[:1]]
         clear = ((-0.6, d + 0.02, 0.6, d + 0.9),)
-        found.append(Template("piano", tuple(slots), clear, clear, rank=0.3))
-    return tuple(found)
+        templates.append(Template("piano", tuple(slots), clear, clear, rank=0.3))
+    return tuple(templates)

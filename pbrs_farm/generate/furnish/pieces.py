@@ -86,14 +86,14 @@ class Shelf:
         """
         ranges = width, depth, height
         aside = set(without.split())
-        found = [
+        pieces = [
             p
             for p in self.catalogue.of(*groups)
             if p.id not in _UNFIT
             and all(low <= x <= high for (low, high), x in zip(ranges, p.size, strict=True))
             and not aside & set(re.findall(r"[a-z0-9]+", f"{p.id} {p.name}".lower()))
         ]
-        return sorted(found, key=lambda p: (self._order[p.id], p.id))
+        return sorted(pieces, key=lambda p: (self._order[p.id], p.id))
 
     def likes(self, piece: Piece, share: float) -> bool:
         """Whether the home is of the share that likes a piece."""
@@ -128,10 +128,10 @@ class Shelf:
         # Take the highest level that covers a fifth of the piece's ground.
         heights, areas = corners[level].mean(1)[:, 1], size[level] / 2
         order = np.argsort(-heights)
-        wanted = 0.2 * piece.size[0] * piece.size[1]
+        top_area = 0.2 * piece.size[0] * piece.size[1]
         for k in order:
-            here = np.abs(heights - heights[k]) < 0.005
-            if areas[here].sum() >= wanted:
+            is_level = np.abs(heights - heights[k]) < 0.005
+            if areas[is_level].sum() >= top_area:
                 return float(heights[k])
         return piece.size[2]
 

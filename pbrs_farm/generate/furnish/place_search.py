@@ -71,19 +71,19 @@ class _Search:
             after = self.placed(place, free, standing)
             if after is None:
                 continue
-            left = [
+            remaining = [
                 mask if k <= level else self.places[k].free_of(mask, place)
                 for k, mask in enumerate(alive)
             ]
             # Prune if a required group has no place any more.
             if any(
                 g.is_required and not mask.any() and alive[k].any()
-                for k, (g, mask) in enumerate(zip(self.groups, left, strict=True))
+                for k, (g, mask) in enumerate(zip(self.groups, remaining, strict=True))
                 if k > level
             ):
                 continue
             if self.descend(
-                level + 1, left, after, (*standing, place), missing, score + place.score
+                level + 1, remaining, after, (*standing, place), missing, score + place.score
             ):
                 return True
         # Go on without it.
@@ -133,9 +133,14 @@ def arranged(
         search.nodes += 1
         if after is None:
             continue
-        left = [p.free_of(mask, place) for p, mask in zip(places, alive, strict=True)]
+        remaining = [p.free_of(mask, place) for p, mask in zip(places, alive, strict=True)]
         search.descend(
-            1, left, after, (*before.standing, place), before.missing, before.score + place.score
+            1,
+            remaining,
+            after,
+            (*before.standing, place),
+            before.missing,
+            before.score + place.score,
         )
     if search.best.score == -np.inf:
         search.limit = search.nodes + 4 * nodes

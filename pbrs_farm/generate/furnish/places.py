@@ -65,11 +65,11 @@ class Places:
         bodies, clear = _rect_array(standing.bodies), _rect_array(standing.clear)
         taken = np.concatenate([bodies, clear])
         # Test only places that are still possible.
-        left = alive.copy()
+        remaining = alive.copy()
         rows = np.flatnonzero(alive)
         hit = overlap(self.bodies[rows], taken).any(1) | overlap(self.clear[rows], bodies).any(1)
-        left[rows[hit]] = False
-        return left
+        remaining[rows[hit]] = False
+        return remaining
 
     def best(self, alive: Bools, n: int = _BEST) -> list[Standing]:
         """The best places, no two of a wall closer than 0.4 m while others are there.
@@ -83,15 +83,15 @@ class Places:
         name = np.array([names.index(x) for x in names], np.int64)[self.template_of[rows]]
         x, z, dx, dz = self.frames[rows].T
         chosen: list[int] = []
-        left = np.ones(len(rows), bool)
-        while len(chosen) < n and left.any():
-            k = int(left.argmax())
+        remaining = np.ones(len(rows), bool)
+        while len(chosen) < n and remaining.any():
+            k = int(remaining.argmax())
             chosen.append(k)
             near = (name == name[k]) & (np.abs(x - x[k]) + np.abs(z - z[k]) < _APART_M)
-            left &= ~(near & (dx == dx[k]) & (dz == dz[k]))
+            remaining &= ~(near & (dx == dx[k]) & (dz == dz[k]))
         # Where these are not enough, take those beside them.
-        others = np.setdiff1d(np.arange(len(rows)), chosen)[: n - len(chosen)].tolist()
-        return [self.standing(int(rows[k])) for k in (*chosen, *others)]
+        more = np.setdiff1d(np.arange(len(rows)), chosen)[: n - len(chosen)].tolist()
+        return [self.standing(int(rows[k])) for k in (*chosen, *more)]
 
 
 def overlap(rects: F64, others: F64) -> Bools:
@@ -120,11 +120,11 @@ def places_of(group: PieceGroup, space: FurnishSpace, rng: np.random.Generator) 
     versions = [v for template in group.templates for v in _versions(template)]
     frames, scores, template_of = [], [], []
     for number, template in enumerate(versions):
-        here, walls = _frames(template, space)
-        ok = allowed(template, here, space)
-        noise = rng.random(len(here)) * _NOISE
-        frames.append(here[ok])
-        scores.append(_scores(template, here[ok], walls[ok], space) + noise[ok])
+        template_frames, walls = _frames(template, space)
+        ok = allowed(template, template_frames, space)
+        noise = rng.random(len(template_frames)) * _NOISE
+        frames.append(template_frames[ok])
+        scores.append(_scores(template, template_frames[ok], walls[ok], space) + noise[ok])
         template_of.append(np.full(int(ok.sum()), number))
     return _sorted_places(
         versions,
@@ -199,35 +199,35 @@ def _frames(template: Template, space: FurnishSpace) -> tuple[F64, Ints]:
         frames = _free_frames(space)
         return frames, np.full(len(frames), -1)
     u0, _, u1, _ = template.extent
-    found, walls = [np.zeros((0, 4))], [np.zeros(0, int)]
+    candidates, walls = [np.zeros((0, 4))], [np.zeros(0, int)]
     for number, wall in enumerate(space.walls):
-        at = _positions_along_wall(template, wall, BESIDE_M - u0, wall.length - u1 - BESIDE_M)
+        along = _positions_along_wall(template, wall, BESIDE_M - u0, wall.length - u1 - BESIDE_M)
         f = wall.frame
-        rows = np.empty((len(at), 4))
+        rows = np.empty((len(along), 4))
         rows[:] = f.x, f.z, f.dx, f.dz
-        rows[:, 0] += at * f.dx
-        rows[:, 1] += at * f.dz
-        found.append(rows)
-        walls.append(np.full(len(at), number))
-    return np.concatenate(found), np.concatenate(walls)
+        rows[:, 0] += along * f.dx
+        rows[:, 1] += along * f.dz
+        candidates.append(rows)
+        walls.append(np.full(len(along), number))
+    return np.concatenate(candidates), np.concatenate(walls)
 
 
 def _positions_along_wall(template: Template, wall: RoomWall, low: float, high: float) -> F64:
     """Where along a wall a template's origin can be, metres."""
-    at: list[float] = []
+    positions: list[float] = []
     if high < low - 1e-9:
         return np.zeros(0)
     if template.stand is Stand.CORNER:
         if template.end < 0 and wall.is_left_corner:
-            at = [low]
+            positions = [low]
         if template.end > 0 and wall.is_right_corner:
-            at = [high]
+            positions = [high]
     else:
         n = int((high - low) / _STEP_M + 1e-9)
-        at = [low + k * _STEP_M for k in range(n + 1)]
-        if high - at[-1] > 1e-6:
-            at.append(high)
-    return np.array(at)
+        positions = [low + k * _STEP_M for k in range(n + 1)]
+        if high - positions[-1] > 1e-6:
+            positions.append(high)
+    return np.array(positions)
 
 
 def _free_frames(space: FurnishSpace) -> F64:
@@ -235,10 +235,10 @@ def _free_frames(space: FurnishSpace) -> F64:
     x0, z0, x1, z1 = space.bounds
     xs = x0 + np.arange(1, int((x1 - x0) / _FREE_STEP_M)) * _FREE_STEP_M
     zs = z0 + np.arange(1, int((z1 - z0) / _FREE_STEP_M)) * _FREE_STEP_M
-    found = np.empty((len(xs), len(zs), 2, 4))
-    found[..., 0], found[..., 1] = xs[:, None, None], zs[:, None]
-    found[:, :, 0, 2:], found[:, :, 1, 2:] = (1, 0), (0, 1)
-    return found.reshape(-1, 4)
+    frames = np.empty((len(xs), len(zs), 2, 4))
+    frames[..., 0], frames[..., 1] = xs[:, None, None], zs[:, None]
+    frames[:, :, 0, 2:], frames[:, :, 1, 2:] = (1, 0), (0, 1)
+    return frames.reshape(-1, 4)
 
 
 def _rects_in_frames(rects: F64, frames: F64) -> F64:
@@ -277,8 +277,8 @@ def _scores(template: Template, frames: F64, walls: Ints, space: FurnishSpace) -
 
 def _distances_to_nearest(points: F64, others: Sequence[Point]) -> F64:
     """(N,) distance of each point to the nearest of others."""
-    apart = points[:, None] - np.array(others)[None]
-    return np.asarray(np.hypot(apart[..., 0], apart[..., 1]).min(1))
+    offsets = points[:, None] - np.array(others)[None]
+    return np.asarray(np.hypot(offsets[..., 0], offsets[..., 1]).min(1))
 
 
 def _wall_scores(
@@ -292,9 +292,9 @@ def _wall_scores(
     scores = np.zeros(len(frames))
     corners = [w.is_left_corner for w in space.walls], [w.is_right_corner for w in space.walls]
     for gap, is_corner in zip((low, length - high), corners, strict=True):
-        here = np.array(is_corner)[walls]
-        scores += here * like.corner * (gap < 0.02)
-        scores -= here * 0.25 * ((gap > 0.03) & (gap < _DEAD_GAP_M))
+        at_corner = np.array(is_corner)[walls]
+        scores += at_corner * like.corner * (gap < 0.02)
+        scores -= at_corner * 0.25 * ((gap > 0.03) & (gap < _DEAD_GAP_M))
     if like.window_wall:
         covered = np.zeros(len(frames))
         for window in space.windows:

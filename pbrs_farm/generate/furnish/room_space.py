@@ -135,7 +135,7 @@ def with_bodies(space: FurnishSpace, bodies: Sequence[Rect]) -> FurnishSpace:
 
 def free_stretches(space: FurnishSpace, least: float) -> tuple[float, ...]:
     """Metres of each stretch of wall, of least or more, without doors and windows; the longest first."""
-    found = set()
+    lengths = set()
     for number, wall in enumerate(space.walls):
         f = wall.frame
         taken = [(w.low, w.high) for w in space.windows if w.wall == number]
@@ -151,9 +151,9 @@ def free_stretches(space: FurnishSpace, least: float) -> tuple[float, ...]:
         start = 0.0
         for a, b in [*sorted(taken), (wall.length, wall.length)]:
             if a - start >= least:
-                found.add(round(a - start, 3))
+                lengths.add(round(a - start, 3))
             start = max(start, b)
-    return tuple(sorted(found, reverse=True))
+    return tuple(sorted(lengths, reverse=True))
 
 
 def outside_of(polygon: Polygon) -> F64:
@@ -183,21 +183,21 @@ def outside_of(polygon: Polygon) -> F64:
 
 def _open_neighbours(plan: Plan, number: int) -> list[tuple[int, Polygon]]:
     """Adjacent rooms without a wall between."""
-    own = Polygon(plan.rooms[number].polygon)
-    found = []
-    for other, room in enumerate(plan.rooms):
+    outline = Polygon(plan.rooms[number].polygon)
+    neighbours = []
+    for neighbour, room in enumerate(plan.rooms):
         polygon = Polygon(room.polygon)
-        if other != number and own.distance(polygon) < _EPSILON:
-            common = own.buffer(2 * _EPSILON).intersection(polygon)
+        if neighbour != number and outline.distance(polygon) < _EPSILON:
+            common = outline.buffer(2 * _EPSILON).intersection(polygon)
             if common.area > 0.5 * 2 * _EPSILON:
-                found.append((other, polygon))
-    return found
+                neighbours.append((neighbour, polygon))
+    return neighbours
 
 
 def _walls_of_room(corners: tuple[Point, ...], open_to: Iterable[Polygon]) -> tuple[RoomWall, ...]:
     """The sides of a room, cut where it is open."""
     near = unary_union([p.buffer(2 * _EPSILON) for p in open_to])
-    n, found = len(corners), []
+    n, walls = len(corners), []
     for i, a in enumerate(corners):
         b, before, after = corners[(i + 1) % n], corners[i - 1], corners[(i + 2) % n]
         length = math.dist(a, b)
@@ -206,14 +206,16 @@ def _walls_of_room(corners: tuple[Point, ...], open_to: Iterable[Polygon]) -> tu
         dx, dz = round((b[0] - a[0]) / length), round((b[1] - a[1]) / length)
         frame = WallFrame(a[0], a[1], dx, dz)
         # An inner corner turns left, since the outline is anticlockwise.
-        left = _turn(before, a, b) > 0
+        is_left_corner = _turn(before, a, b) > 0
         right = _turn(a, b, after) > 0
         for low, high in _solid(frame, length, near):
             start = WallFrame(*frame.point(low, 0.0), dx, dz)
-            found.append(
-                RoomWall(start, high - low, left and low < 0.01, right and high > length - 0.01)
+            walls.append(
+                RoomWall(
+                    start, high - low, is_left_corner and low < 0.01, right and high > length - 0.01
+                )
             )
-    return tuple(found)
+    return tuple(walls)
 
 
 def _turn(a: Point, b: Point, c: Point) -> float:
@@ -225,19 +227,19 @@ def _solid(frame: WallFrame, length: float, near: BaseGeometry) -> list[tuple[fl
     if near.is_empty:
         return [(0.0, length)]
     n = max(int(length / 0.025), 2)
-    at = np.linspace(0, length, n + 1)
-    middles = (at[1:] + at[:-1]) / 2
+    samples = np.linspace(0, length, n + 1)
+    middles = (samples[1:] + samples[:-1]) / 2
     shapely.prepare(near)
     is_open = shapely.contains_xy(near, frame.x + middles * frame.dx, frame.z + middles * frame.dz)
-    found, start = [], None
+    stretches, start = [], None
     for k, opened in enumerate([*is_open.tolist(), True]):
         if not opened and start is None:
-            start = float(at[k])
+            start = float(samples[k])
         if opened and start is not None:
-            if float(at[k]) - start >= 0.3:
-                found.append((start, float(at[k])))
+            if float(samples[k]) - start >= 0.3:
+                stretches.append((start, float(samples[k])))
             start = None
-    return found
+    return stretches
 
 
 def _rect_around_point(point: Point) -> Rect:
@@ -249,7 +251,7 @@ def _open_sides(
 ) -> list[tuple[Rect, Rect]]:
     """(what a way must reach, what stays free: at most so wide) for each open side."""
     near = unary_union([p.buffer(2 * _EPSILON) for p in open_to])
-    found = []
+    sides = []
     if near.is_empty:
         return []
     for i, a in enumerate(corners):
@@ -272,8 +274,8 @@ def _open_sides(
         middle = (low + high) / 2
         half = min(width, high - low) / 2
         reach = frame.rect((low + 0.1, 0.0, high - 0.1, 0.5))
-        found.append((reach, frame.rect((middle - half, 0.0, middle + half, BEFORE_DOOR_M))))
-    return found
+        sides.append((reach, frame.rect((middle - half, 0.0, middle + half, BEFORE_DOOR_M))))
+    return sides
 
 
 def _seen_from(plan: Plan, opening: PlanOpening, polygon: Polygon) -> WallFrame | None:

@@ -9,17 +9,17 @@ from pbrs_farm.generate.furnish.template import Liking, Template
 def coats(shelf: Shelf) -> tuple[Template, ...]:
     """Coat racks, narrow wardrobes."""
     racks = shelf.of("clothes_rack", depth=(0.2, 0.6))[:MAX_CHOICES]
-    found = [single(p, before=0.6, rank=0.3) for p in racks]
+    templates = [single(p, before=0.6, rank=0.3) for p in racks]
     slim = shelf.of("wardrobe", depth=(0.3, 0.56), width=(0.8, 1.1), height=(1.4, 2.3))
-    return tuple(found + [single(p, before=0.65) for p in slim[:MAX_CHOICES]])
+    return tuple(templates + [single(p, before=0.65) for p in slim[:MAX_CHOICES]])
 
 
 def consoles(shelf: Shelf) -> tuple[Template, ...]:
     """Hall furniture for keys and shoes: a low chest, narrow shelves, a bench."""
     pieces = shelf.of("dresser", "shelves", depth=(0.2, 0.56), width=(0.4, 1.5), height=(0.4, 1.3))
-    found = [single(p, before=0.6, rank=-0.5 * p.size[1]) for p in pieces[:MAX_CHOICES]]
+    templates = [single(p, before=0.6, rank=-0.5 * p.size[1]) for p in pieces[:MAX_CHOICES]]
     benches = shelf.of("stool", width=(0.7, 1.3), height=(0.35, 0.55))
-    return tuple(found + [single(p, before=0.6) for p in benches[:MAX_CHOICES]])
+    return tuple(templates + [single(p, before=0.6) for p in benches[:MAX_CHOICES]])
 
 
 def stores(shelf: Shelf) -> tuple[Template, ...]:
@@ -41,7 +41,7 @@ def outdoor_sets(shelf: Shelf) -> tuple[Template, ...]:
     chairs = shelf.of("chair", width=(0.38, 0.65), height=(0.7, 1.0), without="office desk child")
     cafe = [c for c in chairs if "cafe" in c.id.lower() or "plastic" in c.id.lower()]
     chairs = cafe + chairs
-    found = []
+    templates = []
     for table in tables[:3]:
         w, d, _ = table.size
         for chair in chairs[:2]:
@@ -51,7 +51,7 @@ def outdoor_sets(shelf: Shelf) -> tuple[Template, ...]:
             )
             v = 0.05 + max(d, chair.size[0]) / 2
             seats = (slot(chair, -left, v, turns=-1), slot(chair, right, v, turns=1))
-            found.append(
+            templates.append(
                 Template(
                     "table and two chairs",
                     (slot(table, 0.0, v), *seats),
@@ -59,5 +59,5 @@ def outdoor_sets(shelf: Shelf) -> tuple[Template, ...]:
                     liking=Liking(corner=0.4),
                 )
             )
-    found += [Template("chair", (backed(c, gap=0.06),)) for c in chairs[:2]]
-    return tuple(found)
+    templates += [Template("chair", (backed(c, gap=0.06),)) for c in chairs[:2]]
+    return tuple(templates)

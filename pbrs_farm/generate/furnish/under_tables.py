@@ -53,8 +53,8 @@ def _way_m(chair: Shape, table: Shape, at: int, turns: int) -> float:
     if (low >= high).any():
         return np.inf
     a, b = (tuple(map(slice, low - first, high - first)) for first in (front.first, begins))
-    apart = np.where(front.inner[a], near.depths[b] - front.depths[a], np.inf)
-    return max(float(apart.min()) - _APART_M, 0.0)
+    distances = np.where(front.inner[a], near.depths[b] - front.depths[a], np.inf)
+    return max(float(distances.min()) - _APART_M, 0.0)
 
 
 @lru_cache(maxsize=512)
@@ -73,19 +73,19 @@ def _near(table: Shape) -> tuple[_Depths, ...]:
     corners = corners_of_surfaces(table.surfaces)
     points = surface_points(corners, _SPACING_M)
     box = np.stack([corners.min((0, 1)), corners.max((0, 1))])
-    found = []
+    sides = []
     for _ in range(4):
         first, depths = _greatest(points, box[:, 2].min() - points[:, 2])
-        found.append(_Depths(first, -depths, np.isfinite(depths)))
+        sides.append(_Depths(first, -depths, np.isfinite(depths)))
         # A quarter turn, without a rounding: z takes the place of x, -x that of z.
         points, box = (rows[:, [2, 1, 0]] * _QUARTER for rows in (points, box))
-    return tuple(found)
+    return tuple(sides)
 
 
 def _greatest(points: F64, values: F64) -> tuple[tuple[int, int], F64]:
     """The first cell and the greatest value in each; an empty rim of two cells around them."""
     cells = np.floor(points[:, :2] / _CELL_M).astype(np.int64)
     first = cells.min(0) - 2
-    found = np.full(tuple(cells.max(0) - first + 3), -np.inf)
-    np.maximum.at(found, tuple((cells - first).T), values)
-    return (int(first[0]), int(first[1])), found
+    greatest = np.full(tuple(cells.max(0) - first + 3), -np.inf)
+    np.maximum.at(greatest, tuple((cells - first).T), values)
+    return (int(first[0]), int(first[1])), greatest

@@ -45,19 +45,19 @@ class WalkMap:
 
         free: (H, W) bool; a copy is returned. A person is a circle of radius _REACH_M.
         """
-        left = free.copy()
+        remaining = free.copy()
         for x0, z0, x1, z1 in rects:
             # Test the cells in the bounding rectangle; round its corners off.
             columns, rows = (
-                slice(*np.searchsorted(at, (low - _REACH_M, high + _REACH_M)).tolist())
-                for at, low, high in ((self._xs, x0, x1), (self._zs, z0, z1))
+                slice(*np.searchsorted(centres, (low - _REACH_M, high + _REACH_M)).tolist())
+                for centres, low, high in ((self._xs, x0, x1), (self._zs, z0, z1))
             )
             x, z = self._xs[columns], self._zs[rows]
             dx, dz = (
                 np.maximum(np.maximum(a - v, v - b), 0) for v, a, b in ((x, x0, x1), (z, z0, z1))
             )
-            left[rows, columns] &= dx[None] ** 2 + dz[:, None] ** 2 >= _REACH_M**2
-        return left
+            remaining[rows, columns] &= dx[None] ** 2 + dz[:, None] ** 2 >= _REACH_M**2
+        return remaining
 
     def reached(self, free: Bools, fronts: Iterable[Rect]) -> Bools | None:
         """(H, W) middles of a man who came in by the doors; None where a door or front is cut off.

@@ -34,8 +34,8 @@ def closed_rings(path: Path, lines: Sequence[Line], join_m: float = _JOIN_M) -> 
     """
     if len(lines) > MAX_LINES:
         raise BadInput(path, "walls", f"has {len(lines)} walls, at most {MAX_LINES} are read")
-    kept = [line for line in lines if math.dist(*line) >= _SHORTEST_M]
-    ends = np.array([p for line in kept for p in line], np.float64).reshape(-1, 2)
+    walls = [line for line in lines if math.dist(*line) >= _SHORTEST_M]
+    ends = np.array([p for line in walls for p in line], np.float64).reshape(-1, 2)
     if not len(ends) or not np.isfinite(ends).all() or np.abs(ends).max() > 1e9:
         raise BadInput(path, "walls", "has no wall between two places in metres")
     joined = _join_near_ends(ends, join_m).reshape(-1, 2, 2)
@@ -53,8 +53,8 @@ def closed_rings(path: Path, lines: Sequence[Line], join_m: float = _JOIN_M) -> 
     noded = unary_union([*drawn, *middles, *doorways(standing, HALF_M + join_m)])
     rooms = [p for p in polygonize(noded) if p.area >= _LEAST_M2]
     if not rooms:
-        gap, at = _widest_gap(ends)
-        text = f"walls close no room: the widest gap, {gap:.2f} m, is at ({at[0]:.2f}, {at[1]:.2f})"
+        gap, position = _widest_gap(ends)
+        text = f"walls close no room: the widest gap, {gap:.2f} m, is at ({position[0]:.2f}, {position[1]:.2f})"
         raise BadInput(path, "walls", text, hint=f"ends within {join_m:g} m are joined")
     whole = [Polygon(p.exterior) if not p.interiors else p for p in rooms]
     return sorted((Polygon(p.exterior) for p in whole), key=lambda p: -p.area)
@@ -69,18 +69,18 @@ def passages_between(
     """
     walls = [LineString(line) for line in lines if line[0] != line[1]]
     standing = unary_union([wall.buffer(_BESIDE_M, cap_style="flat") for wall in walls])
-    told = [Point(o["at"]) for o in openings]
-    found: list[dict[str, Any]] = []
+    opening_points = [Point(o["at"]) for o in openings]
+    passages: list[dict[str, Any]] = []
     for k, room in enumerate(rooms):
-        for other in rooms[:k]:
-            shared = room.buffer(_SAME_SIDE_M).intersection(other.exterior).difference(standing)
+        for neighbour in rooms[:k]:
+            shared = room.buffer(_SAME_SIDE_M).intersection(neighbour.exterior).difference(standing)
             for gap in shapely.get_parts(shapely.line_merge(shared)):
                 middle = gap.interpolate(0.5, normalized=True)
                 is_door = NARROWEST_M - _JOIN_M <= gap.length <= WIDEST_M + _JOIN_M
-                if is_door and not any(p.distance(middle) < gap.length / 2 for p in told):
+                if is_door and not any(p.distance(middle) < gap.length / 2 for p in opening_points):
                     row = {"at": [middle.x, middle.y], "width": gap.length, "kind": "passage"}
-                    found.append(row)
-    return found
+                    passages.append(row)
+    return passages
 
 
 def _join_near_ends(ends: F64, join_m: float) -> F64:
@@ -110,9 +110,9 @@ def _widest_gap(ends: F64) -> tuple[float, F64]:
     """The widest of the gaps from an end to the nearest end of another wall, and where it is."""
     away = np.full(len(ends), np.inf)
     for k in range(len(ends)):
-        others = np.delete(ends, [k, k ^ 1], axis=0)
-        if len(others):
-            away[k] = np.hypot(*(others - ends[k]).T).min()
+        other_ends = np.delete(ends, [k, k ^ 1], axis=0)
+        if len(other_ends):
+            away[k] = np.hypot(*(other_ends - ends[k]).T).min()
     finite = np.where(np.isfinite(away), away, 0.0)
     k = int(np.argmax(finite))
     return float(finite[k]), ends[k]

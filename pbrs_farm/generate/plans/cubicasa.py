@@ -107,13 +107,20 @@ def _floors(path: Path, root: Element) -> list[_Floor]:
     ]
     while waiting:
         group, matrix, floor, kind, words = waiting.pop()
-        own = tuple((group.get("class") or "").split())
+        classes = tuple((group.get("class") or "").split())
         matrix = _then(matrix, group.get("transform") or "")
-        if own and own[0] == "Floorplan":
+        if classes and classes[0] == "Floorplan":
             floors.append(floor := _Floor())
-        elif own and own[0] in ("Space", "Wall", "Door", "Window", "Railing", "FixedFurniture"):
-            kind, words = own[0], own[1:]
-        elif own and own[0] in _NOT_DRAWN:
+        elif classes and classes[0] in (
+            "Space",
+            "Wall",
+            "Door",
+            "Window",
+            "Railing",
+            "FixedFurniture",
+        ):
+            kind, words = classes[0], classes[1:]
+        elif classes and classes[0] in _NOT_DRAWN:
             continue
         name = str(group.tag).rpartition("}")[2]
         if name == "polygon" and kind:
@@ -138,15 +145,15 @@ def _then(matrix: _Matrix, text: str) -> _Matrix:
     for name, inner in _TRANSFORM.findall(text[:2000]):
         n = [float(x) for x in _NUMBER.findall(inner)]
         if name == "matrix" and len(n) == 6:
-            own: _Matrix = (n[0], n[1], n[2], n[3], n[4], n[5])
+            step: _Matrix = (n[0], n[1], n[2], n[3], n[4], n[5])
         elif name == "translate" and n:
-            own = (1.0, 0.0, 0.0, 1.0, n[0], n[1] if len(n) > 1 else 0.0)
+            step = (1.0, 0.0, 0.0, 1.0, n[0], n[1] if len(n) > 1 else 0.0)
         elif name == "scale" and n:
-            own = (n[0], 0.0, 0.0, n[1] if len(n) > 1 else n[0], 0.0, 0.0)
+            step = (n[0], 0.0, 0.0, n[1] if len(n) > 1 else n[0], 0.0, 0.0)
         else:
             continue
         a, b, c, d, e, f = matrix
-        g, h, i, j, k, m = own
+        g, h, i, j, k, m = step
         matrix = (
             a * g + c * h,
             b * g + d * h,
@@ -225,10 +232,14 @@ def _things_of_shape(words: Sequence[str], shape: Polygon) -> list[Thing]:
 def _opened(rooms: list[dict[str, Any]], left_out: LeftOut) -> list[dict[str, Any]]:
     """The rooms, those whose sides touch without a wall between made one, of the larger one's type."""
     shapes: list[BaseGeometry] = [Polygon(r["polygon"]) for r in rooms]
-    kept = list(range(len(rooms)))
+    remaining_rooms = list(range(len(rooms)))
     for i in range(len(rooms)):
         for j in range(i):
-            if i not in kept or j not in kept or "balcony" in (rooms[i]["type"], rooms[j]["type"]):
+            if (
+                i not in remaining_rooms
+                or j not in remaining_rooms
+                or "balcony" in (rooms[i]["type"], rooms[j]["type"])
+            ):
                 continue
             touch = shapes[i].buffer(0.02).intersection(shapes[j].boundary)
             if touch.length < _OPEN_M or shapes[i].distance(shapes[j]) > 0.02:
@@ -238,13 +249,13 @@ def _opened(rooms: list[dict[str, Any]], left_out: LeftOut) -> list[dict[str, An
             )
             if joined is None or joined.interiors or joined.area < LEAST_M2:
                 continue
-            into, other = (j, i) if shapes[j].area >= shapes[i].area else (i, j)
+            into, merged = (j, i) if shapes[j].area >= shapes[i].area else (i, j)
             joined = largest_part(joined.simplify(0.02)) or joined
             shapes[into] = joined
-            kept.remove(other)
+            remaining_rooms.remove(merged)
             rooms[into] = rooms[into] | {"polygon": [list(p) for p in joined.exterior.coords[:-1]]}
             left_out.add("two rooms without a wall between are one")
-    return [rooms[k] for k in kept]
+    return [rooms[k] for k in remaining_rooms]
 
 
 FORMAT = PlanFormat(

@@ -93,12 +93,14 @@ def plan_of_rows(path: Path, apartment: str = "") -> ParsedPlan:
         (apartment,) = floors
     if apartment not in floors:
         some = ", ".join(list(floors)[:_NAMED]) + (", ..." if len(floors) > _NAMED else "")
-        what = f"has no apartment {apartment!r}" if apartment else f"has {len(floors)} apartments"
+        problem = (
+            f"has no apartment {apartment!r}" if apartment else f"has {len(floors)} apartments"
+        )
         first = next(iter(floors))
         raise BadInput(
             path,
             "apartment_id",
-            f"{what}: {some}",
+            f"{problem}: {some}",
             hint=f"--apartment {first}, or the word {path.name}#apartment={first} of run",
         )
     left_out = LeftOut()
@@ -112,8 +114,8 @@ def plan_of_rows(path: Path, apartment: str = "") -> ParsedPlan:
 
 
 def _elevation(rows: list[_Row]) -> float:
-    known = [r.elevation for r in rows if r.kind == "area:own" and r.elevation is not None]
-    return statistics.median(known) if known else 0.0
+    elevations = [r.elevation for r in rows if r.kind == "area:own" and r.elevation is not None]
+    return statistics.median(elevations) if elevations else 0.0
 
 
 def _read_rows(path: Path) -> Iterator[tuple[int, dict[str, str]]]:
@@ -151,7 +153,7 @@ def _floors(path: Path) -> dict[str, dict[str, str]]:
 
 def _of_apartment(path: Path, floors: dict[str, str]) -> dict[str, list[_Row]]:
     """By floor, an apartment's areas and whatever else is drawn on that floor."""
-    found: dict[str, list[_Row]] = {floor: [] for floor in floors}
+    rows_of_floor: dict[str, list[_Row]] = {floor: [] for floor in floors}
     for line, row in _read_rows(path):
         floor, kind = row["floor_id"], row["entity_type"]
         if floor not in floors:
@@ -162,10 +164,10 @@ def _of_apartment(path: Path, floors: dict[str, str]) -> dict[str, list[_Row]]:
             kind = "area:own"
         elif row["entity_subtype"].upper() not in _DRAWN.get(kind, ()):
             continue
-        found[floor].append(_parse_row(path, line, row, kind))
-        if len(found[floor]) > _MOST_ROWS:
+        rows_of_floor[floor].append(_parse_row(path, line, row, kind))
+        if len(rows_of_floor[floor]) > _MOST_ROWS:
             raise BadInput(path, f"floor {floor}", f"has over {_MOST_ROWS} rows")
-    return found
+    return rows_of_floor
 
 
 def _parse_row(path: Path, line: int, row: dict[str, str], kind: str) -> _Row:
@@ -267,15 +269,15 @@ def _opening_of_row(row: _Row, height: float, floor: float | None) -> dict[str, 
     """Where an opening is and how large: the long side of its polygon, heights where the row has them."""
     box = footprint(row.shape)
     kind = _OPENINGS[row.subtype]
-    found = opening(box._replace(width=round(max(box.width, 0.3), 3)), kind)
+    fields = opening(box._replace(width=round(max(box.width, 0.3), 3)), kind)
     tall = row.height
     if tall is not None and 0.3 <= tall <= height:
-        found["height"] = min(tall, height - 0.03)
+        fields["height"] = min(tall, height - 0.03)
         if kind == "window" and row.elevation is not None and floor is not None:
-            sill = min(max(row.elevation - floor, 0.0), height - 0.03 - found["height"])
-            found["sill"] = round(max(sill, 0.0), 3)
-            found["kind"] = "french_window" if sill < _FRENCH_M else kind
-    return found
+            sill = min(max(row.elevation - floor, 0.0), height - 0.03 - fields["height"])
+            fields["sill"] = round(max(sill, 0.0), 3)
+            fields["kind"] = "french_window" if sill < _FRENCH_M else kind
+    return fields
 
 
 def _things_of_row(row: _Row, height: float, floor: float | None, left_out: LeftOut) -> list[Thing]:

@@ -76,11 +76,11 @@ class LeftOut:
 
     def lines(self) -> tuple[str, ...]:
         """A line a kind, with the first place."""
-        found = []
-        for what, n in self.counts.items():
-            place = f"{self.first[what]}: " if self.first[what] and n == 1 else ""
-            found.append(f"{place}{what}" + (f" ({n} times)" if n > 1 else ""))
-        return tuple(found)
+        texts = []
+        for text, n in self.counts.items():
+            place = f"{self.first[text]}: " if self.first[text] and n == 1 else ""
+            texts.append(f"{place}{text}" + (f" ({n} times)" if n > 1 else ""))
+        return tuple(texts)
 
 
 class Footprint(NamedTuple):
@@ -128,17 +128,17 @@ def footprints(shape: Polygon) -> list[Footprint]:
     upright: Polygon | None = largest_part(
         affinity.rotate(ground, whole.turn_rad, (0, 0), use_radians=True)
     )
-    found: list[Footprint] = []
-    while len(found) < 4 and upright is not None and upright.area > _LEAST_BOX_M2:
+    boxes: list[Footprint] = []
+    while len(boxes) < 4 and upright is not None and upright.area > _LEAST_BOX_M2:
         x0, z0, x1, z1 = largest_rectangle(upright)
         if (x1 - x0) * (z1 - z0) < _LEAST_BOX_M2:
             break
         back = affinity.rotate(
             shapely.box(x0, z0, x1, z1), -whole.turn_rad, (0, 0), use_radians=True
         )
-        found.append(footprint(back))
+        boxes.append(footprint(back))
         upright = largest_part(upright.difference(shapely.box(x0, z0, x1, z1).buffer(1e-6)))
-    return found or [whole]
+    return boxes or [whole]
 
 
 def largest_part(shape: object) -> Polygon | None:

@@ -66,8 +66,8 @@ def plan_formats() -> tuple[PlanFormat, ...]:
     """
     names = [module.name for module in pkgutil.iter_modules(plans.__path__)]
     modules = [import_module(f"{plans.__name__}.{name}") for name in names]
-    found = [m.FORMAT for m in modules if isinstance(getattr(m, "FORMAT", None), PlanFormat)]
-    return tuple(sorted(found, key=lambda one: one.order))
+    formats = [m.FORMAT for m in modules if isinstance(getattr(m, "FORMAT", None), PlanFormat)]
+    return tuple(sorted(formats, key=lambda one: one.order))
 
 
 def plan_from_file(path: Path, part: Part | str = "") -> PlanFile:
@@ -84,9 +84,9 @@ def plan_from_file(path: Path, part: Part | str = "") -> PlanFile:
         return _of_machine(path, by_suffix.read(path, None, part), part)
     value = json_from_file(path)
     if isinstance(value, dict) and not _is_own(value):
-        for one in plan_formats():
-            if one.read is not None and one.fits(value):
-                return _of_machine(path, one.read(path, value, part), part)
+        for plan_format in plan_formats():
+            if plan_format.read is not None and plan_format.fits(value):
+                return _of_machine(path, plan_format.read(path, value, part), part)
     if isinstance(value, dict) and value.get("type") == "FeatureCollection":
         value = _from_geojson(path, value)
     plan = plan_of_value(path, value)
@@ -203,14 +203,14 @@ class _Feature(BaseModel):
 
 def _from_geojson(path: Path, value: dict[str, Any]) -> dict[str, Any]:
     plan: dict[str, Any] = {"rooms": [], "doors": [], "windows": []}
-    for place, given in _features(path, value):
-        row, at = given.properties or {}, given.geometry.coordinates
-        if given.geometry.type == "Polygon":
-            plan["rooms"].append(row | {"polygon": at[0]})
+    for place, feature in _features(path, value):
+        row, coordinates = feature.properties or {}, feature.geometry.coordinates
+        if feature.geometry.type == "Polygon":
+            plan["rooms"].append(row | {"polygon": coordinates[0]})
             continue
         kind = checked(OpeningKind, row.get("kind"), path, f"{place}, kind")
         is_window = kind in (OpeningKind.WINDOW, OpeningKind.FRENCH_WINDOW)
-        plan["windows" if is_window else "doors"].append(row | {"at": at})
+        plan["windows" if is_window else "doors"].append(row | {"at": coordinates})
     return plan if value.get("height") is None else plan | {"height": value["height"]}
 
 

@@ -22,9 +22,9 @@ class Part:
     @property
     def word(self) -> str:
         """The part after the # in a command-line word; "" = the whole file."""
-        given = [f"apartment={self.apartment}"] * bool(self.apartment)
-        given += [f"floor={self.floor}"] * (self.floor is not None)
-        return ",".join(given)
+        parts = [f"apartment={self.apartment}"] * bool(self.apartment)
+        parts += [f"floor={self.floor}"] * (self.floor is not None)
+        return ",".join(parts)
 
 
 def part_of(word: str) -> Part:

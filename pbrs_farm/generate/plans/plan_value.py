@@ -103,9 +103,11 @@ def plan_of_value(
 
     tops: upper edges of its walls where some are sloped. Raises BadInput, naming the room or opening.
     """
-    given = checked(_PlanFields, value, path, hint='{"rooms": [...], "doors": [...]}')
+    plan_fields = checked(_PlanFields, value, path, hint='{"rooms": [...], "doors": [...]}')
     # Build walls between the drawn rooms; openings are then assigned to walls.
-    fields = [checked(_RoomFields, row, path, f"room {k}") for k, row in enumerate(given.rooms, 1)]
+    fields = [
+        checked(_RoomFields, row, path, f"room {k}") for k, row in enumerate(plan_fields.rooms, 1)
+    ]
     _check_unit(path, fields)
     drawn = [
         room
@@ -124,9 +126,11 @@ def plan_of_value(
         if len(built.polygon) < 3 and left_out is None:
             raise BadInput(path, f"{room.place} ({room.name})", "has no floor beside its walls")
     rooms = tuple(room for room in rooms if len(room.polygon) >= 3)
-    builder = _Openings(path, walls, rooms, given.height, is_of_machine=left_out is not None)
-    openings = [(f"door {k}", row, OpeningKind.DOOR) for k, row in enumerate(given.doors, 1)]
-    openings += [(f"window {k}", row, OpeningKind.WINDOW) for k, row in enumerate(given.windows, 1)]
+    builder = _Openings(path, walls, rooms, plan_fields.height, is_of_machine=left_out is not None)
+    openings = [(f"door {k}", row, OpeningKind.DOOR) for k, row in enumerate(plan_fields.doors, 1)]
+    openings += [
+        (f"window {k}", row, OpeningKind.WINDOW) for k, row in enumerate(plan_fields.windows, 1)
+    ]
     for place, row, kind in openings:
         try:
             builder.add(place, row, kind)
@@ -134,15 +138,15 @@ def plan_of_value(
             if left_out is None:
                 raise
             left_out.add(f"an opening {error.text}", place)
-    more = [_wall_of_row(path, k, row) for k, row in enumerate(given.walls, 1)]
-    return Plan(rooms, (*walls, *more), tuple(builder.found), given.height)
+    more = [_wall_of_row(path, k, row) for k, row in enumerate(plan_fields.walls, 1)]
+    return Plan(rooms, (*walls, *more), tuple(builder.found), plan_fields.height)
 
 
 def _wall_of_row(path: Path, number: int, row: object) -> PlanWall:
-    given = checked(_WallFields, row, path, f"wall {number}")
-    if given.start == given.end:
+    fields = checked(_WallFields, row, path, f"wall {number}")
+    if fields.start == fields.end:
         raise BadInput(path, f"wall {number}", "has no length")
-    return PlanWall(given.start, given.end, given.thickness, height=given.height)
+    return PlanWall(fields.start, fields.end, fields.thickness, height=fields.height)
 
 
 def _check_unit(path: Path, rooms: list[_RoomFields]) -> None:
@@ -199,17 +203,17 @@ def _room_of_fields(
 
 def _check_apart(path: Path, drawn: list[DrawnRoom]) -> None:
     for i, room in enumerate(drawn):
-        for other in drawn[:i]:
-            shared = room.shape.intersection(other.shape).area
+        for drawn_before in drawn[:i]:
+            shared = room.shape.intersection(drawn_before.shape).area
             if shared > 0.05:
-                text = f"overlaps {other.name!r} by {shared:.2f} m2"
+                text = f"overlaps {drawn_before.name!r} by {shared:.2f} m2"
                 raise BadInput(path, f"{room.place} ({room.name})", text)
 
 
 def _apart(drawn: list[DrawnRoom], left_out: LeftOut) -> list[DrawnRoom]:
     """The rooms without what they share: the smaller one of two keeps it."""
     order = sorted(range(len(drawn)), key=lambda k: (drawn[k].shape.area, k))
-    kept: dict[int, DrawnRoom] = {}
+    remaining: dict[int, DrawnRoom] = {}
     taken: BaseGeometry = Polygon()
     for k in order:
         room = drawn[k]
@@ -223,15 +227,17 @@ def _apart(drawn: list[DrawnRoom], left_out: LeftOut) -> list[DrawnRoom]:
             if shape.interiors:
                 # A room inside a room: the outer one keeps its outline, and the inner one goes.
                 inner = [
-                    j for j, r in kept.items() if Polygon(shape.exterior).contains(r.shape.centroid)
+                    j
+                    for j, r in remaining.items()
+                    if Polygon(shape.exterior).contains(r.shape.centroid)
                 ]
                 for j in inner:
-                    del kept[j]
+                    del remaining[j]
                     left_out.add("a room lies inside another", drawn[j].place)
             room = room._replace(shape=Polygon(corners(Polygon(shape.exterior).simplify(1e-3))))
-        kept[k] = room
+        remaining[k] = room
         taken = unary_union([taken, room.shape])
-    return [kept[k] for k in sorted(kept)]
+    return [remaining[k] for k in sorted(remaining)]
 
 
 @dataclass
@@ -252,14 +258,14 @@ class _Openings:
 
     def add(self, place: str, row: object, kind: OpeningKind) -> None:
         """Add a door or window in the wall nearest to where it is said to be. Raises BadInput."""
-        given = checked(_OpeningFields, row, self.path, place)
-        if given.entrance or given.kind == "entrance":
+        fields = checked(_OpeningFields, row, self.path, place)
+        if fields.entrance or fields.kind == "entrance":
             kind = OpeningKind.ENTRANCE
-        if given.kind in ("french_window", "passage"):
-            kind = OpeningKind(given.kind)
+        if fields.kind in ("french_window", "passage"):
+            kind = OpeningKind(fields.kind)
         usual = dict(zip(("width", "height", "sill"), _SIZES[kind], strict=True))
         width, tall, sill = (
-            usual | given.model_dump(include=set(usual), exclude_unset=True)
+            usual | fields.model_dump(include=set(usual), exclude_unset=True)
         ).values()
         if self.is_of_machine:
             sill = min(sill, self.height - 0.4)
@@ -267,13 +273,13 @@ class _Openings:
         if sill + tall > self.height - 0.02:
             text = f"is higher than the room: {self.height - 0.02 - sill:.2f} m works"
             raise BadInput(self.path, place, text)
-        at = shapely.Point(given.at)
-        wall = self._nearest_wall(place, at, width)
+        point = shapely.Point(fields.at)
+        wall = self._nearest_wall(place, point, width)
         if self.walls[wall].length < width + 0.04:
             text = f"is wider than its wall of {self.walls[wall].length:.2f} m"
             hint = f"{max(self.walls[wall].length - 0.05, 0.3):.2f} m works"
             raise BadInput(self.path, place, text, hint=hint)
-        self._put(place, at, wall, kind, (width, tall, sill))
+        self._put(place, point, wall, kind, (width, tall, sill))
 
     def _nearest_wall(self, place: str, at: shapely.Point, width: float) -> int:
         near = self._near.query(at.buffer(_REACH_M)).tolist()
@@ -307,8 +313,11 @@ class _Openings:
             if tall < _LEAST_TALL_M:
                 raise BadInput(self.path, place, "is higher than its wall")
         if self.is_of_machine:
-            for other in self.found:
-                if other.wall == number and abs(other.along - along) < (other.width + width) / 2:
+            for opening in self.found:
+                if (
+                    opening.wall == number
+                    and abs(opening.along - along) < (opening.width + width) / 2
+                ):
                     raise BadInput(self.path, place, "overlaps another in its wall")
         hole = shapely.Point(wall.at(along)).buffer(wall.thickness / 2 + 0.15)
         beside = [k for k, ground in enumerate(self._grounds) if ground.intersects(hole)]

@@ -191,14 +191,14 @@ def _assets(path: Path) -> dict[str, tuple[float, float, float]]:
     value = json_from_file(table)
     rows = value.values() if isinstance(value, dict) else value if isinstance(value, list) else []
     flat = [r for row in rows for r in (row if isinstance(row, list) else [row])]
-    found = {}
+    sizes = {}
     for row in flat:
         box = row.get("boundingBox") if isinstance(row, dict) else None
         if isinstance(box, dict):
             size = [v for k in "xyz" if isinstance(v := box.get(k), int | float) and 0 < v < 15]
             if len(size) == 3:
-                found[str(row.get("assetId"))] = (float(size[0]), float(size[1]), float(size[2]))
-    return found
+                sizes[str(row.get("assetId"))] = (float(size[0]), float(size[1]), float(size[2]))
+    return sizes
 
 
 FORMAT = PlanFormat(

@@ -56,13 +56,21 @@ class _File(BaseModel):
 
 def plan_of_react_planner(path: Path, value: Any) -> ParsedPlan:
     """Read the plan, one storey per layer. Raises BadInput, naming the place."""
-    given = checked(_File, value, path)
-    if given.unit not in _METRES:
-        raise BadInput(path, "unit", f"no such unit: {given.unit[:20]}", hint=", ".join(_METRES))
+    file_fields = checked(_File, value, path)
+    if file_fields.unit not in _METRES:
+        raise BadInput(
+            path, "unit", f"no such unit: {file_fields.unit[:20]}", hint=", ".join(_METRES)
+        )
     left_out = LeftOut()
-    layers = sorted(given.layers.items(), key=lambda row: row[1].altitude)
+    layers = sorted(file_fields.layers.items(), key=lambda row: row[1].altitude)
     drawn = [
-        _Drawing(path, f"layers.{key}"[:60], layer, _METRES[given.unit], math.sqrt(given.scale))
+        _Drawing(
+            path,
+            f"layers.{key}"[:60],
+            layer,
+            _METRES[file_fields.unit],
+            math.sqrt(file_fields.scale),
+        )
         for key, layer in layers
         if layer.lines
     ]
@@ -113,7 +121,7 @@ class _Drawing:
         return ParsedStorey(value, tuple(things), str(self.layer.name)[:60])
 
     def _areas(self, lines: dict[str, Line], left_out: LeftOut) -> list[DrawnArea]:
-        found = []
+        areas = []
         for key, row in self.layer.areas.items():
             names = row.get("vertices") if isinstance(row, dict) else None
             points = [self._vertex(n) for n in names] if isinstance(names, list) else []
@@ -124,11 +132,11 @@ class _Drawing:
                 left_out.add("an area names no three corners", f"{self.place}.areas.{key}"[:80])
                 continue
             name = str(row.get("name") or "")
-            found.append(
+            areas.append(
                 DrawnArea(Polygon(ring), "", "" if name.lower().startswith("area") else name)
             )
-        if found:
-            return found
+        if areas:
+            return areas
         return [DrawnArea(p, "") for p in closed_rings(self.path, list(lines.values()))]
 
     def _line(self, key: str, row: Any) -> Line | None:
@@ -171,12 +179,12 @@ class _Drawing:
     def _length(self, row: Any, name: str, usual: float) -> float:
         """A property in metres: {"length": 20}, {"value": 20, "unit": "cm"} or 20."""
         properties = row.get("properties") if isinstance(row, dict) else None
-        given = properties.get(name) if isinstance(properties, dict) else None
+        value = properties.get(name) if isinstance(properties, dict) else None
         metres = self.metres
-        if isinstance(given, dict):
-            metres = _METRES.get(str(given.get("unit")), metres)
-            given = given.get("length", given.get("value"))
-        return float(given) * metres if _is_number(given) else usual
+        if isinstance(value, dict):
+            metres = _METRES.get(str(value.get("unit")), metres)
+            value = value.get("length", value.get("value"))
+        return float(value) * metres if _is_number(value) else usual
 
     def _opening(
         self, key: str, row: Any, lines: dict[str, Line], left_out: LeftOut
@@ -205,19 +213,19 @@ class _Drawing:
                 f"{self.place}.holes.{key}"[:80],
             )
         kind = str(row.get("type", "door")).lower()
-        found: dict[str, Any] = {
+        fields: dict[str, Any] = {
             "at": [x0 + t * (x1 - x0), z0 + t * (z1 - z0)],
             "width": max(width, 0.3),
             "kind": "door",
         }
         if "window" in kind or "curtain" in kind:
             sill, height = self._sill_and_height(row)
-            found |= {"kind": "window", "height": max(height, 0.3), "sill": max(sill, 0.0)}
+            fields |= {"kind": "window", "height": max(height, 0.3), "sill": max(sill, 0.0)}
         elif "entrance" in kind:
-            found["kind"] = "entrance"
+            fields["kind"] = "entrance"
         else:
-            found["height"] = max(min(self._length(row, "height", 2.05), 2.4), 1.6)
-        return found
+            fields["height"] = max(min(self._length(row, "height", 2.05), 2.4), 1.6)
+        return fields
 
     def _sill_and_height(self, row: dict[str, Any]) -> tuple[float, float]:
         """Of a window: by its edges where it has a property for them, else as react-planner has it."""
@@ -230,14 +238,14 @@ class _Drawing:
         return sill, float(high) * self.metres - sill if _is_number(high) else 1.3
 
     def _thing(self, key: str, row: Any, left_out: LeftOut) -> Thing | None:
-        at = self._point(row)
+        position = self._point(row)
         ring = self._ring(row.get("coordinates")) if isinstance(row, dict) else []
-        if at is None and len(ring) >= 3:
+        if position is None and len(ring) >= 3:
             box = footprint(Polygon(ring))
-            at = box.x, box.z
+            position = box.x, box.z
         name = str(row.get("type", "")) if isinstance(row, dict) else ""
         size = usual_size(name) or (0.6, 0.8, 0.6)
-        if at is None or name.lower() in ("stairs", "elevator", "shaft"):
+        if position is None or name.lower() in ("stairs", "elevator", "shaft"):
             left_out.add(
                 "an item has no place, or is stairs or a shaft", f"{self.place}.items.{key}"[:80]
             )
@@ -247,7 +255,7 @@ class _Drawing:
         return Thing(
             "cubicasa-icon",
             name,
-            *at,
+            *position,
             max(self._length(row, "altitude", 0.0), 0.0),
             max(width, 0.05),
             max(self._length(row, "depth", size[2]), 0.05),

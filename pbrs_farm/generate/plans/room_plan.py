@@ -173,8 +173,8 @@ def _upper_edge_of(surface: _Surface, pose: F64) -> WallTop:
     corners = [(*c, 0.0, 0.0)[:2] for c in surface.polygonCorners or ()]
     outline = largest_part(shapely.make_valid(Polygon(corners))) if len(corners) >= 3 else None
     if outline is not None:
-        own = upper_edge(outline)
-        edge = own if len(own) >= 2 else edge
+        outline_edge = upper_edge(outline)
+        edge = outline_edge if len(outline_edge) >= 2 else edge
     world = np.array([(x, y, 0.0) for x, y in edge]) @ pose[:3, :3].T + pose[:3, 3]
     places = tuple((float(x), float(z)) for x, _, z in world)
     return WallTop(places, tuple(float(y) for y in world[:, 1]))
@@ -183,14 +183,14 @@ def _upper_edge_of(surface: _Surface, pose: F64) -> WallTop:
 def _lines_in_gaps(path: Path, scan: _Scan, lines: list[Line]) -> list[Line]:
     """Centre lines of doors, windows and openings between walls instead of in one."""
     standing = unary_union([LineString(line).buffer(_IN_WALL_M) for line in lines])
-    found = []
+    gap_lines = []
     for kind in ("doors", "windows", "openings"):
         for k, surface in enumerate(getattr(scan, kind), 1):
             top = _upper_edge_of(surface, _parse_pose(path, f"{kind} {k}", surface))
             line = (top.places[0], top.places[-1])
             if LineString(line).difference(standing).length > surface.dimensions[0] / 2:
-                found.append(line)
-    return found
+                gap_lines.append(line)
+    return gap_lines
 
 
 def _note_heights(tops: list[WallTop], height: float, left_out: LeftOut) -> None:
@@ -217,8 +217,8 @@ def _outline_of_floor(path: Path, place: str, floor: _Surface) -> Polygon:
 
 def _category(surface: _Surface) -> str:
     """{"bed": {}} or "bed" -> "bed"."""
-    given = surface.category
-    return str(next(iter(given), "")) if isinstance(given, dict) else str(given or "")
+    value = surface.category
+    return str(next(iter(value), "")) if isinstance(value, dict) else str(value or "")
 
 
 def _opening_of_surface(surface: _Surface, pose: F64, kind: str, floor: float) -> dict[str, Any]:
@@ -253,8 +253,8 @@ def _thing(surface: _Surface, pose: F64, floor: float) -> Thing:
 
 def _section_label(shape: Polygon, sections: list[_Section]) -> str:
     inside = (s for s in sections if shape.contains(Point(s.center[0], s.center[2])))
-    found = next(inside, None)
-    return str(found.label) if found else ""
+    section = next(inside, None)
+    return str(section.label) if section else ""
 
 
 def _is_scan(value: dict[str, Any]) -> bool:

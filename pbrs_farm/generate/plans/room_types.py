@@ -62,7 +62,7 @@ def typed_rooms(
     Types follow from names, else furniture, railings, windows and doors, else size. Without any living
     area, the largest plain room becomes one. Slivers and non-rooms are left out.
     """
-    kept: list[tuple[DrawnArea, str]] = []
+    rooms: list[tuple[DrawnArea, str]] = []
     sure = [
         "balcony" if kind == BY_FIXTURES and _is_railed(area.shape, railings) else kind
         for kind, area in ((_by_word(source, area), area) for area in areas)
@@ -94,18 +94,18 @@ def typed_rooms(
             area = area._replace(is_plain=area.is_plain or kind == "bedroom")
         elif kind == "bathroom" and area.shape.area < _SMALL_BATH_M2:
             kind = "wc"
-        kept.append((area, kind))
+        rooms.append((area, kind))
     return [
         {"type": kind, "polygon": ring_of(area.shape)} | ({"name": area.name} if area.name else {})
-        for area, kind in _with_living(kept)
+        for area, kind in _with_living(rooms)
     ]
 
 
 def _by_word(source: str, area: DrawnArea) -> str:
-    given = given_room(source, area.word) if area.word else None
-    if given is not None:
+    room_type = given_room(source, area.word) if area.word else None
+    if room_type is not None:
         # Stairs of a plan lead nowhere: a plain passage.
-        return "hall" if given == "stairs" else given
+        return "hall" if room_type == "stairs" else room_type
     return type_by_words(area.name or area.word)
 
 
@@ -114,17 +114,17 @@ def type_by_words(name: str) -> str:
 
     A studio, an office in some languages and a home of one room in others, has a bed.
     """
-    said, words = named_kind(name), words_of(name)
-    if said is None:
+    kind, words = named_kind(name), words_of(name)
+    if kind is None:
         return BY_FIXTURES
-    if said is RoomKind.OFFICE and "studio" in words:
+    if kind is RoomKind.OFFICE and "studio" in words:
         return "bedroom"
-    return "wc" if {"wc", "toilet"} & words else _TYPES.get(said, said.value)
+    return "wc" if {"wc", "toilet"} & words else _TYPES.get(kind, kind.value)
 
 
 def _fixture(name: str) -> str:
     words = words_of(name.replace("_", " "))
-    return next((kind for kind, known in _FIXTURES if words & known), "")
+    return next((kind for kind, fixture_words in _FIXTURES if words & fixture_words), "")
 
 
 def _place(opening: dict[str, Any]) -> Point:

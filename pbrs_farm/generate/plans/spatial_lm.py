@@ -72,10 +72,10 @@ def plan_of_layout(path: Path) -> ParsedPlan:
 
 def _entity(path: Path, number: int, line: str) -> tuple[str, str, list[float]]:
     """(kind, class or wall, numbers) of a line."""
-    found = _LINE.fullmatch(line)
-    if found is None:
+    match = _LINE.fullmatch(line)
+    if match is None:
         raise BadInput(path, f"line {number}", "is no wall, door, window or bbox of a layout")
-    kind, fields = found[2], [f.strip() for f in found[3].split(",")]
+    kind, fields = match[2], [f.strip() for f in match[3].split(",")]
     word = "" if kind == "Wall" else fields.pop(0).strip("'\"")
     try:
         numbers = [float(f) for f in fields]

@@ -44,22 +44,22 @@ def upper_edge(corners: Polygon) -> list[tuple[float, float]]:
     """
     ring = shapely.get_coordinates(corners.exterior)
     low, high = float(ring[:, 0].min()), float(ring[:, 0].max())
-    found: list[tuple[float, float]] = []
+    points: list[tuple[float, float]] = []
     for x in np.unique(ring[:, 0].round(4)).tolist():
         # A hair to either side of a corner: the edge may step there.
         for beside in (x - _HAIR_M, x + _HAIR_M):
             if low < beside < high and (y := _height_at(ring, beside)) is not None:
-                found.append((x, round(y, 4)))
-    return _without_straight(found)
+                points.append((x, round(y, 4)))
+    return _without_straight(points)
 
 
 def _without_straight(edge: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
     """The edge without points that its neighbours' line goes through."""
-    kept = list(edge[:1])
+    edge_kept = list(edge[:1])
     for point, after in itertools.pairwise(edge[1:]):
-        if LineString([kept[-1], after]).distance(shapely.Point(point)) > _STRAIGHT_M:
-            kept.append(point)
-    return [*kept, *edge[1:][-1:]]
+        if LineString([edge_kept[-1], after]).distance(shapely.Point(point)) > _STRAIGHT_M:
+            edge_kept.append(point)
+    return [*edge_kept, *edge[1:][-1:]]
 
 
 def _height_at(ring: F64, x: float) -> float | None:

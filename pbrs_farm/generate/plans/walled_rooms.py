@@ -44,9 +44,9 @@ def walled(drawn: Sequence[DrawnRoom]) -> tuple[tuple[PlanWall, ...], tuple[Plan
     near = shapely.STRtree(shapes)
     walls: list[PlanWall] = []
     for number, room in enumerate(drawn):
-        others = [int(k) for k in near.query(room.shape.buffer(_THICKEST_M)) if k != number]
+        nearby = [int(k) for k in near.query(room.shape.buffer(_THICKEST_M)) if k != number]
         is_open_air = room.type is RoomType.BALCONY
-        walls += _walls_of(number, room.shape, rings, sorted(others), is_open_air=is_open_air)
+        walls += _walls_of(number, room.shape, rings, sorted(nearby), is_open_air=is_open_air)
     ground = unary_union([_wall_polygon(wall) for wall in walls])
     rooms = [PlanRoom(r.type, r.name, corners(r.shape.difference(ground))) for r in drawn]
     return tuple(walls), tuple(rooms)
@@ -73,22 +73,22 @@ def _walls_of(
     """The walls that a room adds: to rooms of higher number, and outer ones (a balcony: parapets)."""
     outer, height = (PARAPET_M, PARAPET_HEIGHT_M) if is_open_air else (OUTER_M, None)
     ring: list[Point] = [(x, z) for x, z, *_ in shape.exterior.coords[:-1]]
-    found = []
+    walls = []
     for k, a in enumerate(ring):
         b, before, after = ring[(k + 1) % len(ring)], ring[k - 1], ring[(k + 2) % len(ring)]
         side = _Side(a, b)
         free = [(0.0, side.length)]
-        for other in others:
-            for low, high, gap in side.shared(rings[other]):
+        for neighbour in others:
+            for low, high, gap in side.shared(rings[neighbour]):
                 free = _without(free, low, high)
-                if other > number:
-                    found.append(side.wall(low, high, max(gap, INNER_M), gap / 2))
+                if neighbour > number:
+                    walls.append(side.wall(low, high, max(gap, INNER_M), gap / 2))
         # Of the two sides of a thin stub the first has the wall: outer ones would be thicker than it.
         for low, high, gap, j in side.shared_sides(rings[number]):
             if gap < outer:
                 free = _without(free, low, high)
                 if j > k:
-                    found.append(side.stub(low, high, max(gap, INNER_M), gap / 2))
+                    walls.append(side.stub(low, high, max(gap, INNER_M), gap / 2))
         for low, high in free:
             if high - low < _TOUCH_M:
                 continue
@@ -96,8 +96,8 @@ def _walls_of(
             start = outer * _mitre(before, a, b) if low == 0.0 else INNER_M / 2
             end = outer * _mitre(a, b, after) if high == side.length else INNER_M / 2
             wall = side.wall(low - start, high + end, outer, outer / 2, is_outer=True)
-            found.append(replace(wall, height=height))
-    return found
+            walls.append(replace(wall, height=height))
+    return walls
 
 
 def _mitre(a: Point, b: Point, c: Point) -> float:
@@ -110,8 +110,8 @@ def _mitre(a: Point, b: Point, c: Point) -> float:
 def _without(
     spans: list[tuple[float, float]], low: float, high: float
 ) -> list[tuple[float, float]]:
-    left = [(a, min(b, low)) for a, b in spans] + [(max(a, high), b) for a, b in spans]
-    return sorted({(a, b) for a, b in left if b - a > 1e-6})
+    remaining = [(a, min(b, low)) for a, b in spans] + [(max(a, high), b) for a, b in spans]
+    return sorted({(a, b) for a, b in remaining if b - a > 1e-6})
 
 
 class _Side:
@@ -131,14 +131,14 @@ class _Side:
         """(from, to, gap, number of the side) of each side of a ring that faces this one."""
         gaps = ((ring.from_ + ring.to) / 2 - self.start) @ self.out
         faces = (ring.ways @ self.along <= -_PARALLEL) & (gaps >= -_TOUCH_M) & (gaps <= _THICKEST_M)
-        found = []
+        sides = []
         for k in np.flatnonzero(faces).tolist():
             ends = (np.stack([ring.from_[k], ring.to[k]]) - self.start) @ self.along
             low, high = max(float(ends.min()), 0.0), min(float(ends.max()), self.length)
             if high - low > 0.05:
                 gap = float(gaps[k])
-                found.append((low, high, gap if gap > _TOUCH_M else 0.0, k))
-        return found
+                sides.append((low, high, gap if gap > _TOUCH_M else 0.0, k))
+        return sides
 
     def wall(
         self, low: float, high: float, thickness: float, out: float, *, is_outer: bool = False

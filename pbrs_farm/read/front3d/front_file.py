@@ -139,21 +139,21 @@ def _rows_of_key(value: dict[str, Any], key: str, file: str) -> list[dict[str, A
 def _parse_front_rooms(
     scene: dict[str, Any], file: str, notes: Notes
 ) -> tuple[tuple[FrontRoom, ...], list[tuple[str, dict[str, Any], str]]]:
-    found: dict[str, FrontRoom] = {}
+    rooms: dict[str, FrontRoom] = {}
     children: list[tuple[str, dict[str, Any], str]] = []
     for k, row in enumerate(_rows_of_key(scene, "room", file)):
         place = f"scene.room[{k}]"
         name = str(row.get("instanceid") or f"room {k}")[:80]
-        if name in found:
+        if name in rooms:
             notes.add("duplicate-id", place, f"a second room is called {name!r}")
             name = f"{name}.{k}"
-        found[name] = FrontRoom(name, str(row.get("type", ""))[:60], row.get("empty") in (1, True))
+        rooms[name] = FrontRoom(name, str(row.get("type", ""))[:60], row.get("empty") in (1, True))
         for j, child in enumerate(_rows_of_key(row, "children", file)):
             if child.get("ref") is not None:
                 children.append((name, child, f"{place}.children[{j}]"))
         if len(children) > MAX_ENTRIES:
             raise BadHouse(file, place, f"more than {MAX_ENTRIES} children")
-    return tuple(found.values()), children
+    return tuple(rooms.values()), children
 
 
 def numbers(value: Any, n: int, file: str, place: str) -> F64:
@@ -162,20 +162,20 @@ def numbers(value: Any, n: int, file: str, place: str) -> F64:
     file, place: for the message. Numbers of 1e12 and more count as damage.
     """
     try:
-        found = np.array(value if isinstance(value, list) else [None], np.float64)
+        vector = np.array(value if isinstance(value, list) else [None], np.float64)
     except (ValueError, TypeError, OverflowError):
         raise BadHouse(file, place, "is no list of numbers") from None
-    if found.ndim != 1 or (n and len(found) != n):
+    if vector.ndim != 1 or (n and len(vector) != n):
         raise BadHouse(file, place, f"expected {n or 'a flat list of'} numbers")
-    if not (np.isfinite(found) & (np.abs(found) < 1e12)).all():
+    if not (np.isfinite(vector) & (np.abs(vector) < 1e12)).all():
         raise BadHouse(file, place, "holds a number that is not finite or absurdly large")
-    return found
+    return vector
 
 
 def _meshes(
     rows: Sequence[dict[str, Any]], room_of: dict[str, str], file: str, notes: Notes
 ) -> tuple[FrontMesh, ...]:
-    found: dict[str, FrontMesh] = {}
+    meshes: dict[str, FrontMesh] = {}
     for k, row in enumerate(rows):
         place = f"mesh[{k}]"
         # Published uids have up to 84 characters, so they are kept whole.
@@ -192,8 +192,8 @@ def _meshes(
         if not len(faces):
             continue
         key = uid
-        if uid in found:
-            if np.array_equal(found[uid].points[found[uid].faces], points[faces]):
+        if uid in meshes:
+            if np.array_equal(meshes[uid].points[meshes[uid].faces], points[faces]):
                 notes.add("duplicate-id", place, f"a copy of mesh {uid[:80]!r}; left out")
                 continue
             notes.add("duplicate-id", place, f"a second mesh is called {uid[:80]!r}")
@@ -202,7 +202,7 @@ def _meshes(
         if row.get("uv"):
             pairs = numbers(row["uv"], 0, file, f"{place}.uv")
             uvs = pairs.reshape(-1, 2) if len(pairs) == 2 * len(points) else None
-        found[key] = FrontMesh(
+        meshes[key] = FrontMesh(
             uid,
             str(row.get("type", ""))[:60],
             points,
@@ -212,7 +212,7 @@ def _meshes(
             room_of.get(uid, ""),
             f"{place} ({str(row.get('type', ''))[:40]})",
         )
-    return tuple(found.values())
+    return tuple(meshes.values())
 
 
 def _parse_front_pieces(
@@ -224,16 +224,16 @@ def _parse_front_pieces(
     notes: Notes,
 ) -> tuple[tuple[FrontPiece, ...], list[tuple[str, F64, str]]]:
     """The placed pieces, and (ref, location, room) of every child that is not a mesh."""
-    found, places = [], []
+    pieces, places = [], []
     n_missing = n_invalid = n_flat = 0
     for room, child, place in children:
         ref = str(child["ref"])
         if ref in meshes:
             continue
-        at = numbers(child.get("pos"), 3, file, f"{place}.pos")
+        location = numbers(child.get("pos"), 3, file, f"{place}.pos")
         turn = numbers(child.get("rot", [0, 0, 0, 1]), 4, file, f"{place}.rot")
         scale = numbers(child.get("scale", [1, 1, 1]), 3, file, f"{place}.scale")
-        places.append((ref, at, room))
+        places.append((ref, location, room))
         entry = entries.get(ref)
         if entry is None:
             n_missing += ref.removesuffix("/model") not in lamps  # a light alone is no piece
@@ -247,8 +247,8 @@ def _parse_front_pieces(
             continue
         world = np.eye(4)
         world[:3, :3] = _rotation(turn / length) * scale
-        world[:3, 3] = at
-        found.append(
+        world[:3, 3] = location
+        pieces.append(
             FrontPiece(
                 ref,
                 str(entry.get("jid") or "")[:100],
@@ -268,7 +268,7 @@ def _parse_front_pieces(
     ):
         if n:
             notes.add("missing-piece", "scene.room", f"{n} children {why}: left out")
-    return tuple(found), places
+    return tuple(pieces), places
 
 
 def _rotation(q: F64) -> F64:
@@ -309,16 +309,16 @@ def _parse_front_lights(
     rows: Sequence[dict[str, Any]], places: Sequence[tuple[str, F64, str]]
 ) -> list[FrontLight]:
     by_ref: dict[str, list[tuple[str, F64, str]]] = {}
-    for one in places:
-        by_ref.setdefault(one[0].removesuffix("/model"), []).append(one)
-    found = []
+    for child in places:
+        by_ref.setdefault(child[0].removesuffix("/model"), []).append(child)
+    front_lights = []
     for row in rows:
         kind = str(row.get("nodeType", ""))
         if "Sun" in kind or row.get("skylightPortal") in (1, True):
             continue  # the sky is the recipe's
         kelvin = row.get("color_temperature")
         warm = float(kelvin) if isinstance(kelvin, int | float) and 1000 <= kelvin <= 20000 else 0.0
-        for ref, at, room in by_ref.get(str(row.get("instanceid", "")), ()):
-            if np.abs(at).max() < _FARTHEST_M:
-                found.append(FrontLight(at, ref, warm, room))
-    return found
+        for ref, location, room in by_ref.get(str(row.get("instanceid", "")), ()):
+            if np.abs(location).max() < _FARTHEST_M:
+                front_lights.append(FrontLight(location, ref, warm, room))
+    return front_lights

@@ -36,10 +36,10 @@ class Shape:
 
 def rgba_of(model: Any, geom: int) -> tuple[float, ...]:
     """Colour of a geom in the file: its own, else its material's."""
-    own = tuple(float(c) for c in model.geom_rgba[geom])
+    rgba = tuple(float(c) for c in model.geom_rgba[geom])
     material = int(model.geom_matid[geom])
-    if material < 0 or not np.allclose(own, _GREY):
-        return own
+    if material < 0 or not np.allclose(rgba, _GREY):
+        return rgba
     return tuple(float(c) for c in model.mat_rgba[material])
 
 
@@ -124,21 +124,23 @@ def _mesh(model: Any, mesh: int) -> Shape:
     normal_of = rows(model.mesh_facenormal, model.mesh_faceadr, model.mesh_facenum).reshape(-1)
     normals = None
     if _has_normals(model, mesh):
-        every = rows(model.mesh_normal, model.mesh_normaladr, model.mesh_normalnum)
-        normals = every[normal_of].astype(np.float64)
+        values = rows(model.mesh_normal, model.mesh_normaladr, model.mesh_normalnum)
+        normals = values[normal_of].astype(np.float64)
     uvs = None
     if int(model.mesh_texcoordadr[mesh]) >= 0:
         uv_of = rows(model.mesh_facetexcoord, model.mesh_faceadr, model.mesh_facenum).reshape(-1)
-        every = rows(model.mesh_texcoord, model.mesh_texcoordadr, model.mesh_texcoordnum)
-        uvs = every[uv_of].astype(np.float64)
+        values = rows(model.mesh_texcoord, model.mesh_texcoordadr, model.mesh_texcoordnum)
+        uvs = values[uv_of].astype(np.float64)
     # Corners that share a point, its normal and its place in the picture are one vertex.
     keys = [corners, normal_of] + ([] if uvs is None else [uv_of])
-    _, kept, index = np.unique(np.stack(keys, 1), axis=0, return_index=True, return_inverse=True)
+    _, first_uses, index = np.unique(
+        np.stack(keys, 1), axis=0, return_index=True, return_inverse=True
+    )
     return Shape(
-        points[corners[kept]],
+        points[corners[first_uses]],
         index.reshape(-1, 3),
-        None if uvs is None else uvs[kept],
-        None if normals is None else normals[kept],
+        None if uvs is None else uvs[first_uses],
+        None if normals is None else normals[first_uses],
     )
 
 
@@ -185,9 +187,9 @@ def texture_of(model: Any, geom: int) -> int | None:
     if material < 0:
         return None
     roles = np.asarray(model.mat_texid).reshape(model.nmat, -1)[material]
-    wanted = (mujoco.mjtTextureRole.mjTEXROLE_RGB, mujoco.mjtTextureRole.mjTEXROLE_RGBA)
-    found = [int(roles[int(role)]) for role in wanted if int(roles[int(role)]) >= 0]
-    return found[0] if found else None
+    colour_roles = (mujoco.mjtTextureRole.mjTEXROLE_RGB, mujoco.mjtTextureRole.mjTEXROLE_RGBA)
+    numbers = [int(roles[int(role)]) for role in colour_roles if int(roles[int(role)]) >= 0]
+    return numbers[0] if numbers else None
 
 
 def png_of_texture(model: Any, texture: int) -> bytes:
