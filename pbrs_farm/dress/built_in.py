@@ -70,9 +70,9 @@ def finish_built_in_parts(
         kind = _kind_in_scheme(item)
         if not kinds.get(kind, False):
             continue
-        made = _finish_by_scheme(house, item, kind, scheme)
-        if made is not item:
-            house.change(index, made, PASS)
+        finished = _finish_by_scheme(house, item, kind, scheme)
+        if finished is not item:
+            house.change(index, finished, PASS)
             house.done[f"{PASS}: {kind}"] += 1
 
 
@@ -99,8 +99,8 @@ def _kind_in_scheme(item: Item) -> str:
 
 def _finish_by_scheme(house: MutableHouse, item: Item, kind: str, scheme: FinishScheme) -> Item:
     if kind == "door":
-        said = f"{item.name} {item.source_class}".casefold()
-        is_front = any(word in said for word in _TO_STREET)
+        words = f"{item.name} {item.source_class}".casefold()
+        is_front = any(word in words for word in _TO_STREET)
         return _finish_opening(
             house, item, scheme, scheme.front if is_front else scheme.leaf, scheme.trim
         )
@@ -136,16 +136,16 @@ def _finish_opening(
         return item
     box = item.oriented_box
     wide = float(box.half[0] * 2)
-    found: list[Surface] = []
+    surfaces: list[Surface] = []
     for surface in item.surfaces:
         if not is_plain(house.materials[surface.material]):
-            found.append(surface)
+            surfaces.append(surface)
             continue
         for part, size in _connected_surfaces(surface, box.axes):
             is_frame = size[0] > _FRAME * wide and frame != leaf
             finish = scheme.fitting if size.max() < _SMALL_M else frame if is_frame else leaf
-            found.append(with_finish(house, part, finish, box.axes))
-    return replace(item, surfaces=tuple(_merge_surfaces(found)))
+            surfaces.append(with_finish(house, part, finish, box.axes))
+    return replace(item, surfaces=tuple(_merge_surfaces(surfaces)))
 
 
 def _connected_surfaces(surface: Surface, axes: F64) -> Iterator[tuple[Surface, F64]]:

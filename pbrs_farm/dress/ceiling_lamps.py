@@ -52,13 +52,13 @@ def hang_from_ceiling(
             ):
                 continue
             height = float(shape.bounds[1, 1]) * factor
-            at = np.array([place[0], top_y - height - _GAP_M, place[1]])
+            position = np.array([place[0], top_y - height - _GAP_M, place[1]])
             lit = with_flux(shape, flux_lm)
             turn = float(rng.choice([0.0, np.pi / 2]))
             item = house.placed(
                 piece,
                 lit,
-                at,
+                position,
                 turn,
                 item_id=next_id(house, PASS),
                 room_id=room_id,
@@ -78,15 +78,15 @@ def _choices(
 
     The shape of a piece of the catalogue is not loaded yet: None.
     """
-    made: list[tuple[Piece, Shape | None]] = [
+    generated: list[tuple[Piece, Shape | None]] = [
         ceiling_dome(rng, style),
         globe_pendant(rng, style),
         shade_pendant(rng, style),
     ]
     if room.kind in _PLAIN and rng.random() < 0.6:
-        return made
+        return generated
     # Leave out lamps of other places, those too wide, and tubes outside kitchen and store.
-    found = []
+    suitable = []
     for piece in catalogue.of("ceiling_lamp"):
         name = piece.name.lower()
         is_tube = any(word in name for word in _TUBES)
@@ -94,14 +94,14 @@ def _choices(
             continue
         if is_tube and room.kind not in (RoomKind.KITCHEN, RoomKind.STORE):
             continue
-        found.append(piece)
+        suitable.append(piece)
     # Up to three of the catalogue and our own pendants, mixed; the dome last.
-    drawn = [found[int(k)] for k in rng.permutation(len(found))][:3]
-    own = [made[1], made[2]] if rng.random() < 0.5 else [made[2], made[1]]
+    drawn = [suitable[int(k)] for k in rng.permutation(len(suitable))][:3]
+    two = [generated[1], generated[2]] if rng.random() < 0.5 else [generated[2], generated[1]]
     some: list[tuple[Piece, Shape | None]] = [(piece, None) for piece in drawn]
     if rng.random() < 0.35:
-        some = [own[0], *some]
-    return [*some, *own, made[0]]
+        some = [two[0], *some]
+    return [*some, *two, generated[0]]
 
 
 def _least_side(room: RoomSpace) -> float:

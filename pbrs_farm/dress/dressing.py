@@ -74,8 +74,8 @@ def dress(
     A house that is repaired afterwards needs dressed_house and refit_after_repair: repair may remove
     the wall behind a picture.
     """
-    made = dressed_house(house, catalogue, fields, seed)
-    return made.house, made.report
+    dressed = dressed_house(house, catalogue, fields, seed)
+    return dressed.house, dressed.report
 
 
 class Dressed(NamedTuple):
@@ -188,21 +188,21 @@ def _report_of_dressing(
 
 def _count_added(items: Iterable[Item], pieces: Mapping[str, Piece]) -> dict[str, int]:
     """Added items that are present in the end, by part and group."""
-    found = Counter(f"{pass_that_added(item)}: {group_of(item, pieces)}" for item in items)
-    return dict(sorted(found.items()))
+    counts = Counter(f"{pass_that_added(item)}: {group_of(item, pieces)}" for item in items)
+    return dict(sorted(counts.items()))
 
 
 def _credits_of_house(house: House, catalogue: Catalogue) -> tuple[Credit, ...]:
     """The pieces and pictures of libraries that the house shows, by id."""
     pieces: dict[str, Piece] = {p.id: p for p in catalogue.pieces}
     counts = Counter(piece_id(item) for item in house.items)
-    found = [
+    credits = [
         Credit(id=p.id, name=p.name, library=p.library, creator=p.creator, licence=p.licence, n=n)
         for p, n in ((pieces.get(i), n) for i, n in counts.items())
         if p is not None and p.library
     ]
     # A picture is known by its texture, however many surfaces show it.
-    found += [
+    credits += [
         Credit(
             id=p.texture.id,
             name=p.texture.name,
@@ -214,7 +214,7 @@ def _credits_of_house(house: House, catalogue: Catalogue) -> tuple[Credit, ...]:
         for p in catalogue.pictures
         if p.texture.id in house.textures
     ]
-    return tuple(sorted(found, key=lambda c: c.id))
+    return tuple(sorted(credits, key=lambda c: c.id))
 
 
 def _credited(source: Source, credits: tuple[Credit, ...]) -> Source:

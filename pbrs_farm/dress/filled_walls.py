@@ -80,7 +80,7 @@ def fill_wall(
 
 def _stretches(floor: RoomFloor, free_m: float) -> Sequence[_Stretch]:
     """Stretches of wall with so much free before them, the longest first."""
-    found = []
+    stretches = []
     y = floor.room.room.floor_y
     for face in floor.faces:
         ends = np.stack([face.point(s, y, 0.3) for s in (0.1, face.length - 0.1)])[:, [0, 2]]
@@ -94,8 +94,8 @@ def _stretches(floor: RoomFloor, free_m: float) -> Sequence[_Stretch]:
                 min(float(np.ptp(part)) + CELL_M - 2 * _SIDE_M, _LENGTHS_M[1]) if len(part) else 0.0
             )
             if length >= _LENGTHS_M[0]:
-                found.append(_Stretch(face, float(part[0]) + _SIDE_M, length, high))
-    return sorted(found, key=lambda s: -s.length)
+                stretches.append(_Stretch(face, float(part[0]) + _SIDE_M, length, high))
+    return sorted(stretches, key=lambda s: -s.length)
 
 
 def _put(
@@ -118,12 +118,12 @@ def _put(
         return False
     room = floor.room.room
     scale: F64 = np.array([stretch.length / wide, stretch.high / tall, 1.0])
-    at = stretch.face.point(middle, room.floor_y + _LIFT_M, OUT_M - float(shape.bounds[0][2]))
+    position = stretch.face.point(middle, room.floor_y + _LIFT_M, OUT_M - float(shape.bounds[0][2]))
     house.add(
         house.placed(
             piece,
             shape,
-            at,
+            position,
             stretch.face.turn_rad,
             item_id=next_id(house, part),
             room_id=room.id,

@@ -94,9 +94,9 @@ def _trim_finish(rng: np.random.Generator, style: Style) -> Finish:
 
 def _leaf_finish(rng: np.random.Generator, style: Style, trim: Finish) -> Finish:
     # Doors are bought with their frames; some have a leaf of wood in a white frame, or the reverse.
-    other = _white_finish(rng) if trim.wood else Finish("wood", wood=style.wood)
+    plain_wood = _white_finish(rng) if trim.wood else Finish("wood", wood=style.wood)
     painted = Finish("paint", _paint_colour(rng, style))
-    return _pick_by_share(rng, (0.64, trim), (0.24, other), (0.12, painted))
+    return _pick_by_share(rng, (0.64, trim), (0.24, plain_wood), (0.12, painted))
 
 
 def _front_door_finish(rng: np.random.Generator, leaf: Finish) -> Finish:
@@ -157,10 +157,10 @@ def _appliance_finish(rng: np.random.Generator) -> Finish:
 
 def _paint_colour(rng: np.random.Generator, style: Style) -> Rgb:
     # A paint of the carpenter's card, or the style's own, calmed.
-    own = mix(shade(style.palette[2], 0.9), rgb("a8a49a"), 0.3)
+    base = mix(shade(style.palette[2], 0.9), rgb("a8a49a"), 0.3)
     draw = rng.random()
     if draw < 0.35:
-        return aged(rng, own)
+        return aged(rng, base)
     return aged(rng, _pick(rng, COLOURS["darks"] if draw > 0.85 else COLOURS["paints"]))
 
 

@@ -95,9 +95,9 @@ def _kinds_of_surfaces(house: MutableHouse, item: Item, group: str) -> list[Part
         ]
         k = int(np.argmax(areas))
         if areas[k] > 0 and materials[k].texture_id is None and materials[k].opacity == 1:
-            own = materials[k]
+            item_material = materials[k]
             kinds = [
-                PartKind.SOFT if m is own and kind is not PartKind.METAL else kind
+                PartKind.SOFT if m is item_material and kind is not PartKind.METAL else kind
                 for m, kind in zip(materials, kinds, strict=True)
             ]
     # Boards are of wood in any colour but white; a draw per colour decides later.
@@ -170,24 +170,24 @@ def _finish_wood(
     material: Material,
     rng: np.random.Generator,
 ) -> LaidMaterial | None:
-    own, stays = material.diffuse, rng.random()
+    colour, stays = material.diffuse, rng.random()
     # Paint may stay paint; so may grey.
-    is_other = not (is_brown(own) or is_dark(own) or is_vivid(own))
-    if (is_vivid(own) and stays < _PAINT_STAYS) or (is_other and stays < _GREY_STAYS):
+    is_other = not (is_brown(colour) or is_dark(colour) or is_vivid(colour))
+    if (is_vivid(colour) and stays < _PAINT_STAYS) or (is_other and stays < _GREY_STAYS):
         return _finish_lacquer(house, catalogue, style, item, material, rng)
     mean = linear_from_srgb(np.array(style.wood.mean))
-    mine = np.maximum(linear_from_srgb(np.array(own)), _DARKEST)
+    mine = np.maximum(linear_from_srgb(np.array(colour)), _DARKEST)
     # The stronger a brown, the less of it is of wood.
-    strength = (max(own) - min(own)) * max(own)
-    weight = 1.0 if is_vivid(own) else float(rng.uniform(0.25, 0.85)) ** (1 - 0.8 * strength)
+    strength = (max(colour) - min(colour)) * max(colour)
+    weight = 1.0 if is_vivid(colour) else float(rng.uniform(0.25, 0.85)) ** (1 - 0.8 * strength)
     # Mix in the logarithm, so that dark colours stay dark.
-    wanted = np.exp((1 - weight) * np.log(mine) + weight * np.log(mean))
-    if is_dark(own):
-        wanted = mean * float(mine @ LUMINANCE + 0.02) / float(mean @ LUMINANCE)
-    is_pale = float(wanted @ LUMINANCE) > float(mean @ LUMINANCE)
+    target = np.exp((1 - weight) * np.log(mine) + weight * np.log(mean))
+    if is_dark(colour):
+        target = mean * float(mine @ LUMINANCE + 0.02) / float(mean @ LUMINANCE)
+    is_pale = float(target @ LUMINANCE) > float(mean @ LUMINANCE)
     wood = WOODS[_PALE] if is_pale else style.wood
     pattern = photographed(house, catalogue, grain_pattern(house, wood))
-    return tinted(house, pattern, wanted, is_grained=True)
+    return tinted(house, pattern, target, is_grained=True)
 
 
 def grain_pattern(house: MutableHouse, wood: Wood) -> Pattern:
@@ -205,7 +205,7 @@ def _finish_soft(
     rng: np.random.Generator,
 ) -> LaidMaterial | None:
     colours: Mapping[bool, tuple[Rgb, ...]] = {False: style.textiles, True: style.textiles[:3]}
-    wanted = linear_from_srgb(
+    target = linear_from_srgb(
         np.array(colours[is_bed(item)][int(rng.integers(len(colours[is_bed(item)])))])
     )
     family = (
@@ -213,15 +213,15 @@ def _finish_soft(
     )
     # Bed linen is light; some sofas are of leather, in its own browns and blacks.
     if is_bed(item):
-        wanted = 0.45 * wanted + 0.55 * np.array([0.8, 0.79, 0.76])
+        target = 0.45 * target + 0.55 * np.array([0.8, 0.79, 0.76])
     elif family != "leather" and rng.random() < _LEATHER_SHARE:
         family = "leather"
     if family == "leather":
         hides = COLOURS["hides"]
-        wanted = linear_from_srgb(np.array(hides[int(rng.integers(len(hides)))]))
+        target = linear_from_srgb(np.array(hides[int(rng.integers(len(hides)))]))
     seed = int(house.rng(PASS, family).integers(SEEDS))
     pattern = photographed(house, catalogue, Pattern(family, seed))
-    return tinted(house, pattern, wanted, is_grained=False)
+    return tinted(house, pattern, target, is_grained=False)
 
 
 def _finish_lacquer(
@@ -233,14 +233,14 @@ def _finish_lacquer(
     rng: np.random.Generator,
 ) -> LaidMaterial | None:
     has_sheen = material.specular != (0.0, 0.0, 0.0) and material.shininess > 1
-    own = material.diffuse
+    colour = material.diffuse
     # Screen colours are mixed down to those that paint has.
-    if is_vivid(own) or is_loud(own):
-        hue, saturation, value = colorsys.rgb_to_hsv(*own)
-        own = colorsys.hsv_to_rgb(hue, min(saturation, _MAX_SATURATION), min(value, _MAX_VALUE))
-    if has_sheen and own == material.diffuse and max(own) > 0.1:
+    if is_vivid(colour) or is_loud(colour):
+        hue, saturation, value = colorsys.rgb_to_hsv(*colour)
+        colour = colorsys.hsv_to_rgb(hue, min(saturation, _MAX_SATURATION), min(value, _MAX_VALUE))
+    if has_sheen and colour == material.diffuse and max(colour) > 0.1:
         return None
-    linear = np.maximum(linear_from_srgb(np.array(own)), _DARKEST)
+    linear = np.maximum(linear_from_srgb(np.array(colour)), _DARKEST)
     r, g, b = (round(float(c), 4) for c in srgb_from_linear(linear))
     roughness = round(float(rng.uniform(0.25, 0.5)), 2)
     painted = replace(
@@ -278,12 +278,12 @@ def _finish_metal(
 
 def tinted(house: MutableHouse, pattern: Pattern, wanted: F64, *, is_grained: bool) -> LaidMaterial:
     """The pattern's material in another mean colour, linear: its picture times a diffuse of at most 1."""
-    made = pattern_material(house, pattern)
-    ratio = wanted / np.maximum(np.array(made.mean_rgb), 1e-3)
+    laid = pattern_material(house, pattern)
+    ratio = wanted / np.maximum(np.array(laid.mean_rgb), 1e-3)
     ratio = ratio / max(1.0, float(ratio.max()))
     r, g, b = (round(float(c), 4) for c in srgb_from_linear(ratio))
-    tinted = replace(house.materials[made.number], diffuse=(r, g, b))
-    return LaidMaterial(house.material(tinted), made.size_m, is_grained)
+    tinted = replace(house.materials[laid.number], diffuse=(r, g, b))
+    return LaidMaterial(house.material(tinted), laid.size_m, is_grained)
 
 
 def _upward_area(surface: Surface) -> float:

@@ -70,11 +70,11 @@ def common_scale(piece: Piece, places: Sequence[OldPlace]) -> Scale | None:
     A set's members are of one size, or nearly so.
     """
     scales = [scale_of(piece, place) for place in places]
-    known = [s for s in scales if s is not None]
-    if len(known) < len(places):
+    valid = [s for s in scales if s is not None]
+    if len(valid) < len(places):
         return None
-    least = (min(s[0] for s in known), min(s[1] for s in known), min(s[2] for s in known))
-    is_alike = all(least[k] >= ALIKE * s[k] for s in known for k in range(3))
+    least = (min(s[0] for s in valid), min(s[1] for s in valid), min(s[2] for s in valid))
+    is_alike = all(least[k] >= ALIKE * s[k] for s in valid for k in range(3))
     return least if is_alike else None
 
 

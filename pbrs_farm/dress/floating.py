@@ -58,7 +58,7 @@ def with_floating_things(house: House, share: float, seed: int) -> House:
 
 def _fill(house: MutableHouse, air: FreeAir, room: Room, share: float) -> None:
     rng = house.rng("float", room.id)
-    wanted, hidden, n, n_failed = shadow_for_share(room, share), 0.0, 0, 0
+    target, hidden, n, n_failed = shadow_for_share(room, share), 0.0, 0, 0
     while n_failed < _GIVEN_UP:
         piece, shape = _drawn(rng)
         corners = corners_of_surfaces(shape.surfaces)
@@ -81,9 +81,9 @@ def _fill(house: MutableHouse, air: FreeAir, room: Room, share: float) -> None:
         house.add(item, "float", piece)
         n += 1
         hidden += mean_shadow_m2(corners_of_surfaces(item.surfaces))
-        if hidden >= wanted:
+        if hidden >= target:
             return
-    text = f"things in the air hide {hidden:.1f} of {wanted:.1f} m2: there is no more place"
+    text = f"things in the air hide {hidden:.1f} of {target:.1f} m2: there is no more place"
     house.notes.append(Note(FEW, room.id, text))
 
 
@@ -107,12 +107,12 @@ def _drawn(rng: np.random.Generator) -> Model:
 @cache
 def _furniture() -> dict[str, list[Piece]]:
     """Group -> generated floor furniture without lights, no larger than _MOST_M."""
-    found: dict[str, list[Piece]] = {}
+    pieces_of_group: dict[str, list[Piece]] = {}
     for piece in content().family_pieces():
         if (
             piece.place in (Place.FLOOR, Place.SURFACE)
             and piece.kind is ItemKind.OBJECT
             and _LEAST_M <= max(piece.size) <= _MOST_M
         ):
-            found.setdefault(piece.group, []).append(piece)
-    return found
+            pieces_of_group.setdefault(piece.group, []).append(piece)
+    return pieces_of_group

@@ -67,9 +67,9 @@ class _Furniture(Record):
 
     @model_validator(mode="after")
     def _rooms_want_what_there_is(self) -> _Furniture:
-        known = {*self.kinds}
-        for room, wanted in self.wanted.items():
-            if unknown := {name for name, _chance in wanted} - known:
+        names = {*self.kinds}
+        for room, wishes in self.wanted.items():
+            if unknown := {name for name, _chance in wishes} - names:
                 raise ValueError(f"{room}: no kind {', '.join(sorted(unknown))}")
         return self
 
@@ -83,17 +83,19 @@ def add_furniture(house: MutableHouse, catalogue: Catalogue, style: Style, share
     """Add furniture to the rooms of the house. share: 0..1 of what a room would get."""
     space = house_space(house)
     for room in space.rooms:
-        wanted = WANTED.get(room.kind, ())
-        if not wanted or not room.room.has_floor or room.area.area < _LEAST_M2:
+        wishes = WANTED.get(room.kind, ())
+        if not wishes or not room.room.has_floor or room.area.area < _LEAST_M2:
             continue
         rng = house.rng(PASS, room.room.id)
-        names = _draw_wanted(house, room, wanted, rng, share)
+        names = _draw_wanted(house, room, wishes, rng, share)
         floor = RoomFloor.of(house, space, room) if names or is_filled(room.kind) else None
         if floor is None:
             continue
         fill_wall(house, catalogue, floor, PASS, share)
-        own = room_style(style, house.rng("style", room.room.id))
-        look = look_of(house, catalogue, own, house.rng(PASS, "look", int(rng.integers(_LOOKS))))
+        own_style = room_style(style, house.rng("style", room.room.id))
+        look = look_of(
+            house, catalogue, own_style, house.rng(PASS, "look", int(rng.integers(_LOOKS)))
+        )
         for name in names:
             _stand_at_wall(house, catalogue, floor, name, look, rng)
 
@@ -106,15 +108,15 @@ def _draw_wanted(
     share: float,
 ) -> list[str]:
     has = {house.items[n].nyu40 for n in room.items}
-    found = []
+    names = []
     for name, chance in wanted:
         kind = KINDS[name]
         # The other side of a bed may still want its nightstand.
         less = _BESIDE_ALIKE if kind.beside is not None else _ALIKE
         chance *= less if has & set(kind.alike) else 1.0
         if rng.random() < chance * share:
-            found.append(name)
-    return found
+            names.append(name)
+    return names
 
 
 def _stand_at_wall(
@@ -130,18 +132,18 @@ def _stand_at_wall(
     width, height, depth = (
         float(rng.uniform(*side)) for side in (kind.width, kind.height, kind.depth)
     )
-    own, from_catalogue = int(rng.integers(1 << 30)), rng.random() < _FROM_CATALOGUE
+    piece_seed, from_catalogue = int(rng.integers(1 << 30)), rng.random() < _FROM_CATALOGUE
     widths = {max(width * factor, kind.width[0]) for factor in (1.0, 0.75, 0.55, 0.0)}
     for w in sorted(widths, reverse=True):
         if w > floor.wall_m:
             continue
         share = house.own_share
-        made = _from_catalogue(catalogue, kind, w, own, share) if from_catalogue else None
-        made = made or _generated(kind, look, (w, height, depth), own)
-        spot = _find_spot(house, floor, kind, made, rng)
+        model = _from_catalogue(catalogue, kind, w, piece_seed, share) if from_catalogue else None
+        model = model or _generated(kind, look, (w, height, depth), piece_seed)
+        spot = _find_spot(house, floor, kind, model, rng)
         if spot is None:
             continue
-        _put_at_spot(house, floor, made, spot)
+        _put_at_spot(house, floor, model, spot)
         if name == "desk":
             _chair_before(house, floor, spot, look, rng)
         return
@@ -265,9 +267,9 @@ def _put_at_spot(house: MutableHouse, floor: RoomFloor, made: Model, spot: Floor
     low, high = shape.bounds
     # Its back comes to the wall, the middle of its width to the spot.
     y = floor.room.room.floor_y + _LIFT_M - float(low[1])
-    at = spot.face.point(spot.s, y, OUT_M - float(low[2]))
-    at = at - spot.face.along * float(low[0] + high[0]) / 2
-    _add_to_floor(house, floor, made, at, spot.face.turn_rad)
+    position = spot.face.point(spot.s, y, OUT_M - float(low[2]))
+    position = position - spot.face.along * float(low[0] + high[0]) / 2
+    _add_to_floor(house, floor, made, position, spot.face.turn_rad)
     floor.take(spot.body, spot.front)
     floor.wall_m -= float(high[0] - low[0])
 
@@ -280,22 +282,22 @@ def _chair_before(
     rng: np.random.Generator,
 ) -> None:
     """A chair before a desk, turned to it; none where it would be in the way."""
-    made = grained(content().things["desk_chair"](rng, look.style, look.boards), look)
-    high = made[1].bounds[1]
+    chair = grained(content().things["desk_chair"](rng, look.style, look.boards), look)
+    high = chair[1].bounds[1]
     out = OUT_M + spot.depth + float(high[2]) + float(rng.uniform(0.05, 0.12))
     y = floor.room.room.floor_y
-    at = spot.face.point(spot.s + float(rng.normal(0, 0.06)), y + _LIFT_M, out)
-    body = shapely.Point(at[0], at[2]).buffer(float(high[2]) + 0.04)
+    position = spot.face.point(spot.s + float(rng.normal(0, 0.06)), y + _LIFT_M, out)
+    body = shapely.Point(position[0], position[2]).buffer(float(high[2]) + 0.04)
     x0, z0, x1, z1 = body.bounds
     # The chair is in front of the desk: ignore the desk's own front.
-    own = floor.fronts.pop()
+    front = floor.fronts.pop()
     is_free = floor.allows(body, shapely.Polygon()) and floor.space.is_free(
         np.array([x0, y + 0.03, z0]), np.array([x1, y + 1.0, z1])
     )
-    floor.fronts.append(own)
+    floor.fronts.append(front)
     if is_free:
         _add_to_floor(
-            house, floor, made, at, spot.face.turn_rad + np.pi + float(rng.normal(0, 0.25))
+            house, floor, chair, position, spot.face.turn_rad + np.pi + float(rng.normal(0, 0.25))
         )
         floor.take(body, shapely.Polygon())
 

@@ -48,8 +48,8 @@ def stand_by_sofas(
         # Try each end; take the lamp away again where it closes a way.
         for place in _ends(space, room, number, radius):
             if _floor_is_free(space, room, place, radius, float(shape.bounds[1, 1])):
-                at = np.array([place[0], room.room.floor_y, place[1]])
-                _stand_lamp(house, room, piece, with_flux(shape, _FLOOR_LM), at, 0.0)
+                position = np.array([place[0], room.room.floor_y, place[1]])
+                _stand_lamp(house, room, piece, with_flux(shape, _FLOOR_LM), position, 0.0)
                 if _ways_are_open(house, room_id):
                     return
                 house.items.pop()
@@ -70,13 +70,18 @@ def stand_by_beds(
     for number in stands:
         low, high = space.bounds[number]
         middle = ((low + high) / 2)[[0, 2]]
-        at = _spot_on_top(house, space, number, middle, shape)
-        if at is None:
+        spot = _spot_on_top(house, space, number, middle, shape)
+        if spot is None:
             house.refused[f"{PASS}: no free nightstand"] += 1
             continue
         turn = house.items[number].oriented_box.axes[:, 2]
         _stand_lamp(
-            house, room, piece, with_flux(shape, _TABLE_LM), at, float(np.arctan2(turn[0], turn[2]))
+            house,
+            room,
+            piece,
+            with_flux(shape, _TABLE_LM),
+            spot,
+            float(np.arctan2(turn[0], turn[2])),
         )
 
 
@@ -119,18 +124,18 @@ def _ends(space: HouseSpace, room: RoomSpace, number: int, radius: float) -> lis
     low, high = space.bounds[number]
     middle, half = ((low + high) / 2)[[0, 2]], ((high - low) / 2)[[0, 2]]
     long = int(np.argmax(half))
-    found = []
+    ends = []
     for across in (0.5, -0.5, 0.0):
         for sign in (1.0, -1.0):
             offset = np.zeros(2)
             offset[long] = sign * (half[long] + radius + 0.06)
             offset[1 - long] = across * half[1 - long]
-            found.append(middle + offset)
+            ends.append(middle + offset)
     # Floor lamps belong in corners: nearest to the room's edge first, none far from it.
     edge = room.area.boundary
-    away = [float(shapely.distance(shapely.Point(p), edge)) for p in found]
-    order = sorted(range(len(found)), key=lambda k: away[k])
-    return [found[k] for k in order if away[k] < radius + _STANDING_FROM_WALL_M]
+    away = [float(shapely.distance(shapely.Point(p), edge)) for p in ends]
+    order = sorted(range(len(ends)), key=lambda k: away[k])
+    return [ends[k] for k in order if away[k] < radius + _STANDING_FROM_WALL_M]
 
 
 def _floor_is_free(
@@ -195,9 +200,9 @@ def add_lamps(house: MutableHouse, catalogue: Catalogue, style: Style, share: fl
             continue
         if rng.random() < share:
             area, has = float(room.area.area), flux_of_lamps(house.items[k] for k in room.items)
-            wanted = flux_for_floor(area, WANTS[room.kind].lux)
+            target_lm = flux_for_floor(area, WANTS[room.kind].lux)
             if has < flux_for_floor(area, _WEAK_LX):
-                flux = min(max(wanted - has, _FLUX_LM[0]), _FLUX_LM[1])
+                flux = min(max(target_lm - has, _FLUX_LM[0]), _FLUX_LM[1])
                 hang_from_ceiling(house, catalogue, style, room_id, flux, rng)
         if rng.random() < share:
             stand_by_beds(house, catalogue, style, room_id, rng)

@@ -86,8 +86,8 @@ def _table_of(house: MutableHouse, space: HouseSpace, index: int, tables: list[i
         return None
     best: tuple[float, int] | None = None
     for k in tables:
-        apart = np.maximum(space.bounds[k][0] - high, low - space.bounds[k][1])[[0, 2]]
-        away = float(np.hypot(*np.maximum(apart, 0.0)))
+        offsets = np.maximum(space.bounds[k][0] - high, low - space.bounds[k][1])[[0, 2]]
+        away = float(np.hypot(*np.maximum(offsets, 0.0)))
         if away < _AT_TABLE_M and (best is None or away < best[0]):
             best = away, k
     return best[1] if best else None

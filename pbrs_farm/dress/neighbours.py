@@ -66,7 +66,7 @@ class Neighbours:
         with the old item's number: touching items share some cubes.
         """
         low, high = item.bounds
-        own = _cubes(self.triangles(item))
+        cubes = _cubes(self.triangles(item))
         around = np.stack([low - CUBE_M, high + CUBE_M])
         count = 0
         for k in self.near(low, high):
@@ -75,7 +75,7 @@ class Neighbours:
                 least, most = triangle_bounds(corners)
                 meets = ((most >= low) & (least <= high)).all(1)
                 count += len(
-                    np.intersect1d(own, _cubes(corners[meets], around), assume_unique=True)
+                    np.intersect1d(cubes, _cubes(corners[meets], around), assume_unique=True)
                 )
         return count
 
@@ -150,12 +150,12 @@ def held_by(house: MutableHouse, around: Neighbours, index: int, group: str) -> 
     # Items on a piece, a step or a platform do not hang.
     (low, high), all_bounds = around.bounds()[index], around.bounds()
     below = boxes_meeting(all_bounds[:, 0], all_bounds[:, 1], low - _CONTACT_M, high)
-    others = [around.items[int(k)] for k in np.flatnonzero(below) if k != index]
+    items_below = [around.items[int(k)] for k in np.flatnonzero(below) if k != index]
     stands = any(
-        other.kind is not ItemKind.WALL
-        and other.n_faces
-        and _stands_on(item, around.triangles(other), low_y + _CONTACT_M)
-        for other in others
+        below_item.kind is not ItemKind.WALL
+        and below_item.n_faces
+        and _stands_on(item, around.triangles(below_item), low_y + _CONTACT_M)
+        for below_item in items_below
     )
     return Place.SURFACE if stands else Place.WALL
 
@@ -193,9 +193,9 @@ def drop_onto(item: Item, corners: F64) -> float | None:
     drop = float(gap[np.isfinite(gap)].min())
     # Its foot must be held on both sides of its middle, each way.
     foot = points[points[:, 1] < points[:, 1].min() + 0.01]
-    held = foot[foot[:, 1] - drop - highest_below(foot[:, [0, 2]], corners) < _CONTACT_M]
+    contacts = foot[foot[:, 1] - drop - highest_below(foot[:, [0, 2]], corners) < _CONTACT_M]
     middle = (foot.min(0) + foot.max(0))[[0, 2]] / 2
-    plan = held[:, [0, 2]]
+    plan = contacts[:, [0, 2]]
     if len(plan) == 0 or not ((plan.min(0) <= middle).all() and (plan.max(0) >= middle).all()):
         return None
     return -drop

@@ -58,9 +58,9 @@ def _gain(
     # Leave out what adds nothing that eight bits show.
     some = gain > _LEAST_GAIN * gain.max()
     used, n_columns = np.flatnonzero(some.any(1)), int(np.flatnonzero(some.any(0))[-1]) + 1
-    found: F32 = gain[used, :n_columns].astype(np.float32)
-    found.flags.writeable = False
-    return used, found
+    used_gain: F32 = gain[used, :n_columns].astype(np.float32)
+    used_gain.flags.writeable = False
+    return used, used_gain
 
 
 def blurred(field: F32, sigma_px: float) -> F32:
@@ -97,8 +97,8 @@ def sampled(field: F32, rows: np.ndarray, columns: np.ndarray) -> F32:
     """field at integer pixels, wrapped at its edges."""
     h, w = field.shape
     # One number a pixel, and a mask in place of the remainder where a side is a power of two.
-    at = _wrapped(rows, h) * np.int32(w) + _wrapped(columns, w)
-    return np.asarray(field.reshape(-1)[at], np.float32)
+    index = _wrapped(rows, h) * np.int32(w) + _wrapped(columns, w)
+    return np.asarray(field.reshape(-1)[index], np.float32)
 
 
 def _wrapped(numbers: np.ndarray, size: int) -> np.ndarray:

@@ -140,10 +140,10 @@ def at_wall(place: OldPlace, walls: Sequence[F64]) -> OldPlace:
         level = (high[:, 2] - low[:, 2] < _APART_M) & (np.abs(high[:, 2] - back) < _OFF_WALL_M)
         beside = (high[:, :2] > place.low[:2]).all(1) & (low[:, :2] < place.high[:2]).all(1)
         faces.append(high[level & beside, 2])
-    found = np.concatenate(faces)
-    if not len(found):
+    depths = np.concatenate(faces)
+    if not len(depths):
         return place
-    step = np.array([0.0, 0.0, float(found.max()) + _APART_M - back])
+    step = np.array([0.0, 0.0, float(depths.max()) + _APART_M - back])
     return replace(place, low=place.low + step, high=place.high + step)
 
 

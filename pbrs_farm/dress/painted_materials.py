@@ -91,13 +91,13 @@ class PaintedMaterials(Sequence[Material]):
 
     def textures(self) -> dict[str, Texture]:
         """All textures by id, in the order of addition; waits for unfinished ones."""
-        found: dict[str, Texture] = {}
+        textures: dict[str, Texture] = {}
         for row in self._textures:
             if isinstance(row, Painting):
-                found.update((t.id, t) for t in row.painted().textures)
+                textures.update((t.id, t) for t in row.painted().textures)
             else:
-                found[row[0]] = row[1]
-        return found
+                textures[row[0]] = row[1]
+        return textures
 
     @cached_property
     def _thread(self) -> ThreadPoolExecutor:

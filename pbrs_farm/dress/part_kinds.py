@@ -87,8 +87,8 @@ def kind_by_name(name: str) -> PartKind | None:
     """Kind by whole words of a material's name, or None."""
     parted = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name)
     words = set(re.findall(r"[a-z]+", parted.lower()))
-    for kind, known in _FILE.words.items():
-        if words & known:
+    for kind, kind_words in _FILE.words.items():
+        if words & kind_words:
             return kind
     return None
 
@@ -163,7 +163,7 @@ def is_vivid(colour: Rgb) -> bool:
 
 
 def metal_of(name: str, usual: Metal) -> Metal:
-    for known, words in _FILE.metals.items():
+    for metal_name, words in _FILE.metals.items():
         if any(word in name for word in words):
-            return METALS[known]
+            return METALS[metal_name]
     return usual

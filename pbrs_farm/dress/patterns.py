@@ -74,19 +74,19 @@ def pattern_material(house: MutableHouse, pattern: Pattern) -> PatternMaterial:
     KeyError for an unknown family.
     """
     key = f"pattern {pattern!r}"
-    kept = house.kept.get(key)
-    if isinstance(kept, PatternMaterial):
-        return kept
+    cached = house.kept.get(key)
+    if isinstance(cached, PatternMaterial):
+        return cached
     if pattern.photograph:
         number, size, mean = photograph_material(house, pattern.photograph, pattern.family)
-        made = PatternMaterial(number, size, lambda: mean)
+        made_material = PatternMaterial(number, size, lambda: mean)
     else:
         number, painting = house.materials.paint(partial(_paint_pattern, house, pattern))
-        made = PatternMaterial(
+        made_material = PatternMaterial(
             number, content().pattern_size(pattern), lambda: painting.painted().mean_rgb
         )
-    house.kept[key] = made
-    return made
+    house.kept[key] = made_material
+    return made_material
 
 
 def _paint_pattern(house: MutableHouse, pattern: Pattern) -> Painted:
@@ -107,12 +107,12 @@ def _tinted(house: MutableHouse, pattern: Pattern) -> Painted:
     tint = pattern.tints[0]
     grey = next((c for c in _LIGHTNESSES if c >= max(tint)), _LIGHTNESSES[-1])
     plain = replace(pattern, tints=((grey, grey, grey),))
-    made = house.bank.painted(repr(plain), partial(_painted, plain))
+    painted = house.bank.painted(repr(plain), partial(_painted, plain))
     part = np.minimum(linear_from_srgb(np.array(tint)) / linear_from_srgb(np.array(grey)), 1.0)
     r, g, b = (round(float(c), 4) for c in srgb_from_linear(part))
-    means = [float(m) for m in np.array(made.mean_rgb) * linear_from_srgb(np.array((r, g, b)))]
-    diffuse = replace(made.material, diffuse=(r, g, b))
-    return Painted(diffuse, made.textures, (means[0], means[1], means[2]))
+    means = [float(m) for m in np.array(painted.mean_rgb) * linear_from_srgb(np.array((r, g, b)))]
+    diffuse = replace(painted.material, diffuse=(r, g, b))
+    return Painted(diffuse, painted.textures, (means[0], means[1], means[2]))
 
 
 def photographed(house: MutableHouse, catalogue: Catalogue, pattern: Pattern) -> Pattern:
@@ -120,8 +120,8 @@ def photographed(house: MutableHouse, catalogue: Catalogue, pattern: Pattern) ->
 
     With n photographs that fit, one is shown with probability n / (n + 12).
     """
-    found = photograph_for(house, catalogue, pattern.family, pattern.seed)
-    return replace(pattern, photograph=found) if found else pattern
+    photograph = photograph_for(house, catalogue, pattern.family, pattern.seed)
+    return replace(pattern, photograph=photograph) if photograph else pattern
 
 
 def material_from_maps(maps: SurfaceMaps, name: str) -> tuple[Material, tuple[Texture, ...]]:

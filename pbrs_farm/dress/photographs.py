@@ -78,9 +78,9 @@ def photograph_material(
     house: MutableHouse, texture_id: str, family: str
 ) -> tuple[int, tuple[float, float], Rgb]:
     """The material that shows a picture of photograph_for: its number, size in metres, mean linear colour."""
-    kept = house.kept[_KEPT + texture_id]
-    assert isinstance(kept, tuple)
-    picture, mean = kept
+    cached = house.kept[_KEPT + texture_id]
+    assert isinstance(cached, tuple)
+    picture, mean = cached
     shown = _SHOWN[family]
     material = Material(
         name=f"{family} {picture.texture.name[:40]}",

@@ -105,8 +105,8 @@ def _by_part(counts: dict[str, int]) -> dict[str, list[tuple[str, int]]]:
     for key, n in sorted(
         counts.items(), key=lambda row: (row[0].partition(": ")[0], -row[1], row[0])
     ):
-        part, _, what = key.partition(": ")
-        parts.setdefault(part, []).append((what, n))
+        part, _, label = key.partition(": ")
+        parts.setdefault(part, []).append((label, n))
     return parts
 
 

@@ -98,8 +98,8 @@ class RoomFloor:
                 zones += [] if passage.is_window else [passage.swing(side)]
         flights = flights_of(house, room.room, room.area)
         zones += [flights.under, flights.before]
-        here = [house.items[n] for n in room.items]
-        zones.append(floor_swept(here, room.room.floor_y))
+        items = [house.items[n] for n in room.items]
+        zones.append(floor_swept(items, room.room.floor_y))
         # Measure the wall length with free floor in front.
         faces = Hanging(house, room, "furniture").faces
         low, high = room.room.floor_y + LOWER_M, room.room.floor_y + 0.9

@@ -93,17 +93,17 @@ def _woven(
         return surface
     if rng.random() < cloth.printed:
         print_colour = style.textiles[int(rng.integers(len(style.textiles)))]
-        own: Rgb = material.diffuse
+        colour: Rgb = material.diffuse
         # Tone in tone a print is lighter on dark cloth and darker on light one.
-        near = mix(own, (0.95, 0.94, 0.9) if max(own) < 0.5 else (0.2, 0.18, 0.16), 0.3)
-        tints = (own, mix(near, print_colour, cloth.contrast), style.accent)
+        near = mix(colour, (0.95, 0.94, 0.9) if max(colour) < 0.5 else (0.2, 0.18, 0.16), 0.3)
+        tints = (colour, mix(near, print_colour, cloth.contrast), style.accent)
         pattern = Pattern(
             "wallpaper", int(rng.integers(4)), tints, variant=str(rng.choice(content().wallpapers))
         )
-        made = pattern_material(house, pattern)
-        size = made.size_m[0] * cloth.repeat, made.size_m[1] * cloth.repeat
+        woven = pattern_material(house, pattern)
+        size = woven.size_m[0] * cloth.repeat, woven.size_m[1] * cloth.repeat
         mapped = box_mapped(surface, _own_axes(surface, item), size, is_grained=False)
-        return replace(mapped, material=made.number)
+        return replace(mapped, material=woven.number)
     family = str(rng.choice(cloth.families))
     seed = int(house.rng(PASS, family).integers(2**31))
     pattern = photographed(house, catalogue, Pattern(family, seed))

@@ -139,12 +139,12 @@ class _Styles(Record):
 
     @model_validator(mode="after")
     def _tastes_know_their_woods(self) -> _Styles:
-        known = {w.name for w in self.woods} | {m.name for m in self.metals}
+        valid = {w.name for w in self.woods} | {m.name for m in self.metals}
         used = {name for names in self.woods_for.model_dump().values() for name in names}
         if unknown := used - {w.name for w in self.woods}:
             raise ValueError(f"woods_for: no wood {', '.join(sorted(unknown))}")
         for taste in self.tastes:
-            if unknown := {*taste.woods, *taste.metals} - known:
+            if unknown := {*taste.woods, *taste.metals} - valid:
                 raise ValueError(f"{taste.name}: no wood or metal {', '.join(sorted(unknown))}")
             if unknown := {*taste.covers} - {*self.covers}:
                 raise ValueError(f"{taste.name}: no cover {', '.join(sorted(unknown))}")
@@ -191,10 +191,10 @@ def room_style(style: Style, rng: np.random.Generator) -> Style:
 
     The home's wood and metal stay, because doors and fittings are bought once.
     """
-    other = style_for(rng)
+    other_style = style_for(rng)
     if rng.random() >= OUTLIER_SHARE:
         return style
-    return replace(other, metal=style.metal, wood=style.wood)
+    return replace(other_style, metal=style.metal, wood=style.wood)
 
 
 def shade(colour: Rgb, factor: float) -> Rgb:

@@ -90,12 +90,12 @@ def supports_of_item(
     around = faces_around(scene, [index], grid, float(groups[0][..., 1].max()))
     centres = grid.centres()
     indoors = contains_xy(Polygon(room.polygon), centres[..., 0], centres[..., 1])
-    found = []
+    supports = []
     free, border = indoors & ~around.solid, round(border_m / CELL_M)
     for group, cover in zip(groups, covered_by_each(grid, groups), strict=True):
         found_level = _Level(index, cover & free, float(group[..., 1].max()), item.box is not None)
-        found += _supports_of_level(around, found_level, room, border)
-    return found
+        supports += _supports_of_level(around, found_level, room, border)
+    return supports
 
 
 def floor_support(
@@ -225,13 +225,13 @@ def _supports_of_level(
     # Take each connected part that can be reached from a side.
     parts, n = ndimage.label(free)
     parts = np.asarray(parts)
-    found = []
-    for k, at in enumerate(ndimage.find_objects(parts, n), start=1):
-        if np.count_nonzero(np.equal(parts[at], k)) < least:
+    supports = []
+    for k, window in enumerate(ndimage.find_objects(parts, n), start=1):
+        if np.count_nonzero(np.equal(parts[window], k)) < least:
             continue
         around_it = tuple(
             slice(max(s.start - border, 0), min(s.stop + border, size))
-            for s, size in zip(at, parts.shape, strict=True)
+            for s, size in zip(window, parts.shape, strict=True)
         )
         part, air = np.asarray(parts[around_it] == k), clear[around_it]
         sides = _find_open_sides(part, air)
@@ -240,7 +240,7 @@ def _supports_of_level(
             continue
         if not any(sides) and _is_in_a_bowl(around, parts == k, height):
             continue
-        found.append(
+        supports.append(
             turned_to_front(
                 Support(
                     level.item,
@@ -257,7 +257,7 @@ def _supports_of_level(
                 has_front=level.has_front,
             )
         )
-    return found
+    return supports
 
 
 def _find_open_sides(part: Bools, clear: F64) -> tuple[bool, bool, bool, bool]:
@@ -272,8 +272,8 @@ def _find_open_sides(part: Bools, clear: F64) -> tuple[bool, bool, bool, bool]:
         last = order.shape[axis] - 1 - np.argmax(np.flip(order, axis), axis)
         last = last if step > 0 else order.shape[axis] - 1 - last
         lines = np.flatnonzero(part.any(axis))
-        at = last[lines]
-        edge = ahead[lines, at] if axis == 1 else ahead[at, lines]
+        position = last[lines]
+        edge = ahead[lines, position] if axis == 1 else ahead[position, lines]
         sides.append(bool(np.mean(~edge) > _OPEN_SHARE))
     return (sides[0], sides[1], sides[2], sides[3])
 
@@ -288,23 +288,25 @@ def _is_in_a_bowl(around: FacesAround, part: Bools, height: float) -> bool:
     n = round(_RIM_WITHIN_M / around.grid.cell_m)
     for axis in (0, 1):
         lines = np.flatnonzero(part.any(1 - axis))
-        own, rims = (np.moveaxis(m, axis, 0)[lines] for m in (part, rim))
+        part_lines, rims = (np.moveaxis(m, axis, 0)[lines] for m in (part, rim))
         for step in (1, -1):
-            own_, rims_ = own[:, ::step], rims[:, ::step]
+            own_, rims_ = part_lines[:, ::step], rims[:, ::step]
             last = own_.shape[1] - np.argmax(own_[:, ::-1], 1)
-            met = [bool(r[e : e + n].any()) for r, e in zip(rims_, last, strict=True)]
-            if np.mean(met) <= _OPEN_SHARE:
+            is_met = [bool(r[e : e + n].any()) for r, e in zip(rims_, last, strict=True)]
+            if np.mean(is_met) <= _OPEN_SHARE:
                 return False
     return True
 
 
 def _shift_mask(mask: Bools, axis: int, by: int) -> Bools:
     moved = np.zeros_like(mask)
-    there, here = (slice(by, None), slice(0, -by)) if by > 0 else (slice(0, by), slice(-by, None))
+    target, source = (
+        (slice(by, None), slice(0, -by)) if by > 0 else (slice(0, by), slice(-by, None))
+    )
     if axis == 0:
-        moved[there] = mask[here]
+        moved[target] = mask[source]
     else:
-        moved[:, there] = mask[:, here]
+        moved[:, target] = mask[:, source]
     return moved
 
 

@@ -77,8 +77,8 @@ def is_plain(material: Material) -> bool:
 
 def part_of_surface(surface: Surface, faces: Bools) -> Surface:
     """The surface with those of its faces (F,) alone, and the vertices they use."""
-    kept = surface.faces[faces]
-    used, numbers = np.unique(kept, return_inverse=True)
+    chosen = surface.faces[faces]
+    used, numbers = np.unique(chosen, return_inverse=True)
     return replace(
         surface,
         positions=surface.positions[used],

@@ -91,19 +91,19 @@ def _sets_of_models(house: MutableHouse, catalogue: Catalogue) -> dict[tuple[str
     by_id = pieces_by_plain_id(catalogue)
     # Catalogues are for indoors: an upholstered armchair would get wet.
     outdoors = {r.id for r in house.source.rooms if is_outdoors(r)}
-    found: dict[tuple[str, ...], list[int]] = {}
+    indices_of_key: dict[tuple[str, ...], list[int]] = {}
     for index, item in enumerate(house.items[: len(house.source.items)]):
         group = "" if item.kind.is_structure else group_of_item(item, by_id)
         if group in HELD and item.room_id not in outdoors:
             key = (group, item.level_id, item.room_id or "", item.source_class or item.name)
-            found.setdefault(key, []).append(index)
-    return found
+            indices_of_key.setdefault(key, []).append(index)
+    return indices_of_key
 
 
 def _members_of_set(
     house: MutableHouse, indices: Sequence[int], group: str, around: Neighbours
 ) -> list[_Member] | None:
-    found = []
+    members = []
     for index in indices:
         item = house.items[index]
         place = old_place(item, group)
@@ -121,10 +121,10 @@ def _members_of_set(
         if group in _ON_WALLS:
             place = at_wall(place, _walls_near(house, item))
         by = held_by(house, around, index, group)
-        found.append(
+        members.append(
             _Member(index, item, place, tuple(on), Place.WALL if group in _ON_WALLS else by)
         )
-    return found
+    return members
 
 
 def _boards_near(house: MutableHouse, item: Item) -> list[F64]:
@@ -144,13 +144,13 @@ def _boards_near(house: MutableHouse, item: Item) -> list[F64]:
 def _walls_near(house: MutableHouse, item: Item) -> list[F64]:
     """(F, 3, 3) triangles of each wall whose bounds come near the item's."""
     low, high = item.bounds + np.array([[-_NEAR_WALL_M], [_NEAR_WALL_M]])
-    found = []
+    triangles = []
     for wall in house.items:
         if wall.kind is ItemKind.WALL and BASEBOARD not in wall.tags and wall.n_faces:
             least, most = wall.bounds
             if (least < high).all() and (most > low).all():
-                found.append(item_triangles(wall))
-    return found
+                triangles.append(item_triangles(wall))
+    return triangles
 
 
 def _swap_set(
@@ -178,7 +178,9 @@ def _swap_set(
     # front.
     opens = any(item.joints for item in items)
     if opens:
-        candidates = [one for one in candidates if one[0].id.startswith(GENERATED)]
+        candidates = [
+            candidate for candidate in candidates if candidate[0].id.startswith(GENERATED)
+        ]
     # Keep the kind of support: hung or from below.
     candidates = [
         (piece, scale)
@@ -221,24 +223,24 @@ def _item_at_old_place(
     house: MutableHouse, piece: Piece, shape: Shape, scale: Scale, group: str, member: _Member
 ) -> Item:
     """The piece as the member's item: same id, room, kind and tags of its source."""
-    held, place, item = HELD[group], member.place, member.item
-    held = HeldBy.BACK if member.held_by is Place.WALL else held
+    held_by, place, item = HELD[group], member.place, member.item
+    held_by = HeldBy.BACK if member.held_by is Place.WALL else held_by
     low, high = shape.bounds * np.array(scale)
     # Align the fixed point with that of the old piece.
-    own = np.array(
+    anchor = np.array(
         [
             (low[0] + high[0]) / 2,
-            high[1] if held is HeldBy.TOP else low[1],
-            low[2] if held is HeldBy.BACK else (low[2] + high[2]) / 2,
+            high[1] if held_by is HeldBy.TOP else low[1],
+            low[2] if held_by is HeldBy.BACK else (low[2] + high[2]) / 2,
         ]
     )
-    at = place.turn @ (place.held_at(held) - own)
-    if held is not HeldBy.TOP:
-        at[1] -= _above_floor_m(house, item, float(place.low[1]))
+    position = place.turn @ (place.held_at(held_by) - anchor)
+    if held_by is not HeldBy.TOP:
+        position[1] -= _above_floor_m(house, item, float(place.low[1]))
     new = house.placed(
         piece,
         shape,
-        at,
+        position,
         place.turn_rad,
         item_id=item.id,
         room_id=item.room_id,
@@ -276,9 +278,9 @@ def _lights_like(old: tuple[LightPart, ...], new: tuple[LightPart, ...]) -> tupl
 
 def _fits_between_neighbours(around: Neighbours, members: list[_Member], new: list[Item]) -> bool:
     # The new ones may reach into their neighbours no farther than the old ones did.
-    own = {m.index for m in members} | {k for m in members for k in m.on}
+    set_indices = {m.index for m in members} | {k for m in members for k in m.on}
     return all(
-        around.n_shared(item, own) <= around.n_shared(m.item, own) + FREE_CUBES
+        around.n_shared(item, set_indices) <= around.n_shared(m.item, set_indices) + FREE_CUBES
         for m, item in zip(members, new, strict=True)
     )
 

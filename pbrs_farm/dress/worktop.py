@@ -67,8 +67,8 @@ class Worktop:
 
     def free_height(self) -> float:
         """Median free height of the free cells, metres; 0 without any."""
-        left = self.clear[self.support.mask & (self.clear > 0)]
-        return float(np.median(left)) if len(left) else 0.0
+        free_heights = self.clear[self.support.mask & (self.clear > 0)]
+        return float(np.median(free_heights)) if len(free_heights) else 0.0
 
     def free_share(self) -> float:
         """The share of the support that nothing was put on."""

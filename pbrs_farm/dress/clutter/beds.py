@@ -66,19 +66,19 @@ def dress_bed(placing: Placing, scene: SceneTriangles, index: int) -> int:
     rng, n = placing.rng, 0
     if not _has_pillows(bed) and rng.random() < 0.95 * placing.share:
         # Both pillows of a bed are alike.
-        own = int(rng.integers(1 << 30))
-        made = content().things["bed_pillow"](np.random.default_rng(own), placing.style)
+        pillow_seed = int(rng.integers(1 << 30))
+        pillow = content().things["bed_pillow"](np.random.default_rng(pillow_seed), placing.style)
         is_double = bed.width > _DOUBLE_M
         most = (bed.width + 0.04) / 2 - 0.02 if is_double else bed.width
-        if made[0].size[0] > most:
-            made = _narrowed(made, most / made[0].size[0])
-        apart = max(0.46, (made[0].size[0] + 0.02) / bed.width)
-        for at in (0.5 - apart / 2, 0.5 + apart / 2) if is_double else (0.5,):
+        if pillow[0].size[0] > most:
+            pillow = _narrowed(pillow, most / pillow[0].size[0])
+        spacing = max(0.46, (pillow[0].size[0] + 0.02) / bed.width)
+        for share in (0.5 - spacing / 2, 0.5 + spacing / 2) if is_double else (0.5,):
             n += lay_down(
-                placing, scene, index, made, *_place_on_bed(bed, at, 0.06, made), bed.level
+                placing, scene, index, pillow, *_place_on_bed(bed, share, 0.06, pillow), bed.level
             )
         # Who sleeps there has a duvet, below the pillows.
-        first = bed.rows[0] * bed.grid.cell_m + 0.06 + made[0].size[1] + 0.08
+        first = bed.rows[0] * bed.grid.cell_m + 0.06 + pillow[0].size[1] + 0.08
         sides = bed.columns[0] * bed.grid.cell_m, bed.columns[1] * bed.grid.cell_m
         rows = first, bed.rows[1] * bed.grid.cell_m
         duvet = lay_duvet(placing, scene, index, bed.grid, sides, rows, bed.level)
@@ -87,16 +87,18 @@ def dress_bed(placing: Placing, scene: SceneTriangles, index: int) -> int:
         return n + (duvet is not None)
     if rng.random() < 0.45 * placing.share:
         # A cushion leans where the pillows end, not across the bed's middle.
-        made = content().things["cushion"](rng, placing.style)
-        at = float(rng.uniform(0.35, 0.65))
-        n += lay_down(placing, scene, index, made, *_place_on_bed(bed, at, 0.56, made), bed.level)
+        pillow = content().things["cushion"](rng, placing.style)
+        share = float(rng.uniform(0.35, 0.65))
+        n += lay_down(
+            placing, scene, index, pillow, *_place_on_bed(bed, share, 0.56, pillow), bed.level
+        )
     if rng.random() < 0.65 * placing.share:
         # A folded blanket across the foot.
-        made = content().things["folded_blanket"](rng, placing.style)
-        at = float(rng.uniform(0.35, 0.65))
-        from_head = bed.length - made[0].size[1] - float(rng.uniform(0.08, 0.25))
+        pillow = content().things["folded_blanket"](rng, placing.style)
+        share = float(rng.uniform(0.35, 0.65))
+        from_head = bed.length - pillow[0].size[1] - float(rng.uniform(0.08, 0.25))
         n += lay_down(
-            placing, scene, index, made, *_place_on_bed(bed, at, from_head, made), bed.level
+            placing, scene, index, pillow, *_place_on_bed(bed, share, from_head, pillow), bed.level
         )
     return n
 
@@ -118,8 +120,8 @@ def _narrowed(made: Model, factor: float) -> Model:
 def _drop_on(placing: Placing, scene: SceneTriangles, corners: F64) -> None:
     """Drop a garment somewhere on laid cloth, given by its triangles."""
     low, high = corners.min((0, 1)), corners.max((0, 1))
-    at = low + (high - low) * placing.rng.uniform(0.3, 0.7, 3)
-    drop_clothes(placing, scene, at[[0, 2]], float(high[1]))
+    position = low + (high - low) * placing.rng.uniform(0.3, 0.7, 3)
+    drop_clothes(placing, scene, position[[0, 2]], float(high[1]))
 
 
 def lying_place(scene: SceneTriangles, index: int, room: Room) -> Lying | None:
@@ -213,8 +215,8 @@ def lay_down(
     piece, shape = made
     turn = rotation_y(turn_rad + float(placing.rng.normal(0, 0.05)))
     half = piece.size[2] / 2
-    corners, others = around_thing(scene, index, plan, turn, np.asarray(piece.size), level)
-    if others:
+    corners, overlaps = around_thing(scene, index, plan, turn, np.asarray(piece.size), level)
+    if overlaps:
         placing.refuse("something lies on the bed or seat")
         return False
     # Folded items are flat already; a cushion's centre sinks in, and lower points are pressed up to

@@ -49,9 +49,9 @@ class Ground:
         """
         hits = cells_over(grid, corners, touched=True)
         heights = np.full(grid.shape, floor_y)
-        there = hits.low < below_y
-        cell = hits.row[there] * grid.shape[1] + hits.column[there]
-        np.maximum.at(heights.reshape(-1), cell, hits.high[there])
+        is_low = hits.low < below_y
+        cell = hits.row[is_low] * grid.shape[1] + hits.column[is_low]
+        np.maximum.at(heights.reshape(-1), cell, hits.high[is_low])
         n = int(np.ceil(edge_m / 2 / CELL_M))
         grown = np.asarray(ndimage.maximum_filter(heights, size=2 * n + 1))
         sides, outward = _sides_of_steps(grown)

@@ -75,11 +75,11 @@ def lay_duvet(
     tint = mix(
         _LINEN, placing.style.textiles[int(rng.integers(4))], float(rng.choice([0.0, 0.25, 0.6]))
     )
-    made = drape(net, ground, _DUVET_M, folds, rng)
-    made = made or _laid_flat(placing, "duvet", net, ground, _DUVET_M)
-    if made is None:
+    duvet = drape(net, ground, _DUVET_M, folds, rng)
+    duvet = duvet or _laid_flat(placing, "duvet", net, ground, _DUVET_M)
+    if duvet is None:
         return None
-    return _put_cloth(placing, "duvet", made, ground, _DUVET_M, plain("duvet", tint, 0.95), BED)
+    return _put_cloth(placing, "duvet", duvet, ground, _DUVET_M, plain("duvet", tint, 0.95), BED)
 
 
 def lay_throw(placing: Placing, scene: SceneTriangles, index: int, more: F64 | None = None) -> None:
@@ -91,14 +91,14 @@ def lay_throw(placing: Placing, scene: SceneTriangles, index: int, more: F64 | N
     (low, high), style = scene.bounds[index], placing.style
     across = float(max(high[0] - low[0], high[2] - low[2]))
     # Its frame is the seat's own, whose straight sides are then straight in cells.
-    own = plan_turn(scene.items[index], scene.of_item(index).reshape(-1, 3))
-    grid, sides, rows = _over(low, high, own)
+    item_turn = plan_turn(scene.items[index], scene.of_item(index).reshape(-1, 3))
+    grid, sides, rows = _over(low, high, item_turn)
     level = float(high[1])
     ground, _shift = _ground_under_cloth(
         placing, scene, grid, sides, rows, level, _THREADS_M["throw"], more
     )
     tint = style.textiles[int(rng.integers(len(style.textiles)))]
-    folds, made, n = Folds(20, 0.03, 0.035, (0.2, 0.7)), None, 0
+    folds, throw, n = Folds(20, 0.03, 0.035, (0.2, 0.7)), None, 0
     for smaller in np.repeat(_SMALLER, _TRIES):
         x, z = _local(ground, low + (high - low) * rng.uniform(0.25, 0.75, 3))
         size = (smaller * min(1.3, 0.8 * across), smaller * min(0.9, 0.6 * across))
@@ -107,15 +107,15 @@ def lay_throw(placing: Placing, scene: SceneTriangles, index: int, more: F64 | N
         # On a shelf beside the sofa a corner of it would stay up there.
         if (ground.at(net.points[..., 0], net.points[..., 2]) > level + _MOST_RISE_M / 2).any():
             continue
-        made, n = drape(net, ground, _THROW_M, folds, rng), n + 1
-        if made is not None or n == _FALLS:
+        throw, n = drape(net, ground, _THROW_M, folds, rng), n + 1
+        if throw is not None or n == _FALLS:
             break
     if n == 0:
         placing.refuse("a throw would hang on what rises beside the seat")
         return
-    made = made or _laid_flat(placing, "throw", net, ground, _THROW_M)
-    if made is not None:
-        _put_cloth(placing, "throw", made, ground, _THROW_M, plain("throw", tint, 1.0), OTHERPROP)
+    throw = throw or _laid_flat(placing, "throw", net, ground, _THROW_M)
+    if throw is not None:
+        _put_cloth(placing, "throw", throw, ground, _THROW_M, plain("throw", tint, 1.0), OTHERPROP)
 
 
 def drop_clothes(
@@ -151,10 +151,10 @@ def drop_clothes(
     tint = mix((r, g, b), style.textiles[int(rng.integers(4))], 0.5)
     tint = mix(tint, _LINEN, 0.7 if napkin else 0.0)
     name, nyu40 = ("napkin", OTHERPROP) if napkin else ("crumpled_clothes", CLOTHES)
-    made = drape(net, ground, _GARMENT_M, folds, rng)
-    made = made or _laid_flat(placing, name, net, ground, _GARMENT_M)
-    if made is not None:
-        _put_cloth(placing, name, made, ground, _GARMENT_M, plain(name, tint, 0.95), nyu40)
+    cloth = drape(net, ground, _GARMENT_M, folds, rng)
+    cloth = cloth or _laid_flat(placing, name, net, ground, _GARMENT_M)
+    if cloth is not None:
+        _put_cloth(placing, name, cloth, ground, _GARMENT_M, plain(name, tint, 0.95), nyu40)
 
 
 def _over(
@@ -184,8 +184,8 @@ def _ground_under_cloth(
     reach = _AROUND_M
     corner = grid.plan_of((sides[0] - reach) / grid.cell_m, (rows[0] - reach) / grid.cell_m)
     n = [int(np.ceil((span[1] - span[0] + 2 * reach) / CELL_M)) for span in (rows, sides)]
-    own = PlanGrid(corner, grid.turn_rad, CELL_M, (n[0], n[1]))
-    ends = own.plan_of(np.array([0, n[1], 0, n[1]]), np.array([0, 0, n[0], n[0]]))
+    fine_grid = PlanGrid(corner, grid.turn_rad, CELL_M, (n[0], n[1]))
+    ends = fine_grid.plan_of(np.array([0, n[1], 0, n[1]]), np.array([0, 0, n[0], n[0]]))
     floor_y = placing.room.floor_y
     low = np.array([ends[:, 0].min(), floor_y + 0.001, ends[:, 1].min()])
     high = np.array([ends[:, 0].max(), level + _OVER_M, ends[:, 1].max()])
@@ -193,7 +193,7 @@ def _ground_under_cloth(
     corners = np.concatenate(
         [corners, *placing.laid_near(low, high), *([more] if more is not None else [])]
     )
-    ground = Ground.of(own, corners, floor_y, level + _OVER_M, thread_m / 2)
+    ground = Ground.of(fine_grid, corners, floor_y, level + _OVER_M, thread_m / 2)
     return ground, (reach - sides[0], reach - rows[0])
 
 
@@ -236,9 +236,9 @@ def _laid_flat(
     placing: Placing, family: str, net: Net, ground: Ground, thick_m: float
 ) -> Net | None:
     """Cloth that failed to drop, laid flat; None if that fails too. Both are counted."""
-    made = lie_flat(net, ground, thick_m)
-    placing.refuse(f"{family} found no way to fall, {'left out' if made is None else 'lies flat'}")
-    return made
+    cloth = lie_flat(net, ground, thick_m)
+    placing.refuse(f"{family} found no way to fall, {'left out' if cloth is None else 'lies flat'}")
+    return cloth
 
 
 def _put_cloth(

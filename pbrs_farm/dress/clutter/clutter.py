@@ -56,8 +56,8 @@ def add_clutter(house: MutableHouse, catalogue: Catalogue, style: Style, share: 
     owners = _owners(scene, space)
     for room in space.rooms:
         rng = house.rng("clutter", room.room.id)
-        own = room_style(style, house.rng("style", room.room.id))
-        placing = Placing(house, stock, room.room, own, rng, share, bias, room.kind)
+        style_of_room = room_style(style, house.rng("style", room.room.id))
+        placing = Placing(house, stock, room.room, style_of_room, rng, share, bias, room.kind)
         _fill_room(placing, scene, room, owners)
         fill_floor(placing, scene, space, room)
 
@@ -108,7 +108,7 @@ def _fill_item(
     placing: Placing, scene: SceneTriangles, room: RoomSpace, index: int, zone: BaseGeometry
 ) -> None:
     plan, item = None, scene.items[index]
-    there = _SCREENS if _has_screen(scene, room, index) else ()
+    screens = _SCREENS if _has_screen(scene, room, index) else ()
     for support in supports_of_item(scene, index, room.room):
         receptacle = receptacle_of(item, support, room.kind)
         if not receptacle:
@@ -122,7 +122,7 @@ def _fill_item(
         else:
             if receptacle == "dining_table" and placing.rng.random() < _LAID * placing.share:
                 set_table(placing, top, _chairs(scene, room), scene)
-            fill_top(placing, top, receptacle, there)
+            fill_top(placing, top, receptacle, screens)
 
 
 def _has_screen(scene: SceneTriangles, room: RoomSpace, index: int) -> bool:
@@ -159,7 +159,7 @@ def _dress_seat(placing: Placing, scene: SceneTriangles, index: int, item: Item)
         if seat is not None:
             rows = seat.back_row[np.isfinite(seat.back_row)]
             column = float(np.flatnonzero(np.isfinite(seat.back_row)).mean())
-            at = seat.grid.plan_of(column, float(rows.max()) + _ON_SEAT_M / seat.grid.cell_m)
-            drop_clothes(placing, scene, at, seat.level)
+            position = seat.grid.plan_of(column, float(rows.max()) + _ON_SEAT_M / seat.grid.cell_m)
+            drop_clothes(placing, scene, position, seat.level)
     elif width > 0.72 and placing.rng.random() < 0.5:
         dress_seat(placing, scene, index, 1)

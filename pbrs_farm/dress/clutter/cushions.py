@@ -59,14 +59,14 @@ def put_as_it_is(placing: Placing, made: Model, surfaces: list[Surface]) -> None
     shape. Collisions are not checked.
     """
     piece, shape = made
-    kept = tuple(
+    nonempty = tuple(
         replace(surface, material=old.material)
         for surface, old in zip(surfaces, shape.surfaces, strict=True)
     )
-    points = np.concatenate([s.positions for s in kept]).astype(np.float64)
+    points = np.concatenate([s.positions for s in nonempty]).astype(np.float64)
     low, high = points.min(0), points.max(0)
     base = np.array([(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])
-    moved = tuple(replace(s, positions=(s.positions - base).astype(np.float32)) for s in kept)
+    moved = tuple(replace(s, positions=(s.positions - base).astype(np.float32)) for s in nonempty)
     placing.put((piece, Shape(moved, shape.materials, shape.textures)), base, 0.0)
 
 
@@ -98,16 +98,16 @@ def dress_seat(placing: Placing, scene: SceneTriangles, index: int, most: int) -
     for k in range(2 * n_wanted):
         if n == n_wanted:
             break
-        made = content().things["cushion"](rng, placing.style)
-        half = made[0].size[0] / 2 / CELL_M
+        cushion = content().things["cushion"](rng, placing.style)
+        half = cushion[0].size[0] / 2 / CELL_M
         low, high = columns[0] + half + _SIDE_M / CELL_M, columns[-1] - half - _SIDE_M / CELL_M
         if high <= low:
             break
-        at = (low, high)[k] if k < 2 else float(rng.uniform(low, high))
-        if any(at - half < b + 1 and at + half > a - 1 for a, b in taken):
+        middle = (low, high)[k] if k < 2 else float(rng.uniform(low, high))
+        if any(middle - half < b + 1 and middle + half > a - 1 for a, b in taken):
             continue
-        if _lean(placing, scene, index, seat, made, at):
-            taken.append((at - half, at + half))
+        if _lean(placing, scene, index, seat, cushion, middle):
+            taken.append((middle - half, middle + half))
             n += 1
     return n
 
@@ -178,8 +178,8 @@ def _lean(
     corners, owner = scene.in_box(centre - half - 0.25, centre + half + 0.25)
     points = np.concatenate([s_.positions for s_ in shape.surfaces]).astype(np.float64)
     points = points - [0, thick / 2, 0]
-    own = corners[owner == index]
-    placed = _settled(points, own, turn, centre, thick)
+    seat_corners = corners[owner == index]
+    placed = _settled(points, seat_corners, turn, centre, thick)
     if placed is None or _meets_cushion(placed, turn, points, corners, owner, index):
         placing.refuse("a cushion does not fit on the seat")
         return False
@@ -204,8 +204,8 @@ def _settled(points: F64, corners: F64, turn: F64, centre: F64, thick: float) ->
             return None
         centre = centre - [0, fall, 0]
     # Give way where the back, or the seat, would reach into it.
-    own = (corners - centre) @ turn
-    ground = highest_below(points[:, [0, 2]], own, _MOST_PRESSED_M)
+    local = (corners - centre) @ turn
+    ground = highest_below(points[:, [0, 2]], local, _MOST_PRESSED_M)
     pressed = points.copy()
     pressed[:, 1] = np.maximum(points[:, 1], ground + TOUCH_M)
     placed = pressed @ turn.T + centre
@@ -218,13 +218,13 @@ def _settled(points: F64, corners: F64, turn: F64, centre: F64, thick: float) ->
 def _way_to_back(points: F64, corners: F64, turn: F64, centre: F64, thick: float) -> float | None:
     """Distance along its thickness that the cushion moves to touch the back."""
     # In the cushion's own frame the back is a height field under its upper half.
-    own = (corners - centre) @ turn
+    local = (corners - centre) @ turn
     upper = points[:, 2] < 0
-    ground = highest_below(points[upper][:, [0, 2]], own, thick)
-    found = np.isfinite(ground)
-    if found.sum() < 0.4 * upper.sum():
+    ground = highest_below(points[upper][:, [0, 2]], local, thick)
+    is_backed = np.isfinite(ground)
+    if is_backed.sum() < 0.4 * upper.sum():
         return None
-    return float(np.quantile(ground[found], 0.9)) + _SUNK * thick / 2
+    return float(np.quantile(ground[is_backed], 0.9)) + _SUNK * thick / 2
 
 
 def _way_to_seat(placed: F64, corners: F64) -> float | None:

@@ -56,14 +56,14 @@ class Net:
 
     def stretches(self) -> F64:
         """(E,) the length of each thread and diagonal over that at rest."""
-        at = np.moveaxis(self.points, -1, 0)
+        points = np.moveaxis(self.points, -1, 0)
         down, across = self.thread_m
         slant = float(np.hypot(down, across))
         pairs = (
-            (at[:, :-1], at[:, 1:], down),
-            (at[:, :, :-1], at[:, :, 1:], across),
-            (at[:, :-1, :-1], at[:, 1:, 1:], slant),
-            (at[:, 1:, :-1], at[:, :-1, 1:], slant),
+            (points[:, :-1], points[:, 1:], down),
+            (points[:, :, :-1], points[:, :, 1:], across),
+            (points[:, :-1, :-1], points[:, 1:, 1:], slant),
+            (points[:, 1:, :-1], points[:, :-1, 1:], slant),
         )
         return np.concatenate(
             [(np.sqrt(((b - a) ** 2).sum(0)) / length).ravel() for a, b, length in pairs]
@@ -71,8 +71,8 @@ class Net:
 
     def deepest_m(self, ground: Ground) -> float:
         """Maximum penetration of vertices and thread centres into the ground; metres."""
-        at = np.moveaxis(self.points, -1, 0)
-        places = (at, (at[:, :-1] + at[:, 1:]) / 2, (at[:, :, :-1] + at[:, :, 1:]) / 2)
+        xyz = np.moveaxis(self.points, -1, 0)
+        places = (xyz, (xyz[:, :-1] + xyz[:, 1:]) / 2, (xyz[:, :, :-1] + xyz[:, :, 1:]) / 2)
         return max(float(ground.depths(p).max()) for p in places)
 
 
@@ -101,22 +101,22 @@ def drape(
     one edge of a hundred is stretched by more than MOST_STRETCH, or it is in something by more than
     thick_m.
     """
-    apart = thick_m / 2 + TOUCH_M
-    at = np.ascontiguousarray(np.moveaxis(net.points, -1, 0))
-    _fall(at, net.thread_m, ground, apart)
+    gap_m = thick_m / 2 + TOUCH_M
+    points = np.ascontiguousarray(np.moveaxis(net.points, -1, 0))
+    _fall(points, net.thread_m, ground, gap_m)
     thread_m = net.thread_m[0] / 2, net.thread_m[1] / 2
-    fine = _folded(at, thread_m, folds, rng)
-    made = Net(np.moveaxis(fine, 0, -1), thread_m)
+    fine = _folded(points, thread_m, folds, rng)
+    cloth = Net(np.moveaxis(fine, 0, -1), thread_m)
     for k in range(_TIGHTENED):
         _pull(fine, thread_m, push=0.0)
         _pull_across(fine, thread_m, _SHARPEST, pull=0.0)
         if k % 2:
-            _lift_threads(fine, ground, apart)
-        fine += ground.ways_out(fine, apart)
-        if k % 4 == 3 and _usual_most(made) < _TIGHT:
+            _lift_threads(fine, ground, gap_m)
+        fine += ground.ways_out(fine, gap_m)
+        if k % 4 == 3 and _usual_most(cloth) < _TIGHT:
             break
-    is_sound = _usual_most(made) <= MOST_STRETCH and made.deepest_m(ground) <= thick_m
-    return made if is_sound else None
+    is_sound = _usual_most(cloth) <= MOST_STRETCH and cloth.deepest_m(ground) <= thick_m
+    return cloth if is_sound else None
 
 
 def lie_flat(net: Net, ground: Ground, thick_m: float) -> Net | None:
@@ -149,10 +149,10 @@ def _fall(at: F64, thread_m: tuple[float, float], ground: Ground, apart: float) 
             _pull_across(at, thread_m, 1.0, _BEND)
         _lift_threads(at, ground, 0.0)
         move = ground.ways_out(at, apart)
-        held = move.any(0)
+        gripped = move.any(0)
         at += move
-        at[:, held] -= _GRIP * (at - start)[:, held] * [[1.0], [0.0], [1.0]]
-        before = np.where(held, at, start)
+        at[:, gripped] -= _GRIP * (at - start)[:, gripped] * [[1.0], [0.0], [1.0]]
+        before = np.where(gripped, at, start)
 
 
 def _lift_threads(at: F64, ground: Ground, apart: float) -> None:

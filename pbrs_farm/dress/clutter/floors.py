@@ -58,12 +58,12 @@ def fill_floor(placing: Placing, scene: SceneTriangles, space: HouseSpace, room:
     """Put items on the floor of a room; returns their number."""
     rng = placing.rng
     # Draw what the room usually has before its floor is looked at, which costs more.
-    wanted = [
+    kinds = [
         kind
         for kind, chance in CLUTTER.floors.get(room.kind, ())
         if rng.random() < chance * placing.share
     ]
-    floor = _floor_of_room(scene, space, room) if wanted else None
+    floor = _floor_of_room(scene, space, room) if kinds else None
     flights = flights_of(placing.house, room.room, room.area)
     if floor is not None and not flights.before.is_empty:
         plan = floor.grid.centres()
@@ -71,12 +71,12 @@ def fill_floor(placing: Placing, scene: SceneTriangles, space: HouseSpace, room:
     if floor is None or not floor.free.any():
         return 0
     n = 0
-    for kind in wanted:
-        made = placing.stock.take(rng, kind, placing.style)
-        if made is not None and kind == "shoes":
-            made = separate_pair(made, rng, placing.house.mess)
-        if made is not None:
-            n += _put_on_floor(placing, floor, made, at_wall=kind in CLUTTER.at_walls)
+    for kind in kinds:
+        model = placing.stock.take(rng, kind, placing.style)
+        if model is not None and kind == "shoes":
+            model = separate_pair(model, rng, placing.house.mess)
+        if model is not None:
+            n += _put_on_floor(placing, floor, model, at_wall=kind in CLUTTER.at_walls)
     return n
 
 
@@ -97,18 +97,18 @@ def _floor_of_room(scene: SceneTriangles, space: HouseSpace, room: RoomSpace) ->
     body[hits.row[blocks], hits.column[blocks]] = True
     walkable = inside & ~body
     # Keep a metre before doors and windows that reach the floor.
-    kept = np.zeros(grid.shape, np.bool_)
+    kept_free = np.zeros(grid.shape, np.bool_)
     for passage in (*room.doors, *(w for w in room.windows if w.bottom_y < y + 0.4)):
         side = passage.side_of(room.room.id)
         if side is None:
             continue
         zone = passage.before(side, _DOOR_M).union(passage.swing(side)).buffer(CELL_M)
-        kept |= shapely.contains_xy(zone, plan[..., 0], plan[..., 1])
-    here = [scene.items[k] for k in room.items]
-    fronts = shapely.union_all([floor_swept(here, y), *(_before_front(item, y) for item in here)])
-    kept |= shapely.contains_xy(fronts, plan[..., 0], plan[..., 1])
+        kept_free |= shapely.contains_xy(zone, plan[..., 0], plan[..., 1])
+    items = [scene.items[k] for k in room.items]
+    fronts = shapely.union_all([floor_swept(items, y), *(_before_front(item, y) for item in items)])
+    kept_free |= shapely.contains_xy(fronts, plan[..., 0], plan[..., 1])
     joined = doors_are_joined(bitmap, room)
-    return _Floor(room, bitmap, grid, inside & ~low & ~kept, walkable, joined)
+    return _Floor(room, bitmap, grid, inside & ~low & ~kept_free, walkable, joined)
 
 
 def _before_front(item: Item, floor_y: float) -> BaseGeometry:
@@ -165,12 +165,12 @@ def _distance_to_walls(floor: _Floor, asked: Bools) -> F64:
 
     Where a home has no walls, to the room's outline.
     """
-    found = np.full(asked.shape, np.inf)
+    distances = np.full(asked.shape, np.inf)
     room = floor.room
     near = shapely.intersection(room.walls, room.area.buffer(_NEAR_WALLS_M))
     near = room.area.boundary if near.is_empty else near
-    found[asked] = shapely.distance(shapely.points(floor.grid.centres()[asked]), near)
-    return found
+    distances[asked] = shapely.distance(shapely.points(floor.grid.centres()[asked]), near)
+    return distances
 
 
 def _disc(shape: tuple[int, int], row: int, column: int, radius_m: float) -> Bools:

@@ -42,10 +42,10 @@ def separate_pair(made: Model, rng: np.random.Generator, mess: float) -> Model:
         of = _connected_part_of_vertices(surface)
         middle = np.array([points[of == k, 0].mean() for k in range(int(of.max()) + 1)])[of]
         for side, sign in enumerate((-1, 1)):
-            own = middle * sign > 0
+            mask = middle * sign > 0
             pivot, turn = np.array([sign * quarter, 0.0, 0.0]), rotation_y(float(turns[side]))
             step = [sign * abs(float(turns[side])) * quarter, 0.0, float(ahead[side])]
-            points[own] = (points[own] - pivot) @ turn.T + pivot + step
+            points[mask] = (points[mask] - pivot) @ turn.T + pivot + step
         surfaces.append(replace(surface, positions=points.astype(np.float32), normals=None))
     moved = Shape(tuple(surfaces), shape.materials, shape.textures)
     low, high = moved.bounds
@@ -171,8 +171,8 @@ def take_for_room(placing: Placing, kind: str) -> Model | None:
     if placing.taken[kind] >= CLUTTER.most_in_room.get(kind, _MOST_IN_ROOM):
         placing.refuse(f"enough of {kind} in the room")
         return None
-    made = placing.stock.take(placing.rng, kind, placing.style)
-    if made is None:
+    model = placing.stock.take(placing.rng, kind, placing.style)
+    if model is None:
         placing.refuse(f"no {kind} in the catalogue")
-    placing.taken[kind] += made is not None
-    return made
+    placing.taken[kind] += model is not None
+    return model

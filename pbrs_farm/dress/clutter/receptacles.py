@@ -69,7 +69,7 @@ def shares() -> Mapping[str, tuple[Row, ...]]:
     rows: dict[str, list[Row]] = {}
     for row in read_csv(Path(__file__).with_name("shares.csv"), Row):
         rows.setdefault(row.receptacle, []).append(row)
-    return MappingProxyType({name: tuple(found) for name, found in rows.items()})
+    return MappingProxyType({name: tuple(rows_of_name) for name, rows_of_name in rows.items()})
 
 
 @cache

@@ -32,16 +32,16 @@ class ShelfPlan:
 def plan_shelves(placing: Placing, kind: RoomKind) -> ShelfPlan:
     """Fill plan for the shelves of one bookcase, by its room."""
     rng = placing.rng
-    others, books = "decor", float(rng.uniform(0.08, 0.26))
+    theme, books = "decor", float(rng.uniform(0.08, 0.26))
     if kind is RoomKind.KITCHEN or (kind is RoomKind.DINING and rng.random() < 0.4):
-        others, books = "kitchen", 0.05
+        theme, books = "kitchen", 0.05
     elif kind is RoomKind.OFFICE:
-        others, books = "office", float(rng.uniform(0.15, 0.35))
+        theme, books = "office", float(rng.uniform(0.15, 0.35))
     elif kind is RoomKind.BEDROOM and rng.random() < 0.35:
-        others, books = "child", float(rng.uniform(0.08, 0.25))
+        theme, books = "child", float(rng.uniform(0.08, 0.25))
     fullness = float(np.clip(rng.uniform(0.55, 1.0) + placing.bias, 0.2, 1.0))
     inset_m = float(rng.uniform(0.01, 0.04))
-    return ShelfPlan(books, fullness * min(placing.share, 1.0), CLUTTER.shelves[others], inset_m)
+    return ShelfPlan(books, fullness * min(placing.share, 1.0), CLUTTER.shelves[theme], inset_m)
 
 
 def fill_shelf(placing: Placing, top: Worktop, plan: ShelfPlan) -> int:
@@ -84,8 +84,8 @@ def _put_books(
     for length in (most, 0.6 * most, 0.35 * most):
         if length < 0.03:
             return None
-        made, last = content().run_of_books(rng, stock.covers, length - 0.09 * leans, tall, depth)
-        row = [made]
+        books, last = content().run_of_books(rng, stock.covers, length - 0.09 * leans, tall, depth)
+        row = [books]
         if leans and last > 0.14:
             row.append(content().leaning_book(rng, stock.covers, last * 0.97, depth))
         after = _leftmost(placing, top, column, row, plan.inset_m)
@@ -98,9 +98,9 @@ def _lying(rng: np.random.Generator, placing: Placing, depth: float, tall: float
     # A pile as high as the shelf lets it, its spines out.
     n = int(rng.integers(2, 6))
     while True:
-        made = content().stack_of_books(rng, placing.stock.covers, n, most=min(depth / 0.72, 0.32))
-        if made[0].size[2] < tall or n == 1:
-            return made
+        pile = content().stack_of_books(rng, placing.stock.covers, n, most=min(depth / 0.72, 0.32))
+        if pile[0].size[2] < tall or n == 1:
+            return pile
         n -= 1
 
 
@@ -110,10 +110,10 @@ def _put_other(
     rng = placing.rng
     share = np.array([p for _, p in plan.others])
     kind = plan.others[int(rng.choice(len(share), p=share / share.sum()))][0]
-    made = take_for_room(placing, kind)
-    if made is None or made[0].size[2] > free - _HEADROOM_M or made[0].size[1] > top.depth:
+    model = take_for_room(placing, kind)
+    if model is None or model[0].size[2] > free - _HEADROOM_M or model[0].size[1] > top.depth:
         return None
-    return _leftmost(placing, top, column + 1, [made], plan.inset_m + float(rng.uniform(0, 0.04)))
+    return _leftmost(placing, top, column + 1, [model], plan.inset_m + float(rng.uniform(0, 0.04)))
 
 
 def _leftmost(
@@ -123,7 +123,7 @@ def _leftmost(
 
     Their fronts are aligned, inset_m behind the shelf's edge if there is space.
     """
-    sizes = np.array([made[1].bounds[1] - made[1].bounds[0] for made in row])
+    sizes = np.array([model[1].bounds[1] - model[1].bounds[0] for model in row])
     width = float(sizes[:, 0].sum() + _TOUCH_M * (len(row) - 1))
     needed = (width, float(sizes[:, 1].max()), float(sizes[:, 2].max()))
     rows, columns, n = top.spots(needed, margin_m=0.0)
@@ -144,7 +144,7 @@ def _put_row(placing: Placing, top: Worktop, spot: TopSpot, row: list[Model], si
     cell, turn = top.grid.cell_m, top.grid.turn_rad
     front = (spot.row + spot.n_rows) * cell - 0.5 * cell
     x = spot.column * cell + 0.5 * cell
-    for made, size in zip(row, sizes, strict=True):
+    for model, size in zip(row, sizes, strict=True):
         place = top.grid.plan_of((x + size[0] / 2) / cell, (front - size[2] / 2) / cell)
-        placing.put(made, np.array([place[0], top.height, place[1]]), turn)
+        placing.put(model, np.array([place[0], top.height, place[1]]), turn)
         x += float(size[0]) + _TOUCH_M

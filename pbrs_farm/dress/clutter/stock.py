@@ -70,27 +70,27 @@ class Stock:
         if kind == "magazines":
             return content().magazines(rng, self.covers, int(rng.integers(1, 6)))
         # Draw for all alike, so that what the catalogue holds moves no later draw.
-        found = _thing_kind(kind)
-        is_made, number = rng.random() < found.made_share, int(rng.integers(1 << 30))
-        designs = [] if found.made and is_made else self._owned(kind)
+        thing_kind = _thing_kind(kind)
+        is_made, number = rng.random() < thing_kind.made_share, int(rng.integers(1 << 30))
+        designs = [] if thing_kind.made and is_made else self._owned(kind)
         # Of one detailed model there are few in a home.
         designs = [d for d in designs if self._faces[d[0].id] + _n_faces(d[1]) <= _MOST_OF_MODEL]
         if designs:
             piece, shape = designs[number % len(designs)]
             self._faces[piece.id] += _n_faces(shape)
             return piece, shape
-        own = np.random.default_rng(number)
-        return content().things[found.made](own, style) if found.made else None
+        model_rng = np.random.default_rng(number)
+        return content().things[thing_kind.made](model_rng, style) if thing_kind.made else None
 
     def _owned(self, kind: str) -> list[Model]:
         """The designs of the catalogue that this home has; at most _DESIGNS of a kind."""
         if kind not in self._designs:
-            found = _thing_kind(kind)
+            thing_kind = _thing_kind(kind)
             fitting = [
                 p
-                for p in self._catalogue.of(*found.groups)
-                if p.place is found.place
-                and max(p.size) <= found.most_m
+                for p in self._catalogue.of(*thing_kind.groups)
+                if p.place is thing_kind.place
+                and max(p.size) <= thing_kind.most_m
                 and p.kind in (ItemKind.OBJECT, ItemKind.LAMP)
             ]
             order = np.random.default_rng([self._seed, *kind.encode()]).permutation(len(fitting))
@@ -99,7 +99,7 @@ class Stock:
                 if len(owned) == _DESIGNS:
                     break
                 shape = self._catalogue.shape(fitting[k])
-                if shape is not None and _is_usable(shape, found):
+                if shape is not None and _is_usable(shape, thing_kind):
                     owned.append((fitting[k], shape))
             self._designs[kind] = owned
         return self._designs[kind]

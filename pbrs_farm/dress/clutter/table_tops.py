@@ -32,15 +32,15 @@ def fill_top(placing: Placing, top: Worktop, receptacle: str, there: Collection[
     """
     rng = placing.rng
     factor = min(top.support.area / CLUTTER.usual_m2.get(receptacle, _USUAL_M2), _MOST_FACTOR)
-    wanted: list[str] = []
+    kinds: list[str] = []
     most = CLUTTER.most_on_one | dict.fromkeys(there, 0)
     for row in shares().get(receptacle, ()):
         chance = np.clip((row.share + placing.bias * row.share**0.5) * factor, 0, 0.98)
-        left = most.get(row.kind, _MOST_OF_A_KIND) - wanted.count(row.kind)
-        while left > 0 and rng.random() < chance * placing.share:
-            wanted.append(row.kind)
-            left, chance = left - 1, _ANOTHER * chance
-    return put_all(placing, top, wanted)
+        remaining = most.get(row.kind, _MOST_OF_A_KIND) - kinds.count(row.kind)
+        while remaining > 0 and rng.random() < chance * placing.share:
+            kinds.append(row.kind)
+            remaining, chance = remaining - 1, _ANOTHER * chance
+    return put_all(placing, top, kinds)
 
 
 def set_table(placing: Placing, top: Worktop, chairs: Sequence[F64], scene: SceneTriangles) -> int:
@@ -64,13 +64,13 @@ def set_table(placing: Placing, top: Worktop, chairs: Sequence[F64], scene: Scen
             continue
         inward = inward / np.linalg.norm(inward)
         right = np.array([-inward[1], inward[0]])
-        at = edge + inward * (plate[0].size[0] / 2 + 0.03)
+        position = edge + inward * (plate[0].size[0] / 2 + 0.03)
         aside = rng.normal(0, _LEFT_M, (2, 2)) if is_eaten else np.zeros((2, 2))
         turned = float(rng.normal(0, 0.6)) if is_eaten else 0.0
-        n += placing.drop_near(top, plate, at + aside[0], turn_rad=turned)
-        n += placing.drop_near(top, glass, at + inward * 0.1 + right * 0.17 + aside[1])
+        n += placing.drop_near(top, plate, position + aside[0], turn_rad=turned)
+        n += placing.drop_near(top, glass, position + inward * 0.1 + right * 0.17 + aside[1])
         if is_eaten and rng.random() < _NAPKINS:
-            place = at - right * 0.22 + inward * 0.02
+            place = position - right * 0.22 + inward * 0.02
             if top.is_free(place, _NAPKIN_M):
                 drop_clothes(placing, scene, place, top.height, napkin=True)
                 n += 1
@@ -84,15 +84,15 @@ def put_all(placing: Placing, top: Worktop, kinds: list[str]) -> int:
     """
     things: list[tuple[str, Model]] = []
     for kind in kinds:
-        made = take_for_room(placing, kind)
-        if made is not None:
-            things.append((kind, made))
+        model = take_for_room(placing, kind)
+        if model is not None:
+            things.append((kind, model))
     things.sort(key=lambda thing: -thing[1][0].size[0] * thing[1][0].size[1])
     n = 0
-    for kind, made in things:
+    for kind, model in things:
         if top.free_share() < _FULL and n:
             placing.refuse("surface full")
             continue
-        pull = -3.0 if kind in CLUTTER.in_front else 5.0 + 12.0 * made[0].size[2]
-        n += placing.drop(top, made, faces_anywhere=is_round(kind), depth_pull=pull)
+        pull = -3.0 if kind in CLUTTER.in_front else 5.0 + 12.0 * model[0].size[2]
+        n += placing.drop(top, model, faces_anywhere=is_round(kind), depth_pull=pull)
     return n

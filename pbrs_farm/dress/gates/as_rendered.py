@@ -44,9 +44,9 @@ def refit_to_walls(
     moved to the remaining wall, if it is within 12 cm. n_source: number of items before dressing.
     pieces: of the added items, by id.
     """
-    own = {i.id for i in dressed.items[n_source:] if not i.kind.is_structure}
-    added = [item for item in repaired.items if item.id in own]
-    base = repaired.with_items(item for item in repaired.items if item.id not in own)
+    added_ids = {i.id for i in dressed.items[n_source:] if not i.kind.is_structure}
+    added = [item for item in repaired.items if item.id in added_ids]
+    base = repaired.with_items(item for item in repaired.items if item.id not in added_ids)
     with closing(MutableHouse(base, report.seed)) as house:
         house.items += added
         bodies = bodies_of(house, pieces)
@@ -54,8 +54,8 @@ def refit_to_walls(
             return dressed, report
         moved = _hung_anew(house, bodies)
         gates = {gate.name: gate for gate in keep_gates(house, pieces, CONTACT)}
-        left = {item.id for item in house.items[len(base.items) :]}
-        out, why = {item.id for item in added} - left, house.refused
+        remaining_ids = {item.id for item in house.items[len(base.items) :]}
+        out, why = {item.id for item in added} - remaining_ids, house.refused
     if not out and not moved:
         return dressed, report
     items = [
@@ -85,9 +85,9 @@ def _is_held(bodies: Sequence[Body]) -> bool:
 
     Repair moves neither the items nor any other support.
     """
-    asked = [k for k, b in enumerate(bodies) if b.is_new and _hangs(b)]
-    plumb = Plumb(bodies, asked)
-    if not all(by.is_good for by in held(bodies, asked, plumb).values()):
+    hung = [k for k, b in enumerate(bodies) if b.is_new and _hangs(b)]
+    plumb = Plumb(bodies, hung)
+    if not all(by.is_good for by in held(bodies, hung, plumb).values()):
         return False
     solids = Solids()
     return not any(
@@ -104,9 +104,9 @@ def _hangs(body: Body) -> bool:
 def _hung_anew(house: MutableHouse, bodies: Sequence[Body]) -> dict[str, F64]:
     """Move hung items without support to a wall, in place; returns the offsets by id."""
     walls = [b for b in bodies if b.item.kind is ItemKind.WALL]
-    asked = [k for k, b in enumerate(bodies) if b.is_new and _hangs(b)]
+    hung = [k for k, b in enumerate(bodies) if b.is_new and _hangs(b)]
     moved: dict[str, F64] = {}
-    for k, by in held(bodies, asked, Plumb(bodies, asked)).items():
+    for k, by in held(bodies, hung, Plumb(bodies, hung)).items():
         item, piece = bodies[k].item, bodies[k].piece
         if by.is_good or item.box is None or piece is None or piece.place is not Place.WALL:
             continue

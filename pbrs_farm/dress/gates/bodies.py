@@ -73,14 +73,14 @@ def bodies_of(
 
     pieces: by id. known: reusable bodies by the id of their item.
     """
-    found = []
+    bodies = []
     n_source = len(house.source.items)
     for index, item in enumerate(house.items):
         was = house.source.items[index] if index < n_source else None
-        held = (known or {}).get(id(item))
-        if held is not None:
-            held.index = index
-            found.append(held)
+        cached = (known or {}).get(id(item))
+        if cached is not None:
+            cached.index = index
+            bodies.append(cached)
             continue
         corners = item_triangles(item)
         if not len(corners):
@@ -89,8 +89,8 @@ def bodies_of(
         # Walls are cut where rooms meet, but stay in place; boards lie along them.
         is_new = not item.kind.is_structure and (was is None or not has_same_mesh(item, was))
         piece = pieces.get(piece_id(item)) if is_new else None
-        found.append(Body(index, item, corners, low, high, is_new, was, piece))
-    return found
+        bodies.append(Body(index, item, corners, low, high, is_new, was, piece))
+    return bodies
 
 
 def piece_id(item: Item) -> str:
@@ -119,9 +119,9 @@ def has_same_mesh(a: Item, b: Item) -> bool:
     ):
         return True
     # Doors are parted into leaf and frame: their triangles come in another order.
-    mine, other = (item_triangles(x).reshape(-1, 9) for x in (a, b))
-    order, other_order = (np.lexsort(rows.T[::-1]) for rows in (mine, other))
-    return np.array_equal(mine[order], other[other_order])
+    mine, theirs = (item_triangles(x).reshape(-1, 9) for x in (a, b))
+    order, other_order = (np.lexsort(rows.T[::-1]) for rows in (mine, theirs))
+    return np.array_equal(mine[order], theirs[other_order])
 
 
 def shells_of(corners: F64) -> list[Shell]:

@@ -28,7 +28,7 @@ def blocked_fronts(_space: HouseSpace, bodies: Sequence[Body]) -> tuple[int, lis
     its way must be free of added items; chairs can be pushed aside. If a new item's own door hits
     existing furniture, the new item is removed.
     """
-    n, found = 0, []
+    n, blocked = 0, []
     scene = SceneTriangles([b.item for b in bodies])
     new = [k for k, b in enumerate(bodies) if b.is_new and b.item.nyu40 != CHAIR]
     for k, body in enumerate(bodies):
@@ -55,8 +55,8 @@ def blocked_fronts(_space: HouseSpace, bodies: Sequence[Body]) -> tuple[int, lis
             n += 1
             stopped_by = _stopped_by(scene, k, near, joints[swept.part])
             if stopped_by is not None:
-                found.append(Blocked(body.item.id, bodies[_goes(bodies, k, stopped_by)].index))
-    return n, found
+                blocked.append(Blocked(body.item.id, bodies[_goes(bodies, k, stopped_by)].index))
+    return n, blocked
 
 
 def _goes(bodies: Sequence[Body], own: int, other: int) -> int:
@@ -70,8 +70,8 @@ def _stopped_by(scene: SceneTriangles, own: int, near: Sequence[int], joint: Joi
     """Which of some items stops a part before nine tenths of its way; None: it opens."""
     items: list[Item] = [scene.items[own], *(scene.items[i] for i in near)]
     some = SceneTriangles(items)
-    wanted = joint.lower + LEAST_OPEN * (joint.upper - joint.lower)
-    value, by = free_value(some, 0, joint.part, wanted)
-    if value >= wanted - 1e-9:
+    target = joint.lower + LEAST_OPEN * (joint.upper - joint.lower)
+    value, by = free_value(some, 0, joint.part, target)
+    if value >= target - 1e-9:
         return None
     return next((i for i in near if scene.items[i].id == by), None)

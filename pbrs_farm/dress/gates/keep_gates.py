@@ -114,9 +114,9 @@ def _measure_gates(
     if any(name not in memory.free for name in ways):
         space, large = _space(house, bodies)
         for name, gate in ways.items():
-            n, found = gate(space, large)
-            checked[name], broken[name] = n, sorted({b.index for b in found})
-            if not found:
+            n, bodies_found = gate(space, large)
+            checked[name], broken[name] = n, sorted({b.index for b in bodies_found})
+            if not bodies_found:
                 memory.free[name] = n
     return checked | memory.free, broken
 
@@ -157,23 +157,25 @@ def _are_apart(a: Body, b: Body, memory: _Memory) -> bool:
 
 def _unsupported(bodies: list[Body], memory: _Memory) -> tuple[int, list[int]]:
     """Number of added bodies, and indices of those without support."""
-    there = {id(b.item) for b in bodies}
+    present = {id(b.item) for b in bodies}
     new = [k for k, b in enumerate(bodies) if b.is_new]
     # Measure new bodies, and those that lost all their supports.
-    asked = [k for k in new if not there.intersection(memory.supports.get(id(bodies[k].item), ()))]
-    if not asked:
+    unsettled = [
+        k for k in new if not present.intersection(memory.supports.get(id(bodies[k].item), ()))
+    ]
+    if not unsettled:
         return len(new), []
-    plumb = Plumb(bodies, asked)
-    found = held(bodies, asked, plumb)
-    for number, by in found.items():
+    plumb = Plumb(bodies, unsettled)
+    supports = held(bodies, unsettled, plumb)
+    for number, by in supports.items():
         memory.supports[id(bodies[number].item)] = tuple(id(bodies[b].item) for b in by.by)
-    bad = [k for k, by in found.items() if not by.is_good]
+    bad = [k for k, by in supports.items() if not by.is_good]
     # A replacement may have the same gap to its support as the original.
     return len(new), [
         bodies[k].index
         for k in bad
         if bodies[k].was is None
-        or abs(found[k].gap_m) > abs(held_as_drawn(bodies, k, plumb).gap_m) + SUPPORT_M
+        or abs(supports[k].gap_m) > abs(held_as_drawn(bodies, k, plumb).gap_m) + SUPPORT_M
     ]
 
 

@@ -55,10 +55,10 @@ def is_allowed(a: Body, b: Body) -> bool:
 
     Rugs only if added; curtains and blinds only with walls, doors or windows behind them. Symmetric.
     """
-    for one, other in ((a, b), (b, a)):
-        if one.is_new and one.item.nyu40 == FLOOR_MAT:
+    for first, second in ((a, b), (b, a)):
+        if first.is_new and first.item.nyu40 == FLOOR_MAT:
             return True
-        if one.item.nyu40 in (CURTAIN, BLINDS) and other.item.kind in _BEHIND_CURTAINS:
+        if first.item.nyu40 in (CURTAIN, BLINDS) and second.item.kind in _BEHIND_CURTAINS:
             return True
     return False
 
@@ -70,10 +70,10 @@ def penetration_m(a: Body, b: Body, solids: Solids) -> float:
     one passes through a face of the other, whichever is most.
     """
     deepest = 0.0
-    for one in _shells_near(a, b):
-        for other in _shells_near(b, a):
-            if _box_depth(one.low, one.high, other.low, other.high) > MOST_M:
-                deepest = max(deepest, _depth_of_shells(one, other, solids))
+    for shell in _shells_near(a, b):
+        for other_shell in _shells_near(b, a):
+            if _box_depth(shell.low, shell.high, other_shell.low, other_shell.high) > MOST_M:
+                deepest = max(deepest, _depth_of_shells(shell, other_shell, solids))
     return deepest
 
 

@@ -76,18 +76,18 @@ class Plumb:
         A point may have no hit or many, in no order of height. float64 metres. Of each hit it gives
         the number of the point, the height and whose face it is.
         """
-        found = [grid.candidates(points[:, [0, 2]]) for grid in self._grids]
-        place, triangle = (np.concatenate(parts) for parts in zip(*found, strict=True))
+        candidates = [grid.candidates(points[:, [0, 2]]) for grid in self._grids]
+        place, triangle = (np.concatenate(parts) for parts in zip(*candidates, strict=True))
         # Leave out faces that lie too high or too low, then those beside the place.
         for axis, reach in ((1, reach_m), (0, _BESIDE_M), (2, _BESIDE_M)):
-            at = np.ascontiguousarray(points[:, axis])[place]
-            near = self._low[axis][triangle] < at + reach
-            near &= self._high[axis][triangle] > at - reach
+            coordinate = np.ascontiguousarray(points[:, axis])[place]
+            near = self._low[axis][triangle] < coordinate + reach
+            near &= self._high[axis][triangle] > coordinate - reach
             place, triangle = place[near], triangle[near]
         y = heights_in(points[place][:, [0, 2]], self._corners[triangle], _EDGE)
         with np.errstate(invalid="ignore"):
-            met = np.abs(y - points[place, 1]) < reach_m
-        return Hits(place[met], y[met], self._owner[triangle[met]])
+            is_near = np.abs(y - points[place, 1]) < reach_m
+        return Hits(place[is_near], y[is_near], self._owner[triangle[is_near]])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -130,8 +130,8 @@ def _grid_of_triangles(
     stride = int(last[:, 1].max(initial=0)) + 2
     keys = cell[:, 0] * stride + cell[:, 1]
     order = np.argsort(keys, kind="stable")
-    held = _Grid(cell_m, origin, stride, keys[order], numbers[fits][row[order]])
-    return held, numbers[~fits]
+    grid = _Grid(cell_m, origin, stride, keys[order], numbers[fits][row[order]])
+    return grid, numbers[~fits]
 
 
 def _counting(counts: Ints) -> Ints:

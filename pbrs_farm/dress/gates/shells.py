@@ -84,14 +84,14 @@ def depths_inside(points: F64, corners: F64) -> F64:
     inside = np.ones(len(points), bool)
     depth = np.full(len(points), np.inf)
     for axis in (1, 0, 2):
-        left = np.flatnonzero(inside)
-        if not len(left):
+        inside_numbers = np.flatnonzero(inside)
+        if not len(inside_numbers):
             break
-        n_ahead, ahead, n_behind, behind = _crossings_along(points[left], corners, axis)
+        n_ahead, ahead, n_behind, behind = _crossings_along(points[inside_numbers], corners, axis)
         odd_ahead, odd_behind = n_ahead % 2 == 1, n_behind % 2 == 1
-        inside[left] &= odd_ahead if axis == 1 else odd_ahead & odd_behind
+        inside[inside_numbers] &= odd_ahead if axis == 1 else odd_ahead & odd_behind
         nearest = np.minimum(ahead, np.where(odd_behind, behind, np.inf))
-        depth[left] = np.minimum(depth[left], nearest)
+        depth[inside_numbers] = np.minimum(depth[inside_numbers], nearest)
     return np.where(inside & np.isfinite(depth), depth, 0.0)
 
 
@@ -168,14 +168,14 @@ class Solids:
     def _solid(self, shell: Shell) -> Any:
         # manifold3d ends the process on open meshes: closed shells alone are given to it.
         assert shell.is_closed
-        held = self._made.get(id(shell))
-        if held is None or held[0] is not shell:
+        cached = self._made.get(id(shell))
+        if cached is None or cached[0] is not shell:
             mesh = manifold3d.Mesh(shell.vertices.astype(np.float32), shell.faces.astype(np.uint32))
-            made = manifold3d.Manifold(mesh)
-            good = made.status() == manifold3d.Error.NoError
-            held = (shell, made if good else None)
-            self._made[id(shell)] = held
-        return held[1]
+            solid = manifold3d.Manifold(mesh)
+            good = solid.status() == manifold3d.Error.NoError
+            cached = (shell, solid if good else None)
+            self._made[id(shell)] = cached
+        return cached[1]
 
 
 def thickness(corners: F64) -> float:

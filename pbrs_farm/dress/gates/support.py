@@ -50,14 +50,14 @@ def held(bodies: Sequence[Body], numbers: Sequence[int], plumb: Plumb) -> dict[i
     test `is_good`.
     """
     low, high = boxes_of(bodies)
-    found = _find_what_holds(bodies, numbers, plumb)
+    supports = _find_what_holds(bodies, numbers, plumb)
     for number in numbers:
         body = bodies[number]
-        ways = [found[number]] if _may_stand(body) else []
+        ways = [supports[number]] if _may_stand(body) else []
         if not any(w.is_good for w in ways) and _may_hang(body):
             ways.append(_hanging(bodies, number, low, high))
-        found[number] = min(ways, key=lambda w: abs(w.gap_m))
-    return found
+        supports[number] = min(ways, key=lambda w: abs(w.gap_m))
+    return supports
 
 
 def held_as_drawn(bodies: Sequence[Body], number: int, plumb: Plumb) -> Held:
@@ -99,21 +99,21 @@ def _find_what_holds(
     hits = plumb.hits(points, _REACH_M)
     # The gap is from a place down to the face below it, negative to a face above.
     gap = points[hits.place, 1] - hits.y
-    own = of[hits.place]
-    keep = hits.body != own
-    gap, own, body = gap[keep], own[keep], hits.body[keep]
-    found = dict.fromkeys(numbers, Held(_REACH_M))
-    order = np.argsort(own, kind="stable")
-    gap, own, body = gap[order], own[order], body[order]
-    cuts = np.flatnonzero(own[1:] != own[:-1]) + 1 if len(own) else np.zeros(0, np.int64)
-    for first, last in zip(np.r_[0, cuts], np.r_[cuts, len(own)], strict=True):
+    owner = of[hits.place]
+    keep = hits.body != owner
+    gap, owner, body = gap[keep], owner[keep], hits.body[keep]
+    below = dict.fromkeys(numbers, Held(_REACH_M))
+    order = np.argsort(owner, kind="stable")
+    gap, owner, body = gap[order], owner[order], body[order]
+    cuts = np.flatnonzero(owner[1:] != owner[:-1]) + 1 if len(owner) else np.zeros(0, np.int64)
+    for first, last in zip(np.r_[0, cuts], np.r_[cuts, len(owner)], strict=True):
         if first == last:
             continue
         gaps = gap[first:last]
         nearest = float(gaps[np.argmin(np.abs(gaps))])
         by = np.unique(body[first:last][np.abs(gaps) <= MOST_M + _ROUNDING_M])
-        found[int(own[first])] = Held(nearest, tuple(int(b) for b in by))
-    return found
+        below[int(owner[first])] = Held(nearest, tuple(int(b) for b in by))
+    return below
 
 
 def _places_that_touch(body: Body) -> F64:
@@ -139,12 +139,12 @@ def _hanging(bodies: Sequence[Body], number: int, low: F64, high: F64) -> Held:
     below, above = body.low - _REACH_M / 10, body.high + _REACH_M / 10
     near = np.flatnonzero(((low <= above) & (high >= below)).all(1))
     best, by = _REACH_M, list[int]()
-    for other in near.tolist():
-        if other == number or bodies[other].item.kind is ItemKind.PERSON:
+    for neighbour in near.tolist():
+        if neighbour == number or bodies[neighbour].item.kind is ItemKind.PERSON:
             continue
-        distance = _distance_m(body, bodies[other])
+        distance = _distance_m(body, bodies[neighbour])
         if distance <= MOST_M:
-            by.append(other)
+            by.append(neighbour)
         best = min(best, distance)
     return Held(best, tuple(by))
 

@@ -46,7 +46,7 @@ def blocked_doors(space: HouseSpace, bodies: Sequence[Body]) -> tuple[int, list[
     Windows and sides that lead to no room do not count. Curtains, and items lower than a step or above
     head height, block nothing.
     """
-    n, found = 0, []
+    n, blocked = 0, []
     boxes = boxes_of(bodies)
     for door in space.passages:
         sides = [] if door.is_window else [s for s in (0, 1) if door.room_ids[s] is not None]
@@ -59,8 +59,8 @@ def blocked_doors(space: HouseSpace, bodies: Sequence[Body]) -> tuple[int, list[
             )
             for k in np.flatnonzero(_may_enter(boxes, door, side, low, high)).tolist():
                 if _is_in_the_way(bodies[k]) and _enters(bodies[k], door, side, low, high):
-                    found.append(Blocked(door.id, bodies[k].index))
-    return n, found
+                    blocked.append(Blocked(door.id, bodies[k].index))
+    return n, blocked
 
 
 def _may_enter(boxes: tuple[F64, F64], passage: Passage, side: int, low: F64, high: F64) -> Bools:
@@ -70,9 +70,9 @@ def _may_enter(boxes: tuple[F64, F64], passage: Passage, side: int, low: F64, hi
     """
     middle, half = (boxes[0] + boxes[1]) / 2, (boxes[1] - boxes[0]) / 2
     axes = np.array([passage.along, [0.0, 1.0, 0.0], passage.inward(side)])
-    at = in_front_of(passage, side, middle)
+    offset = in_front_of(passage, side, middle)
     reach = half @ np.abs(axes).T + _ROUNDING_M
-    return np.asarray(((at + reach >= low) & (at - reach <= high)).all(1))
+    return np.asarray(((offset + reach >= low) & (offset - reach <= high)).all(1))
 
 
 def _enters(body: Body, door: Passage, side: int, low: F64, high: F64) -> bool:
@@ -95,7 +95,7 @@ def covered_windows(space: HouseSpace, bodies: Sequence[Body]) -> tuple[int, lis
 
     If several cover it together, the largest ones, until less than a fifth is covered.
     """
-    n, found = 0, []
+    n, blocked = 0, []
     for window in space.passages:
         sides = [s for s in (0, 1) if window.is_window and window.room_ids[s] is not None]
         for side in sides:
@@ -103,9 +103,9 @@ def covered_windows(space: HouseSpace, bodies: Sequence[Body]) -> tuple[int, lis
             covers = {k: m for k, m in _covers(window, side, space, bodies).items() if m.any()}
             while covers and np.mean(np.any(list(covers.values()), 0)) >= MOST_COVERED:
                 worst = max(covers, key=lambda k: (int(covers[k].sum()), k))
-                found.append(Blocked(window.id, bodies[worst].index))
+                blocked.append(Blocked(window.id, bodies[worst].index))
                 del covers[worst]
-    return n, found
+    return n, blocked
 
 
 def _covers(
@@ -121,7 +121,7 @@ def _covers(
     low = np.array([-window.width / 2, window.bottom_y, 0.01])
     high = np.array([window.width / 2, window.top_y, _BEFORE_WINDOW_M])
     near_it = _may_enter((space.bounds[:, 0], space.bounds[:, 1]), window, side, low, high)
-    found = {}
+    masks = {}
     for number in np.flatnonzero(near_it).tolist():
         if not _is_in_the_way(bodies[number]):
             continue
@@ -131,11 +131,11 @@ def _covers(
         column = np.floor((local[near, 0] / window.width + 0.5) * columns).astype(np.int64)
         height = (local[near, 1] - window.bottom_y) / (window.top_y - window.bottom_y)
         row = np.floor(height * rows).astype(np.int64)
-        seen = (column >= 0) & (column < columns) & (row >= 0) & (row < rows)
+        in_window = (column >= 0) & (column < columns) & (row >= 0) & (row < rows)
         mask = np.zeros((rows, columns), bool)
-        mask[row[seen], column[seen]] = True
-        found[number] = mask
-    return found
+        mask[row[in_window], column[in_window]] = True
+        masks[number] = mask
+    return masks
 
 
 def closed_ways(space: HouseSpace, bodies: Sequence[Body]) -> tuple[int, list[Blocked]]:
@@ -144,7 +144,7 @@ def closed_ways(space: HouseSpace, bodies: Sequence[Body]) -> tuple[int, list[Bl
     Only rooms with a free way before dressing. Bodies are named from the last one on, until a way
     0.6 m wide connects the doors again.
     """
-    n, found = 0, []
+    n, blocked = 0, []
     for room in space.rooms:
         if sum(door.side_of(room.room.id) is not None for door in room.doors) < 2:
             continue
@@ -161,8 +161,8 @@ def closed_ways(space: HouseSpace, bodies: Sequence[Body]) -> tuple[int, list[Bl
             without.append(number)
             if _is_joined(space, room, without):
                 break
-        found += [Blocked(room.room.id, bodies[k].index) for k in without]
-    return n, found
+        blocked += [Blocked(room.room.id, bodies[k].index) for k in without]
+    return n, blocked
 
 
 def _is_joined(space: HouseSpace, room: RoomSpace, without: Collection[int]) -> bool:

@@ -53,15 +53,15 @@ def flights_of(house: MutableHouse, room: Room, area: BaseGeometry) -> Flights:
 
 def _stairs(house: MutableHouse) -> list[tuple[F64, BaseGeometry]]:
     """Level triangles (F, 3, 3) of each stairs of the source, and their plan; found once a house."""
-    kept = house.kept.get("stairs")
-    if isinstance(kept, list):
-        return kept
-    found: list[tuple[F64, BaseGeometry]] = []
+    cached = house.kept.get("stairs")
+    if isinstance(cached, list):
+        return cached
+    stairs: list[tuple[F64, BaseGeometry]] = []
     for item in house.source.items:
         if item.kind is ItemKind.STAIRS and item.n_faces:
             corners = item_triangles(item)
             treads = corners[np.abs(unit_normals(corners)[:, 1]) > _FLAT]
             if len(treads):
-                found.append((treads, plan_area(treads, upright=False).simplify(_COARSE_M)))
-    house.kept["stairs"] = found
-    return found
+                stairs.append((treads, plan_area(treads, upright=False).simplify(_COARSE_M)))
+    house.kept["stairs"] = stairs
+    return stairs

@@ -125,17 +125,17 @@ def house_space(house: MutableHouse) -> HouseSpace:
         room = space.room("0_1")
         is_free = space.is_free(low, high)  # a box (3,), (3,) of the world, metres
     """
-    kept = house.kept.get("space")
-    if not isinstance(kept, _KeptSpaces):
-        kept = house.kept["space"] = _empty_house(house)
+    cached = house.kept.get("space")
+    if not isinstance(cached, _KeptSpaces):
+        cached = house.kept["space"] = _empty_house(house)
     key = tuple(id(item) for item in house.items)
-    if kept.space is None or kept.space[0] != key:
+    if cached.space is None or cached.space[0] != key:
         # Spread points over new items; keep those of the others.
         for item in house.items:
-            if id(item) not in kept.items:
-                kept.items[id(item)] = _with_points(item)
-        kept.space = key, _house_space(house.items, kept)
-    return kept.space[1]
+            if id(item) not in cached.items:
+                cached.items[id(item)] = _with_points(item)
+        cached.space = key, _house_space(house.items, cached)
+    return cached.space[1]
 
 
 def floor_space(house: MutableHouse) -> HouseSpace:
@@ -144,11 +144,11 @@ def floor_space(house: MutableHouse) -> HouseSpace:
     For passes that place nothing on walls: `faces` of every room is empty. Per-item results are cached
     in the house.
     """
-    kept = house.kept.get("space")
-    if not isinstance(kept, _KeptSpaces):
-        kept = house.kept["space"] = _empty_house(house)
-    kept.items |= {id(i): _with_points(i) for i in house.items if id(i) not in kept.items}
-    bare = replace(kept, rooms=tuple(replace(room, faces=()) for room in kept.rooms))
+    cached = house.kept.get("space")
+    if not isinstance(cached, _KeptSpaces):
+        cached = house.kept["space"] = _empty_house(house)
+    cached.items |= {id(i): _with_points(i) for i in house.items if id(i) not in cached.items}
+    bare = replace(cached, rooms=tuple(replace(room, faces=()) for room in cached.rooms))
     return _house_space(house.items, bare)
 
 
@@ -210,8 +210,8 @@ def _triangles_over(triangles: F64, area: BaseGeometry) -> F64:
 
 def _ceiling(above: F64, room: Room) -> Callable[[F64], F64]:
     def ceiling_y(places: F64) -> F64:
-        found = lowest_above(places, above, room.floor_y + _ABOVE_FLOOR_M)
-        return np.where(np.isfinite(found), found, room.ceiling_y)
+        heights = lowest_above(places, above, room.floor_y + _ABOVE_FLOOR_M)
+        return np.where(np.isfinite(heights), heights, room.ceiling_y)
 
     return ceiling_y
 
@@ -222,7 +222,7 @@ def _house_space(items: Sequence[Item], kept: _KeptSpaces) -> HouseSpace:
     rooms = []
     for empty in kept.rooms:
         inside = _items_in(items, points, bounds, empty, kept)
-        own = [p for p in kept.passages if empty.room.id in p.room_ids]
+        room_passages = [p for p in kept.passages if empty.room.id in p.room_ids]
         faces = [_face_behind_things(face, items, points, bounds, kept) for face in empty.faces]
         rooms.append(
             RoomSpace(
@@ -230,8 +230,8 @@ def _house_space(items: Sequence[Item], kept: _KeptSpaces) -> HouseSpace:
                 room_kind(empty.room, [items[n] for n in inside], float(empty.area.area)),
                 empty.area,
                 tuple(face for face in faces if face.clear.any()),
-                tuple(p for p in own if not p.is_window),
-                tuple(p for p in own if p.is_window),
+                tuple(p for p in room_passages if not p.is_window),
+                tuple(p for p in room_passages if p.is_window),
                 inside,
                 empty.walls,
                 empty.above,
@@ -246,14 +246,14 @@ def _face_behind_things(
     """The empty face limited by items in front of it; rugs are ignored."""
     if id(face) not in kept.reach:
         kept.reach[id(face)] = reach_of(face)
-    found = meeting(bounds, kept.reach[id(face)])
-    near = [n for n in found if items[n].nyu40 != FLOOR_MAT]
+    near_numbers = meeting(bounds, kept.reach[id(face)])
+    near = [n for n in near_numbers if items[n].nyu40 != FLOOR_MAT]
     key = tuple(id(items[n]) for n in near)
-    known = kept.faces.get(id(face))
-    if known is None or known[0] != key:
+    cached = kept.faces.get(id(face))
+    if cached is None or cached[0] != key:
         hidden = [_hidden_by(face, items[n], points[n], kept) for n in near]
-        known = kept.faces[id(face)] = key, with_things(face, hidden)
-    return known[1]
+        cached = kept.faces[id(face)] = key, with_things(face, hidden)
+    return cached[1]
 
 
 def _hidden_by(face: WallFace, item: Item, points: F64, kept: _KeptSpaces) -> Hidden | None:
@@ -272,7 +272,7 @@ def _items_in(
         return ()
     x0, z0, x1, z1 = area.bounds
     shapely.prepare(area)
-    found = []
+    numbers = []
     reach = np.array([[x0, room.floor_y - 0.05, z0], [x1, room.ceiling_y, z1]])
     for number in meeting(bounds, reach):
         if items[number].kind in (ItemKind.DOOR, ItemKind.WINDOW):
@@ -283,5 +283,5 @@ def _items_in(
             share = shapely.contains_xy(area, some[:, 0], some[:, 2]).mean()
             kept.inside[key] = bool(share > _INSIDE_SHARE)
         if kept.inside[key]:
-            found.append(number)
-    return tuple(found)
+            numbers.append(number)
+    return tuple(numbers)

@@ -98,15 +98,15 @@ def passages_of(
     outside of walls, are given by their own boxes.
     """
     by_id = {item.id: item for item in items}
-    found = [_from_opening(o, rooms, walls_at) for o in openings]
+    passages = [_from_opening(o, rooms, walls_at) for o in openings]
     with_hole = {o.item_id for o in openings}
     loose = [
         i
         for i in by_id.values()
         if i.kind in (ItemKind.DOOR, ItemKind.WINDOW) and i.id not in with_hole and i.n_faces
     ]
-    found += [_from_item(i, rooms, walls_at) for i in loose]
-    return tuple(p for p in found if p is not None)
+    passages += [_from_item(i, rooms, walls_at) for i in loose]
+    return tuple(p for p in passages if p is not None)
 
 
 def _from_opening(
@@ -199,9 +199,9 @@ def _from_item(
     if not is_window:
         walls = walls_at(float(box.centre[1]))
         for k in level:
-            found = _doorway(corners, box.axes[:, k] * [1, 0, 1], walls)
-            if found is not None:
-                corners, normal = found, box.axes[:, k]
+            doorway = _doorway(corners, box.axes[:, k] * [1, 0, 1], walls)
+            if doorway is not None:
+                corners, normal = doorway, box.axes[:, k]
                 break
     return _passage(item.id, item.id, item.level_id, is_window, corners, normal, rooms, walls_at)
 
@@ -315,13 +315,13 @@ def _room_at(
 
 def _half_wall(centre: F64, out: F64, along: F64, width: float, walls: BaseGeometry) -> float:
     # Go out from the middle plane through the wall: in the hole, and beside it where it is cut.
-    found = []
+    lengths = []
     for beside in (0.0, width / 2 + 0.05, -width / 2 - 0.05):
         start = (centre + along * beside)[[0, 2]]
         way = shapely.LineString([start, start + out[[0, 2]] * _MOST_HALF_WALL_M])
         for part in shapely.get_parts(shapely.intersection(way, walls)):
             if shapely.distance(part, shapely.Point(start)) < 1e-6 and part.length > 0.005:
-                found.append(float(part.length))
-        if found and beside == 0.0:
+                lengths.append(float(part.length))
+        if lengths and beside == 0.0:
             break
-    return min(found, default=_HALF_WALL_M)
+    return min(lengths, default=_HALF_WALL_M)

@@ -52,7 +52,7 @@ def room_faces(
     `with_things`.
     """
     order = sorted(range(len(areas)), key=lambda k: (areas[k].area, k))
-    found: dict[int, list[WallFace]] = {}
+    faces: dict[int, list[WallFace]] = {}
     for plane in planes:
         s, y = plane.corners[:, :, 0], plane.corners[:, :, 1]
         s0, n = float(s.min()), max(int((s.max() - s.min()) / CELL_M), 1)
@@ -81,25 +81,25 @@ def room_faces(
                     clear,
                     plane.recess(first, end - start),
                 )
-                found.setdefault(k, []).append(face)
-    return found
+                faces.setdefault(k, []).append(face)
+    return faces
 
 
 def _rooms_before(
     plane: WallPlane, columns: F64, rooms: Sequence[int], areas: Sequence[BaseGeometry]
 ) -> list[int]:
-    found = np.full(len(columns), -1)
+    rooms_found = np.full(len(columns), -1)
     for out_m in _IN_FRONT_M:
         places = plane.world(columns, out_m)
         for k in rooms:
-            open_ = found < 0
+            open_ = rooms_found < 0
             x0, z0, x1, z1 = areas[k].bounds if not areas[k].is_empty else (1.0, 1.0, 0.0, 0.0)
             open_ &= (places[:, 0] >= x0) & (places[:, 0] <= x1)
             open_ &= (places[:, 1] >= z0) & (places[:, 1] <= z1)
             if open_.any():
                 inside = shapely.contains_xy(areas[k], places[open_, 0], places[open_, 1])
-                found[np.flatnonzero(open_)[inside]] = k
-    return found.tolist()
+                rooms_found[np.flatnonzero(open_)[inside]] = k
+    return rooms_found.tolist()
 
 
 def with_structure(

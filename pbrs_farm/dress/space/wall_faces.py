@@ -160,13 +160,13 @@ class WallPlane:
 
     def recess(self, s0: float, n_columns: int) -> F32:
         """(S,) depth behind the plane of the nearest triangle in each column from s0 on."""
-        found = np.full(n_columns, np.inf)
+        depths = np.full(n_columns, np.inf)
         s = (self.corners[:, :, 0] - s0) / CELL_M
         first = np.clip(np.floor(s.min(1) + 1e-6), 0, n_columns).astype(int)
         last = np.clip(np.ceil(s.max(1) - 1e-6), 0, n_columns).astype(int)
         for behind, i, j in zip(self.behind, first, last, strict=True):
-            found[i:j] = np.minimum(found[i:j], behind)
-        return np.where(np.isfinite(found), found, 0.0).astype(np.float32)
+            depths[i:j] = np.minimum(depths[i:j], behind)
+        return np.where(np.isfinite(depths), depths, 0.0).astype(np.float32)
 
     def world(self, s: F64, out_m: float) -> F64:
         """(N, 2) plan places at s (N,) along the plane and out_m before it."""
@@ -181,7 +181,7 @@ class WallPlane:
         """
         ss = s0 + (np.arange(shape[1]) + 0.5) * CELL_M
         yy = y0 + (np.arange(shape[0]) + 0.5) * CELL_M
-        found = np.zeros(shape, bool)
+        mask = np.zeros(shape, bool)
         for (sa, ya), (sb, yb), (sc, yc) in self.corners:
             # Look at the cells in the triangle's bounds.
             i0, i1 = np.searchsorted(yy, [min(ya, yb, yc), max(ya, yb, yc)])
@@ -194,8 +194,8 @@ class WallPlane:
             ]
             positive = (sides[0] >= -1e-9) & (sides[1] >= -1e-9) & (sides[2] >= -1e-9)
             negative = (sides[0] <= 1e-9) & (sides[1] <= 1e-9) & (sides[2] <= 1e-9)
-            found[i0:i1, j0:j1] |= positive | negative
-        return found
+            mask[i0:i1, j0:j1] |= positive | negative
+        return mask
 
 
 def wall_planes(walls: Sequence[Item]) -> Iterator[WallPlane]:
@@ -207,11 +207,11 @@ def wall_planes(walls: Sequence[Item]) -> Iterator[WallPlane]:
     """
     corners, owner = [np.zeros((0, 3, 3))], [np.zeros(0, np.int64)]
     for number, wall in enumerate(walls):
-        own = item_triangles(wall)
-        if len(own) and not _is_closed(own):
-            own = np.concatenate([own, own[:, ::-1]])
-        corners.append(own)
-        owner.append(np.full(len(own), number))
+        wall_corners = item_triangles(wall)
+        if len(wall_corners) and not _is_closed(wall_corners):
+            wall_corners = np.concatenate([wall_corners, wall_corners[:, ::-1]])
+        corners.append(wall_corners)
+        owner.append(np.full(len(wall_corners), number))
     triangles, owners = np.concatenate(corners), np.concatenate(owner)
     vectors = area_vectors(triangles)
     areas = np.linalg.norm(vectors, axis=1)
@@ -219,9 +219,9 @@ def wall_planes(walls: Sequence[Item]) -> Iterator[WallPlane]:
     # Keep upright triangles; slivers say nothing of their plane.
     upright = (np.abs(normals[:, 1]) < 0.02) & (areas > 1e-8)
     triangles, owners, normals, areas = (x[upright] for x in (triangles, owners, normals, areas))
-    left = np.ones(len(triangles), bool)
+    unassigned = np.ones(len(triangles), bool)
     for first in np.argsort(-areas, kind="stable"):
-        if not left[first]:
+        if not unassigned[first]:
             continue
         if areas[first] < 2 * _LEAST_AREA_M2:
             break
@@ -230,8 +230,8 @@ def wall_planes(walls: Sequence[Item]) -> Iterator[WallPlane]:
         normal = normals[first] * [1, 0, 1]
         normal = normal / np.linalg.norm(normal)
         out = (triangles - triangles[first, 0]) @ normal
-        same = left & (np.abs(out).max(1) < _SAME_PLANE_M) & (normals @ normal > 0.99)
-        left &= ~same
+        same = unassigned & (np.abs(out).max(1) < _SAME_PLANE_M) & (normals @ normal > 0.99)
+        unassigned &= ~same
         along = np.array([normal[2], 0.0, -normal[0]])
         # The face is where the outermost of them is.
         nearest = triangles[first, 0] + normal * float(out[same].max())

@@ -236,7 +236,7 @@ def _accent_runs(
                 lengths = planes.setdefault(run.room, {})
                 lengths[plane] = lengths.get(plane, 0.0) + run.end - run.start
                 runs.append(((index, k, r), run.room, plane))
-    longest = {room: max(found, key=lambda p: found[p]) for room, found in planes.items()}
+    longest = {room: max(by_plane, key=lambda p: by_plane[p]) for room, by_plane in planes.items()}
     return frozenset(key for key, room, plane in runs if longest[room] == plane)
 
 
@@ -277,9 +277,9 @@ def _paint_boards(
             continue
         finish = next(finishes[k] for k in rooms if finishes[k].walls is not None)
         board_finish = _board_finish(house, home, scheme, finish)
-        made = item_with_finish(house, item, board_finish)
-        if made is not item:
-            house.change(index, made, PASS)
+        painted = item_with_finish(house, item, board_finish)
+        if painted is not item:
+            house.change(index, painted, PASS)
 
 
 def _rooms_before(board: Item, finder: RoomFinder) -> list[int]:
@@ -304,6 +304,6 @@ def _board_finish(
         return scheme.trim
     if floor is None or floor.pattern.family not in WOOD_FLOORS:
         return scheme.trim
-    made: PatternMaterial = pattern_material(house, floor.pattern)
-    r, g, b = srgb_from_linear(np.array(made.mean_rgb)).tolist()
+    material: PatternMaterial = pattern_material(house, floor.pattern)
+    r, g, b = srgb_from_linear(np.array(material.mean_rgb)).tolist()
     return Finish("skirting wood", (r, g, b))

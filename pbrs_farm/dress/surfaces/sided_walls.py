@@ -75,17 +75,17 @@ class RoomFinder:
 
     def at(self, places: F64, low_y: float, high_y: float) -> Ints:
         """(N,) index of the room at plan places (N, 2) that shares heights low_y..high_y; -1 none."""
-        found = np.full(len(places), -1, np.int64)
+        room_index = np.full(len(places), -1, np.int64)
         for k in self.order:
             room = self.rooms[k]
             shared = min(high_y, room.ceiling_y) - max(low_y, room.floor_y)
             if shared < min(_LEAST_HEIGHT_M, 0.5 * (high_y - low_y)):
                 continue
-            if not (found < 0).any():
+            if not (room_index < 0).any():
                 break
             inside = shapely.contains_xy(self.areas[k], places[:, 0], places[:, 1])
-            found[(found < 0) & inside] = k
-        return found
+            room_index[(room_index < 0) & inside] = k
+        return room_index
 
 
 def sided_wall(wall: Item, finder: RoomFinder) -> SidedWall:
@@ -132,12 +132,12 @@ def _side_of_plane(corners: F64, normal: F64, offset: float, finder: RoomFinder)
     # Look for rooms before the middle of each step.
     n = max(1, round((high - low) / _STEP_M))
     middles = low + (np.arange(n) + 0.5) * (high - low) / n
-    found = np.full(n, -1, np.int64)
+    room_index = np.full(n, -1, np.int64)
     for out_m in _BEFORE_M:
         points = middles[:, None] * along + (offset + out_m) * normal
-        there = finder.at(points[:, [0, 2]], low_y, high_y)
-        found = np.where(found < 0, there, found)
-    return Side(along, normal, offset, low_y, high_y, _runs_of_rooms(found, low, high))
+        rooms_here = finder.at(points[:, [0, 2]], low_y, high_y)
+        room_index = np.where(room_index < 0, rooms_here, room_index)
+    return Side(along, normal, offset, low_y, high_y, _runs_of_rooms(room_index, low, high))
 
 
 def _runs_of_rooms(found: Ints, low: float, high: float) -> tuple[SideRun, ...]:
@@ -145,9 +145,9 @@ def _runs_of_rooms(found: Ints, low: float, high: float) -> tuple[SideRun, ...]:
     if (found < 0).all():
         return (SideRun(None, low, high),)
     step = (high - low) / len(found)
-    known = np.flatnonzero(found >= 0)
+    indices = np.flatnonzero(found >= 0)
     # Give each step the nearest step's room; a long stretch outdoors stays outdoors.
-    nearest = known[np.abs(np.arange(len(found))[:, None] - known[None]).argmin(1)]
+    nearest = indices[np.abs(np.arange(len(found))[:, None] - indices[None]).argmin(1)]
     far = np.abs(np.arange(len(found)) - nearest) * step > 0.6
     rooms = np.where(far, -1, found[nearest])
     edges = [0, *(np.flatnonzero(np.diff(rooms)) + 1).tolist(), len(rooms)]

@@ -31,7 +31,7 @@ def has_boards(house: House) -> bool:
 
 def wall_plans(house: House) -> tuple[tuple[BaseGeometry, float, float], ...]:
     """The plan area of every wall, and its lowest and highest y; walls without thickness left out."""
-    found = []
+    plans = []
     for item in house.items:
         if item.kind is not ItemKind.WALL or not item.n_faces:
             continue
@@ -39,8 +39,8 @@ def wall_plans(house: House) -> tuple[tuple[BaseGeometry, float, float], ...]:
         area = plan_area(corners, upright=False)
         low, high = float(corners[..., 1].min()), float(corners[..., 1].max())
         if not area.is_empty and area.area > 1e-4:
-            found.append((area, low, high))
-    return tuple(found)
+            plans.append((area, low, high))
+    return tuple(plans)
 
 
 def skirting_board(
@@ -86,7 +86,7 @@ def skirting_board(
 
 def _doors(house: House, room: Room, height_m: float) -> BaseGeometry:
     # Plan areas of the openings that reach down to the board.
-    found = []
+    areas = []
     for opening in house.openings:
         points = opening.cutter.positions
         if not len(points) or opening.level_id != room.level_id:
@@ -94,8 +94,8 @@ def _doors(house: House, room: Room, height_m: float) -> BaseGeometry:
         if float(points[:, 1].min()) > room.floor_y + height_m:
             continue
         hull = shapely.MultiPoint(points[:, [0, 2]].astype(np.float64)).convex_hull
-        found.append(hull.buffer(_THICK_M + _BESIDE_DOOR_M, join_style="mitre"))
-    return shapely.union_all(found)
+        areas.append(hull.buffer(_THICK_M + _BESIDE_DOOR_M, join_style="mitre"))
+    return shapely.union_all(areas)
 
 
 def _pieces_of_strip(strip: BaseGeometry, solid: BaseGeometry) -> Iterator[shapely.Polygon]:

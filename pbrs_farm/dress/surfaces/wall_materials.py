@@ -59,13 +59,13 @@ def painted_wall(item: Item, wall: SidedWall, looks: LooksOf, rest: RestOfWall) 
     for normal, offset in _cuts(wall, looks) if wall.is_closed else ():
         rows, parents = cut_triangles(rows, normal, offset)
         surface, side = surface[parents], side[parents]
-    found: list[Surface] = []
-    left = np.ones(len(rows), bool)
+    surfaces: list[Surface] = []
+    unassigned = np.ones(len(rows), bool)
     for part in _parts_by_look(rows, side, wall, looks):
-        left &= ~part.members
+        unassigned &= ~part.members
         for n in np.unique(surface[part.members]).tolist():
             mine = rows[part.members & (surface == n)]
-            found.append(
+            surfaces.append(
                 _surface_of_rows(
                     item.surfaces[n].name, part.material.number, _in_metres(mine, part)
                 )
@@ -73,17 +73,17 @@ def painted_wall(item: Item, wall: SidedWall, looks: LooksOf, rest: RestOfWall) 
     # Horizontal faces get plaster; the others are unchanged.
     height = unit_normals(rows[..., :3])[:, 1]
     for mine, name, material in (
-        (left & (height < -_LEVEL), REVEAL, rest.foot),
-        (left & (height > _LEVEL), "top", rest.flat),
+        (unassigned & (height < -_LEVEL), REVEAL, rest.foot),
+        (unassigned & (height > _LEVEL), "top", rest.flat),
     ):
-        left &= ~mine
+        unassigned &= ~mine
         if mine.any():
-            found.append(_surface_of_rows(name, material, rows[mine]))
+            surfaces.append(_surface_of_rows(name, material, rows[mine]))
     for n, source in enumerate(item.surfaces):
-        mine = left & (surface == n)
+        mine = unassigned & (surface == n)
         if mine.any():
-            found.append(_surface_of_rows(source.name, source.material, rows[mine]))
-    return replace(item, surfaces=tuple(found))
+            surfaces.append(_surface_of_rows(source.name, source.material, rows[mine]))
+    return replace(item, surfaces=tuple(surfaces))
 
 
 def _cuts(wall: SidedWall, looks: LooksOf) -> Iterator[tuple[F64, float]]:
@@ -94,9 +94,9 @@ def _cuts(wall: SidedWall, looks: LooksOf) -> Iterator[tuple[F64, float]]:
             look = looks.get((k, r))
             if look is not None and look.low is not None:
                 levels.append(look.low_y)
-            other = looks.get((k, r - 1)) if r else look
+            before = looks.get((k, r - 1)) if r else look
             ends = side.runs[0].start + _LEAST_CUT_M, side.runs[-1].end - _LEAST_CUT_M
-            if r and other != look and ends[0] < run.start < ends[1]:
+            if r and before != look and ends[0] < run.start < ends[1]:
                 yield side.along, run.start
     for y in sorted(set(levels)):
         yield np.array([0.0, 1.0, 0.0]), y
@@ -107,7 +107,7 @@ def _parts_by_look(
 ) -> Iterator[_SidePart]:
     middles = rows[..., :3].mean(1)
     for k, plane in enumerate(wall.sides):
-        here = side == k
+        on_side = side == k
         s = middles @ plane.along
         last = len(plane.runs) - 1
         for r, run in enumerate(plane.runs):
@@ -115,7 +115,7 @@ def _parts_by_look(
             if look is None:
                 continue
             # The first and the last run reach to the ends, however rounded.
-            mine = here & ((s >= run.start) | (r == 0)) & ((s < run.end) | (r == last))
+            mine = on_side & ((s >= run.start) | (r == 0)) & ((s < run.end) | (r == last))
             below = mine & (middles[:, 1] < look.low_y) & (look.low is not None)
             if look.low is not None and below.any():
                 yield _SidePart(below, look.low, plane, run.start, look.floor_y)

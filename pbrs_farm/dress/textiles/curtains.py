@@ -96,8 +96,10 @@ def window_side(
     sticks_out = 0.0
     if number is not None and len(space.points[number]):
         sticks_out = max(float(((space.points[number] - origin) @ inward).max()), 0.0)
-    seen = WindowSide(window, side, origin, along, inward, room.room.floor_y, ceiling, sticks_out)
-    return None if _is_dressed(house, space, seen) else seen
+    candidate = WindowSide(
+        window, side, origin, along, inward, room.room.floor_y, ceiling, sticks_out
+    )
+    return None if _is_dressed(house, space, candidate) else candidate
 
 
 def _is_dressed(house: MutableHouse, space: HouseSpace, seen: WindowSide) -> bool:
@@ -139,9 +141,9 @@ def hang_curtains(
     cover = float(rng.uniform(0.15, 0.25)) * window.width * (1.5 if cloth.is_draped else 1.0)
     for sign in (-1, 1):
         widths = _DRAPED_M + _BESIDE_M if cloth.is_draped else _BESIDE_M
-        found = _panel_place(space, room, seen, sign, (cover, widths), rod_y, out, house)
-        if found is not None:
-            panels.append(found)
+        panel = _panel_place(space, room, seen, sign, (cover, widths), rod_y, out, house)
+        if panel is not None:
+            panels.append(panel)
     # One panel alone looks as if the other had been stolen.
     if len(panels) < 2:
         house.refused[f"{PASS}: no room on both sides of a window"] += 1
@@ -217,8 +219,8 @@ def is_flat(free: BaseGeometry, seen: WindowSide, x: float) -> bool:
     free is the plan area without walls. Ask it on both sides of the cloth, lest a rod
     end in a corner.
     """
-    at = seen.origin + seen.along * x
-    before, behind = at + seen.inward * _FLAT_M, at - seen.inward * _FLAT_M
+    position = seen.origin + seen.along * x
+    before, behind = position + seen.inward * _FLAT_M, position - seen.inward * _FLAT_M
     return bool(
         shapely.contains_xy(free, before[0], before[2])
         and not shapely.contains_xy(free, behind[0], behind[2])
@@ -300,12 +302,12 @@ def hang_blind(
     half = window.width / 2 + 0.03
     drop = float(rng.uniform(0.12, 0.5)) * (window.top_y - window.bottom_y) + top - window.top_y
     low, high = seen.bounds(-half, half, top - drop, top, z + 0.07)
-    own = [n for n, i in enumerate(house.items) if i.id == window.item_id]
+    window_items = [n for n, i in enumerate(house.items) if i.id == window.item_id]
     free = shapely.difference(room.area, room.walls)
     if not (is_flat(free, seen, half) and is_flat(free, seen, -half)):
         house.refused[f"{PASS}: the wall bends beside a window"] += 1
         return False
-    if z > 0.1 or top < window.top_y + 0.01 or not space.is_free(low, high, without=own):
+    if z > 0.1 or top < window.top_y + 0.01 or not space.is_free(low, high, without=window_items):
         house.refused[f"{PASS}: no place for a blind"] += 1
         return False
     calm = mix(style.textiles[0], (0.92, 0.91, 0.88), float(rng.uniform(0.3, 0.9)))
@@ -362,13 +364,13 @@ def _add_at_window(
     x: float,
     y: float,
 ) -> Item:
-    at = seen.origin + seen.along * x + seen.inward * GAP_M
-    at[1] = y
+    position = seen.origin + seen.along * x + seen.inward * GAP_M
+    position[1] = y
     placed = replace(piece, place=Place.WALL)
     item = house.placed(
         placed,
         shape,
-        at,
+        position,
         seen.turn_rad,
         item_id=next_id(house, PASS),
         room_id=room.room.id,

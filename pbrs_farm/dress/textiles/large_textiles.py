@@ -107,8 +107,8 @@ def _spot_near_basin(
     best: tuple[float, int, float] | None = None
     for k, face in enumerate(hanging.faces):
         for s in face.starts(width + 0.06, heights[0], heights[1] + 0.05, depth + 0.15):
-            at = face.point(float(s) + width / 2, heights[1])
-            away = min((float(np.linalg.norm((at - b)[[0, 2]])) for b in basins), default=0.0)
+            position = face.point(float(s) + width / 2, heights[1])
+            away = min((float(np.linalg.norm((position - b)[[0, 2]])) for b in basins), default=0.0)
             if away < _FAR_M and (best is None or away < best[0]):
                 best = (away, k, float(s) + 0.03)
     return None if best is None else (best[1], best[2])
@@ -148,14 +148,14 @@ def _dress_windows(
         if None not in window.room_ids and not _looks_out(house, window.room_ids):
             continue
         space = house_space(house)
-        seen = window_side(house, space, space.room(room.room.id), window)
-        if seen is None:
+        side = window_side(house, space, space.room(room.room.id), window)
+        if side is None:
             continue
-        own = np.random.default_rng(look)
-        done = cloth is not None and hang_curtains(house, space, room, seen, cloth, own)
+        cloth_rng = np.random.default_rng(look)
+        done = cloth is not None and hang_curtains(house, space, room, side, cloth, cloth_rng)
         # Where no cloth fits beside it, people still want to close it.
         if not done and (blinds or cloth is not None):
-            hang_blind(house, space, room, seen, style, own)
+            hang_blind(house, space, room, side, style, cloth_rng)
 
 
 def _looks_out(house: MutableHouse, room_ids: tuple[str | None, str | None]) -> bool:

@@ -149,18 +149,18 @@ def _by_bed(
     # Across the bed under its foot, else a runner along a side or at the foot.
     if half[0] > 0.6 and rng.random() < 0.65:
         wide = 2 * float(half[0]) + float(rng.uniform(0.7, 1.1))
-        at = box.centre + front * float(half[2]) * 0.45
+        position = box.centre + front * float(half[2]) * 0.45
         narrow = 2 * float(half[0]) + 0.3
         sizes = [(w, min(long, 3.0)) for long in (wide, narrow) for w in (2.0, 1.7, 1.4)]
-        if _lay_largest(house, space, room, style, rng, at, turn, sizes, from_wall=0.1):
+        if _lay_largest(house, space, room, style, rng, position, turn, sizes, from_wall=0.1):
             return
     for sign in (1.0, -1.0):
-        at = box.centre + right * sign * (float(half[0]) + 0.42)
-        if _lay_largest(house, space, room, style, rng, at, turn + np.pi / 2,
+        position = box.centre + right * sign * (float(half[0]) + 0.42)
+        if _lay_largest(house, space, room, style, rng, position, turn + np.pi / 2,
             [(0.7, 1.5), (0.6, 1.1)], from_wall=0.05):
             return
-    at = box.centre + front * (float(half[2]) + 0.45)
-    _lay_largest(house, space, room, style, rng, at, turn, [(0.7, 1.4), (0.6, 1.0)], from_wall=0.1)
+    position = box.centre + front * (float(half[2]) + 0.45)
+    _lay_largest(house, space, room, style, rng, position, turn, [(0.7, 1.4), (0.6, 1.0)], from_wall=0.1)
 
 
 def _by_table(
@@ -185,14 +185,14 @@ def _by_table(
 def _bath_mat(
     house: MutableHouse, space: HouseSpace, room: RoomSpace, style: Style, rng: np.random.Generator
 ) -> None:
-    for wanted in (BATHTUB, SINK):
-        for number in _furniture_of_class(house, room, wanted):
+    for nyu40 in (BATHTUB, SINK):
+        for number in _furniture_of_class(house, room, nyu40):
             box = house.items[number].oriented_box
             for axis, sign in ((2, 1.0), (0, 1.0), (0, -1.0)):
                 out = box.axes[:, axis] * sign * [1, 0, 1]
-                at = box.centre + out * (float(box.half[axis]) + 0.3)
+                position = box.centre + out * (float(box.half[axis]) + 0.3)
                 turn = float(np.arctan2(out[0], out[2]))
-                if _lay_largest(house, space, room, style, rng, at, turn,
+                if _lay_largest(house, space, room, style, rng, position, turn,
                     [(0.5, 0.8), (0.45, 0.65)], from_wall=0.02, patterns=content().bath_mats,
                     forms=_MAT_FORMS, bare=True):
                     return
@@ -217,10 +217,10 @@ def _doormats(
         side = door.side_of(room.room.id)
         if side is None or None not in door.room_ids or door.width > 1.4:
             continue
-        at = door.face_point(side) + door.inward(side) * 0.38
+        position = door.face_point(side) + door.inward(side) * 0.38
         out = door.inward(side)
         turn = float(np.arctan2(out[0], out[2]))
-        _lay_largest(house, house_space(house), room, style, rng, at, turn,
+        _lay_largest(house, house_space(house), room, style, rng, position, turn,
             [(0.45, 0.75), (0.4, 0.6)], from_wall=0.05, patterns=content().door_mats,
             forms=("sharp", "sharp", "rounded", "half"), bare=True, at_doors=True)
 
@@ -254,14 +254,14 @@ def _lay_largest(house: MutableHouse, space: HouseSpace, room: RoomSpace, style:
     for width, length in sizes:
         for shift in ((0.0, 0.0), (0.15, 0.0), (-0.15, 0.0), (0.3, 0.0), (-0.3, 0.0), (0.0, 0.15),
             (0.0, -0.15)):
-            at = middle + _offset(turn, shift)
-            area = _rug_area(at, turn, width, length)
+            position = middle + _offset(turn, shift)
+            area = _rug_area(position, turn, width, length)
             if not shapely.contains(free, area) or shapely.intersects(taken, area):
                 continue
             if bare and not _is_bare(space, room, area):
                 continue
             piece, shape = rug(rng, width, length, style, tuple(patterns), forms)
-            where = np.array([at[0], room.room.floor_y + _GAP_M, at[2]])
+            where = np.array([position[0], room.room.floor_y + _GAP_M, position[2]])
             item: Item = house.placed(piece, shape, where, turn, item_id=next_id(house, PASS),
                 room_id=room.room.id, level_id=room.room.level_id, tags=(RUG_TAG,))
             house.add(item, PASS, piece)

@@ -60,14 +60,14 @@ def _tall_mirror(hanging: Hanging, rng: np.random.Generator, style: Style) -> No
     frame = frame_material(rng, style)
     if rng.random() < 0.35:
         diameter = float(rng.uniform(0.45, 0.75))
-        made, low = (
+        model, low = (
             content().things["round_mirror"](rng, style, diameter, frame),
             1.55 - diameter / 2,
         )
     else:
         width, height = float(rng.uniform(0.4, 0.6)), float(rng.uniform(1.1, 1.5))
-        made, low = mirror(width, height, frame, 0.03), 0.45
-    hang_anywhere(hanging, made, low, 0.4, rng)
+        model, low = mirror(width, height, frame, 0.03), 0.45
+    hang_anywhere(hanging, model, low, 0.4, rng)
 
 
 def hang_notes(hanging: Hanging, style: Style, share: float) -> None:
@@ -102,8 +102,8 @@ def _dial(rng: np.random.Generator, ground: Rgb) -> Srgb8Image:
         tip = [(160 + 320 * r * np.sin(a), 160 - 320 * r * np.cos(a)) for r in (inner, 0.465)]
         pen.line(tip, fill=ink, width=6 if n == 12 else 2)
         if numerals and n == 12:
-            at = (160 + 115 * np.sin(a), 160 - 115 * np.cos(a))
-            pen.text(at, str(k or 12), font=font, fill=ink, anchor="mm")
+            position = (160 + 115 * np.sin(a), 160 - 115 * np.cos(a))
+            pen.text(position, str(k or 12), font=font, fill=ink, anchor="mm")
     # Set the hands to some time of day.
     hour = float(rng.uniform(0, 12))
     for turn, length, width in ((hour / 12, 78, 9), (hour % 1.0, 118, 6)):
@@ -194,12 +194,12 @@ def _fit_beside_door(
     half = float(np.abs(shape.bounds[:, 0]).max()) + 0.02
     order = (1.0, -1.0) if rng.random() < 0.5 else (-1.0, 1.0)
     for sign in order:
-        at = door.face_point(side) + door.along * sign * (door.width / 2 + _CASING_M)
+        position = door.face_point(side) + door.along * sign * (door.width / 2 + _CASING_M)
         for k, face in enumerate(hanging.faces):
-            out = float(face.out_of(at[None])[0])
+            out = float(face.out_of(position[None])[0])
             if abs(out) > 0.06 or float(face.normal @ door.inward(side)) < 0.95:
                 continue
-            s = float(face.s_of(at[None])[0])
+            s = float(face.s_of(position[None])[0])
             if face.free_m(s - half, s + half, low, low + 0.1) > 0.03:
                 hanging.hang(piece, shape, k, s, low, margin_m=0.02)
                 return True

@@ -127,11 +127,11 @@ class Hanging:
         corners = np.array(
             [[x, low[1], z] for x in (low[0], high[0]) for z in (low[2], high[2])], np.float64
         )
-        for k, other in enumerate(self.faces):
-            out, s = other.out_of(corners), other.s_of(corners)
-            is_near = -_DEEP_M < out.min() < FAR_M and s.max() > 0 and s.min() < other.length
+        for k, neighbour in enumerate(self.faces):
+            out, s = neighbour.out_of(corners), neighbour.s_of(corners)
+            is_near = -_DEEP_M < out.min() < FAR_M and s.max() > 0 and s.min() < neighbour.length
             if k != face and is_near:
-                self.faces[k] = other.limited(
+                self.faces[k] = neighbour.limited(
                     float(s.min()),
                     float(s.max()),
                     float(low[1]),
@@ -172,9 +172,9 @@ def faces_behind(
 ) -> list[tuple[int, float, float]]:
     """(face, s0, s1) of every wall face behind a box low..high (3,), largest first."""
     corners = np.array([[x, 0.0, z] for x in (low[0], high[0]) for z in (low[2], high[2])])
-    found = []
+    spans = []
     for k, face in enumerate(room.faces):
         out, s = face.out_of(corners), face.s_of(corners)
         if -0.1 < out.min() < reach_m and s.max() > 0 and s.min() < face.length:
-            found.append((k, float(s.min()), float(s.max())))
-    return sorted(found, key=lambda f: f[1] - f[2])
+            spans.append((k, float(s.min()), float(s.max())))
+    return sorted(spans, key=lambda f: f[1] - f[2])

@@ -73,14 +73,14 @@ def framed(
     low, high = np.array([-width / 2, 0.0]), np.array([width / 2, height])
     shown = _printed(print_)
     parts = [(content().ring("frame", low, high, frame_m, depth), frame)]
-    at = depth - 0.006
+    z = depth - 0.006
     mat = float(rng.uniform(0.1, 0.17)) * min(width, height) if rng.random() < 0.6 else 0.0
     inner_low, inner_high = low + frame_m, high - frame_m
     if mat:
-        card = content().ring("mat", inner_low, inner_high, mat, at)
+        card = content().ring("mat", inner_low, inner_high, mat, z)
         parts.append((card, plain("mat", (0.93, 0.92, 0.89), 0.9)))
-        inner_low, inner_high, at = inner_low + mat - 0.002, inner_high - mat + 0.002, at - 0.002
-    face, back = faced_slab("print", inner_low, inner_high, (0.001, at))
+        inner_low, inner_high, z = (inner_low + mat - 0.002, inner_high - mat + 0.002, z - 0.002)
+    face, back = faced_slab("print", inner_low, inner_high, (0.001, z))
     parts += [(face, shown), (back, plain("card", (0.6, 0.52, 0.42), 0.9))]
     return hanging_piece("framed_picture", "picture_frame", PICTURE, parts, [print_])
 

@@ -87,14 +87,14 @@ def _hang_cupboards(
                 continue
             is_open = rng.random() < _OPEN
             if is_open:
-                made = content().things["open_cupboard"](
+                cupboard = content().things["open_cupboard"](
                     rng, style, body, w, height, _DEEP_M - 0.04
                 )
             else:
-                given = (body, front, w, height, _DEEP_M, 2 if w > 0.62 else 1, form)
-                made = content().things["wall_cupboard"](rng, style, *given)
+                options = (body, front, w, height, _DEEP_M, 2 if w > 0.62 else 1, form)
+                cupboard = content().things["wall_cupboard"](rng, style, *options)
             tags = ("support",) if is_open else ()
-            hanging.hang(*made, k, s + w / 2, low, margin_m=0.0, tags=tags)
+            hanging.hang(*cupboard, k, s + w / 2, low, margin_m=0.0, tags=tags)
             s += w + 0.001
 
 

@@ -88,9 +88,9 @@ class Gallery:
     def __init__(self, house: MutableHouse, catalogue: Catalogue, style: Style) -> None:
         self._rng = house.rng("prints")
         self._style = style
-        own = [p for p in catalogue.pictures if p.group == PRINTS]
-        order = house.rng("prints", "own").permutation(len(own))
-        self._own = [own[int(k)] for k in order]
+        prints = [p for p in catalogue.pictures if p.group == PRINTS]
+        order = house.rng("prints", "own").permutation(len(prints))
+        self._own = [prints[int(k)] for k in order]
         self._prints: list[Print] = []
         self._families: Counter[str] = Counter()
 
@@ -137,26 +137,26 @@ def hang_pictures(
     room = hanging.room
     low, high = WANTS[room.kind].pictures, WANTS[room.kind].most_pictures
     rng = hanging.house.rng("pictures", room.room.id)
-    wanted = int(np.floor(rng.integers(low, high + 1) * share + rng.random()))
+    n_wanted = int(np.floor(rng.integers(low, high + 1) * share + rng.random()))
     taste = room_style(style, rng)
     frame = frame_material(rng, taste)
-    left = MOST_PICTURES
+    n_left = MOST_PICTURES
     for spot in _spots(hanging, space, rng):
-        if wanted <= 0 or left <= 0:
+        if n_wanted <= 0 or n_left <= 0:
             return
-        group = _group_for(rng, spot, hanging, left)
+        group = _group_for(rng, spot, hanging, n_left)
         if group is None:
             continue
         _hang_group(rng, hanging, spot, group, gallery, taste, frame)
-        left -= len(group[0].frames)
-        wanted -= 1
-    if wanted > 0:
-        hanging.house.refused["walls: no free wall for pictures"] += wanted
+        n_left -= len(group[0].frames)
+        n_wanted -= 1
+    if n_wanted > 0:
+        hanging.house.refused["walls: no free wall for pictures"] += n_wanted
 
 
 def _spots(hanging: Hanging, space: HouseSpace, rng: np.random.Generator) -> list[PictureSpot]:
     """Places for pictures, best first: over furniture, then the middles of free stretches."""
-    room, found = hanging.room, []
+    room, spots = hanging.room, []
     for number in room.items:
         item, (low, high) = hanging.house.items[number], space.bounds[number]
         liked = _BENEATH.get(item.nyu40, 0.0)
@@ -167,7 +167,7 @@ def _spots(hanging: Hanging, space: HouseSpace, rng: np.random.Generator) -> lis
             if s1 - s0 > 0.5:
                 width = (s1 - s0) * float(rng.uniform(0.55, 0.8))
                 score = liked + 0.3 * (s1 - s0) + float(rng.uniform(0, 0.6))
-                found.append(PictureSpot(score, k, (s0 + s1) / 2, width, float(high[1])))
+                spots.append(PictureSpot(score, k, (s0 + s1) / 2, width, float(high[1])))
     y0, y1 = hanging.floor_y + 1.3, hanging.floor_y + 1.8
     for k, face in enumerate(hanging.faces):
         starts = face.starts(0.3, y0, y1, IN_FRONT_M)
@@ -178,8 +178,8 @@ def _spots(hanging: Hanging, space: HouseSpace, rng: np.random.Generator) -> lis
             for j in range(n):
                 s = first + length * (j + 0.5) / n
                 score = 0.25 * min(length / n, 2.5) + float(rng.uniform(0, 0.7))
-                found.append(PictureSpot(score, k, s, min(length / n - 0.2, 1.5), None))
-    return sorted(found, key=lambda spot: -spot.score)
+                spots.append(PictureSpot(score, k, s, min(length / n - 0.2, 1.5), None))
+    return sorted(spots, key=lambda spot: -spot.score)
 
 
 def _stretches(starts: F64) -> list[tuple[float, float]]:
@@ -248,12 +248,12 @@ def _hang_group(
     pictures, left, bottom = group
     # A group of pictures has the same kind of frame.
     kind = str(rng.choice(["framed", "canvas", "poster"], p=[0.68, 0.22, 0.1]))
-    own, hung = int(rng.integers(1 << 30)), list[str]()
+    group_seed, hung = int(rng.integers(1 << 30)), list[str]()
     for x, y, w, h in pictures.frames:
         shown = gallery.print_for(w / h, hung)
         hung.append(shown.texture.id)
         piece, shape = _framed_picture(
-            np.random.default_rng(own), kind, (w, h), shown, style, frame
+            np.random.default_rng(group_seed), kind, (w, h), shown, style, frame
         )
         middle = left + x + w / 2
         hanging.hang(piece, shape, spot.face, middle, bottom + y, margin_m=0.0)
@@ -288,7 +288,7 @@ def hang_pin_board(hanging: Hanging, space: HouseSpace, style: Style, share: flo
         return
     width, height = float(rng.uniform(0.55, 0.95)), float(rng.uniform(0.42, 0.65))
     frame = frame_material(rng, style)
-    made = content().things["pin_board"](rng, style, width, height, frame)
+    board = content().things["pin_board"](rng, style, width, height, frame)
     low = hanging.floor_y + _LOW_M
     places = _over_desks(hanging, space)
     if kind is not RoomKind.BEDROOM:
@@ -299,16 +299,16 @@ def hang_pin_board(hanging: Hanging, space: HouseSpace, style: Style, share: flo
         ]
     for k, s in places:
         if hanging.faces[k].free_m(s - width / 2, s + width / 2, low, low + height) >= IN_FRONT_M:
-            hanging.hang(*made, k, s, low)
+            hanging.hang(*board, k, s, low)
             return
     hanging.house.refused["walls: no free wall for a pin board"] += 1
 
 
 def _over_desks(hanging: Hanging, space: HouseSpace) -> list[tuple[int, float]]:
     """(face, s) of the wall behind the middle of each desk, or table in a room with a bed."""
-    found = []
+    spots = []
     for number in hanging.room.items:
         item, (low, high) = hanging.house.items[number], space.bounds[number]
         if item.nyu40 in (DESK, TABLE) and 0.6 < high[1] - hanging.floor_y < 0.95:
-            found += [(k, (s0 + s1) / 2) for k, s0, s1 in faces_behind(hanging.room, low, high)[:1]]
-    return found
+            spots += [(k, (s0 + s1) / 2) for k, s0, s1 in faces_behind(hanging.room, low, high)[:1]]
+    return spots

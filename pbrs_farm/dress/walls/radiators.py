@@ -44,11 +44,11 @@ def hang_radiators(hanging: Hanging, style: Style, share: float) -> None:
         if side is None or not _LEAST_SILL_M <= sill <= 1.4:
             continue
         height = min(sill - _LOW_M - _SPACE_M, 0.6)
-        at = window.face_point(side)
+        spot = window.face_point(side)
         for k, face in enumerate(hanging.faces):
-            if face.normal @ window.inward(side) < 0.99 or abs(face.out_of(at[None])[0]) > 0.03:
+            if face.normal @ window.inward(side) < 0.99 or abs(face.out_of(spot[None])[0]) > 0.03:
                 continue
-            s, width = float(face.s_of(at[None])[0]), window.width
+            s, width = float(face.s_of(spot[None])[0]), window.width
             if _hang_below(hanging, k, s, (width, height), make):
                 break
 
@@ -71,7 +71,7 @@ def _hang_below(
             hanging.faces[face].free_m(s - half, s + half, hanging.floor_y + 0.05, low + height)
             > 0.3
         ):
-            made = make(wide, height)
-            hanging.hang(*made, face, s, low, margin_m=0.02)
+            model = make(wide, height)
+            hanging.hang(*model, face, s, low, margin_m=0.02)
             return True
     return False

@@ -29,24 +29,24 @@ def hang_shelves(hanging: Hanging, style: Style, share: float) -> None:
     kind = hanging.room.kind
     rng = hanging.house.rng("shelf", hanging.room.room.id)
     low, high = WANTS[kind].shelves, WANTS[kind].most_shelves
-    wanted = int(np.floor(rng.integers(low, high + 1) * share + rng.random()))
+    n_shelves = int(np.floor(rng.integers(low, high + 1) * share + rng.random()))
     is_bath = kind is RoomKind.BATHROOM
     if is_bath and rng.random() < _RADIATORS * share:
         hang_anywhere(hanging, content().things["towel_radiator"](rng, style), _LADDER_M, 0.2, rng)
     wood = plain(f"shelf {style.wood.name}", style.wood.mean, 0.4)
     board = wood if rng.random() < 0.6 else plain("shelf white", (0.9, 0.9, 0.88), 0.4)
     # Shelves of one room share a design, with several widths.
-    for _ in range(wanted):
+    for _ in range(n_shelves):
         longest = 0.7 if is_bath else 1.7
         width = float(rng.uniform(0.35 if is_bath else 0.6, longest))
-        own = int(rng.integers(1 << 30))
+        shelf_seed = int(rng.integers(1 << 30))
         for factor in (1.0, 0.65, 0.45):
-            made, low_m, above_m = _shelf(
-                np.random.default_rng(own), style, board, width * factor, is_bath=is_bath
+            shelf, low_m, above_m = _shelf(
+                np.random.default_rng(shelf_seed), style, board, width * factor, is_bath=is_bath
             )
-            depth = float(made[1].bounds[1, 2])
+            depth = float(shelf[1].bounds[1, 2])
             if hang_anywhere(
-                hanging, made, low_m, depth + _BEFORE_M, rng, above_m=above_m, tags=("support",)
+                hanging, shelf, low_m, depth + _BEFORE_M, rng, above_m=above_m, tags=("support",)
             ):
                 break
 
@@ -66,13 +66,13 @@ def _shelf(
         )
     if kind < 0.75:
         height = float(rng.choice([0.34, 0.34, 0.62]))
-        made = content().things["open_cupboard"](rng, style, board, width, height, depth)
-        return made, float(rng.uniform(1.35, 1.55)), _ABOVE_M
+        shelf = content().things["open_cupboard"](rng, style, board, width, height, depth)
+        return shelf, float(rng.uniform(1.35, 1.55)), _ABOVE_M
     n_doors = max(1, round(width / 0.45))
     height = float(rng.uniform(0.38, 0.6))
-    given = (board, board, width, height, depth + 0.06, n_doors, int(rng.integers(CUPBOARD_FORMS)))
-    made = content().things["wall_cupboard"](rng, style, *given)
-    return made, float(rng.uniform(1.4, 1.6)), 0.05
+    args = (board, board, width, height, depth + 0.06, n_doors, int(rng.integers(CUPBOARD_FORMS)))
+    shelf = content().things["wall_cupboard"](rng, style, *args)
+    return shelf, float(rng.uniform(1.4, 1.6)), 0.05
 
 
 def hang_cloth(hanging: Hanging, style: Style, share: float) -> None:
