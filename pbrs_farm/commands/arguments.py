@@ -139,8 +139,8 @@ def home_arguments(homes: Sequence[str], houses: str | None) -> list[str]:
         words = words_of_homes(list(homes))
         # A folder that stays a word has no homes of its own: its error says where they lie.
         for folder in dict.fromkeys(homes):
-            if folder not in words and (left := homes_left_below(Path(folder))):
-                warn(f"{folder}: {left}")
+            if folder not in words and (unlisted := homes_left_below(Path(folder))):
+                warn(f"{folder}: {unlisted}")
         return words
     if len(homes) != 1:
         raise BadInput("--houses", houses, "needs the SUNCG root as the one HOME")

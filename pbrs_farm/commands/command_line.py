@@ -47,22 +47,22 @@ class Parser(argparse.ArgumentParser):
 
         Empty for the parser of a verb itself.
         """
-        found = [a for a in self._actions if isinstance(a, argparse._SubParsersAction)]
-        return dict(found[0].choices) if found else {}
+        actions = [a for a in self._actions if isinstance(a, argparse._SubParsersAction)]
+        return dict(actions[0].choices) if actions else {}
 
     def format_help(self) -> str:
         """The help: of a verb argparse's own, of the command its verbs in groups."""
-        found = [a for a in self._actions if isinstance(a, argparse._SubParsersAction)]
-        if not found or found[0].metavar != "VERB":
+        actions = [a for a in self._actions if isinstance(a, argparse._SubParsersAction)]
+        if not actions or actions[0].metavar != "VERB":
             return super().format_help()
-        lines = {action.dest: action for action in found[0]._choices_actions}
+        lines = {action.dest: action for action in actions[0]._choices_actions}
         formatter = self._get_formatter()
         formatter.add_usage(self.usage, self._actions, self._mutually_exclusive_groups)
         formatter.add_text(self.description)
-        known = [row for row in VERBS.values() if row.verb in lines]
-        for group in dict.fromkeys(row.group for row in known):
+        rows = [row for row in VERBS.values() if row.verb in lines]
+        for group in dict.fromkeys(row.group for row in rows):
             formatter.start_section(group)
-            formatter.add_arguments([lines[row.verb] for row in known if row.group == group])
+            formatter.add_arguments([lines[row.verb] for row in rows if row.group == group])
             formatter.end_section()
         formatter.add_text(self.epilog)
         formatter.add_text("`pbrs-farm VERB --help` lists a verb's options.")
@@ -94,27 +94,27 @@ def verb_first(
     """
     # A word is the verb only where all before it are options of its own with their values.
     if words and words[0].startswith("-"):
-        for at, word in enumerate(words):
-            if word in verbs and _are_options(words[:at], parser_of(word)):
-                return [word, *words[:at], *words[at + 1 :]]
+        for position, word in enumerate(words):
+            if word in verbs and _are_options(words[:position], parser_of(word)):
+                return [word, *words[:position], *words[position + 1 :]]
     return list(words)
 
 
 def _are_options(words: Sequence[str], parser: argparse.ArgumentParser) -> bool:
     """Whether the words are options of the parser, each with its values."""
-    at = 0
-    while at < len(words):
-        name, equals, _value = words[at].partition("=")
+    k = 0
+    while k < len(words):
+        name, equals, _value = words[k].partition("=")
         action = parser._option_string_actions.get(name)
         if action is None:
             return False
-        at += 1
+        k += 1
         if equals or action.nargs == 0:
             continue
         # One value, or all up to the next option.
-        first = at
-        while at < len(words) and not words[at].startswith("-") and (at == first or action.nargs):
-            at += 1
-        if at == first:
+        first = k
+        while k < len(words) and not words[k].startswith("-") and (k == first or action.nargs):
+            k += 1
+        if k == first:
             return False
     return True

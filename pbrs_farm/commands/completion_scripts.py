@@ -68,8 +68,10 @@ def _fish_lines(verbs: Mapping[str, argparse.ArgumentParser]) -> Iterator[str]:
         values = dict(_option_choices(parser))
         for option in _options(parser):
             # -x: nothing but these words may follow the option, no file names.
-            known = f" -x -a {shlex.quote(' '.join(values[option]))}" if option in values else ""
-            yield f"{of_verb} -l {option.removeprefix('--')}{known}"
+            values_text = (
+                f" -x -a {shlex.quote(' '.join(values[option]))}" if option in values else ""
+            )
+            yield f"{of_verb} -l {option.removeprefix('--')}{values_text}"
         if arguments := _arguments(verb, parser):
             yield f"{of_verb} -a {shlex.quote(' '.join(arguments))}"
 
@@ -85,7 +87,7 @@ def _option_choices(parser: argparse.ArgumentParser) -> Iterator[tuple[str, list
     from pbrs_farm.core.recipe import CAMERA_SOURCES, RECIPE_NAMES
 
     # Options that take lists declare no choices of their own.
-    known = {
+    choices = {
         "--recipe": list(RECIPE_NAMES),
         "--modes": [mode.value for mode in ALL_MODES],
         "--layers": list(OPTIONAL),
@@ -94,8 +96,8 @@ def _option_choices(parser: argparse.ArgumentParser) -> Iterator[tuple[str, list
     for name, action in parser._option_string_actions.items():
         if action.choices and name.startswith("--"):
             yield name, [str(choice) for choice in action.choices]
-        elif name in known:
-            yield name, known[name]
+        elif name in choices:
+            yield name, choices[name]
 
 
 def _arguments(verb: str, parser: argparse.ArgumentParser) -> list[str]:

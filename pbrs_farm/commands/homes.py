@@ -96,7 +96,7 @@ def _make(args: argparse.Namespace) -> int:
     if not args.empty:
         catalogue_here()
     # Homes come in the order of their seeds; say how far it is every _SAY_EVERY_S seconds.
-    started = said = time.monotonic()
+    started = last_report = time.monotonic()
     n_new = 0
     _folder(args.out)
     failed = []
@@ -105,13 +105,13 @@ def _make(args: argparse.Namespace) -> int:
         if done.fault:
             failed.append(done)
             warn(done.fault)
-        if time.monotonic() - said > _SAY_EVERY_S:
-            said = time.monotonic()
+        if time.monotonic() - last_report > _SAY_EVERY_S:
+            last_report = time.monotonic()
             echo(f"{number} of {len(homes)} homes")
     # What is neither new nor failed was there from a former run.
-    kept = len(homes) - n_new - len(failed)
+    n_kept = len(homes) - n_new - len(failed)
     text = f"{counted(n_new, 'home')} made in {time.monotonic() - started:.0f} s"
-    echo(text + (f", {kept} kept" if kept else "") + f": {args.out / 'plans.html'}")
+    echo(text + (f", {n_kept} kept" if n_kept else "") + f": {args.out / 'plans.html'}")
     return 1 if failed else 0
 
 
@@ -127,24 +127,24 @@ def _make_of_plan(args: argparse.Namespace) -> int:
 
     at_least("--floor", args.floor or 0, 0)
     # The plan decides the rooms, so wishes about rooms contradict it.
-    given = [
+    options = [
         f"--{k}" for k in ("rooms", "area", "storeys", "offices", "programme") if getattr(args, k)
     ]
-    if given:
-        raise BadInput("--plan", str(args.plan), f"leaves no choice of {given[0]}")
+    if options:
+        raise BadInput("--plan", str(args.plan), f"leaves no choice of {options[0]}")
     entry = format_of_file(args.plan)
     if entry is not None and entry.kind != PLAN:
         hint = f"`pbrs-farm run {args.plan}` reads it"
         raise BadInput(args.plan, "", f"is a house ({entry.kind}), no floor plan", hint=hint)
-    own = plan_from_file(args.plan, Part(args.apartment, args.floor))
-    for line in own.left_out:
+    plan_file = plan_from_file(args.plan, Part(args.apartment, args.floor))
+    for line in plan_file.left_out:
         warn(f"left out: {line}")
     catalogue = EMPTY if args.empty else catalogue_here()
     _folder(args.out)
     for seed in range(args.seed, args.seed + args.count):
         name = args.plan.stem if args.count == 1 else f"{args.plan.stem}-{seed}"
         style = args.style or ""
-        home = furnish_plan_file(own, catalogue, seed=seed, style=style, name=name)
+        home = furnish_plan_file(plan_file, catalogue, seed=seed, style=style, name=name)
         write_home(args.out / f"{name}.sh3d", home)
         echo(str(args.out / f"{name}.sh3d"))
     return 0
@@ -172,7 +172,7 @@ def _asked_for(args: argparse.Namespace) -> tuple[list[MadeHome], Programme | No
         if (v := getattr(args, k))
     ]
     options += ["furniture=none"] * args.empty
-    given = [f"--{k}" for k in ("rooms", "area", "offices") if args.programme and getattr(args, k)]
+    chosen = [f"--{k}" for k in ("rooms", "area", "offices") if args.programme and getattr(args, k)]
     if args.programme and args.storeys not in (None, "1"):
         raise BadInput(
             "--programme",
@@ -180,8 +180,8 @@ def _asked_for(args: argparse.Namespace) -> tuple[list[MadeHome], Programme | No
             "names the rooms of one storey and not which of them lie above",
             hint="leave out --storeys, or ask for a house by --storeys 2 --rooms 2..4 --area 90..150",
         )
-    if given:
-        raise BadInput("--programme", str(args.programme), f"leaves no choice of {given[0]}")
+    if chosen:
+        raise BadInput("--programme", str(args.programme), f"leaves no choice of {chosen[0]}")
     if args.seed < 0:
         raise BadInput("--seed", str(args.seed), "is below 0", hint="--seed 1")
     first, last = args.seed, args.seed + args.count - 1

@@ -99,7 +99,7 @@ def _add_form_options(p: argparse.ArgumentParser, words: Sequence[str] | None) -
     unknown = {word.partition("=")[0] for word in words if word.startswith("--")}
     for option in sorted(unknown - p._option_string_actions.keys()):
         field = option.removeprefix("--").replace("-", "_")
-        if any(field in form_options(other) for other in all_forms()):
+        if any(field in form_options(f) for f in all_forms()):
             p.error(str(no_such_option(form, field)))
 
 
@@ -178,10 +178,10 @@ def _pack_views(args: argparse.Namespace) -> None:
     packed = pack(views, args.out, packing, form=args.to, tell=echo)
     # A run may still go on: name the views that are left out.
     if packed.left_out:
-        at, why = next(iter(packed.left_out.items()))
-        warn(f"{counted(len(packed.left_out), 'view')} left out, {at}: {why}")
-    said = ", ".join(f"{split} {n}" for split, n in packed.n_views.items())
-    echo(f"{args.out}: {said} views, {packed.n_files} files, {packed.n_bytes / 1e6:.1f} MB")
+        view, why = next(iter(packed.left_out.items()))
+        warn(f"{counted(len(packed.left_out), 'view')} left out, {view}: {why}")
+    counts = ", ".join(f"{split} {n}" for split, n in packed.n_views.items())
+    echo(f"{args.out}: {counts} views, {packed.n_files} files, {packed.n_bytes / 1e6:.1f} MB")
 
 
 def packing_of(

@@ -234,10 +234,10 @@ def _report(summary: Summary, seconds: float, out: str, *, as_json: bool) -> Non
         warn(f"{view}: dark: {reason}")
     for house, reason in summary.without_views:
         warn(f"{house}: no view: {reason}")
-    for what, message, command in summary.failures:
-        text = message if message.startswith(what) else f"{what}: {message}"
+    for subject, message, command in summary.failures:
+        text = message if message.startswith(subject) else f"{subject}: {message}"
         # A step that failed has printed its message when it happened.
-        warn(f"{what} failed; reproduce: {command}" if command else text)
+        warn(f"{subject} failed; reproduce: {command}" if command else text)
     if summary.taken_out:
         kinds = " and ".join(counted(n, kind) for kind, n in sorted(summary.taken_out.items()))
         echo(f"{kinds} taken out: `removed` in repair.json (repair.remove_persons, remove_plants)")

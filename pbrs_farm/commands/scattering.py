@@ -77,22 +77,22 @@ def _scatter(args: argparse.Namespace) -> None:
     distance = nearest, farthest
     with warnings.catch_warnings(record=True) as heard:
         warnings.simplefilter("always", UserWarning)
-        found = [
+        items = [
             model
             for pattern in args.models
             for model in models(
                 pattern, unit=args.unit, size_m=args.size_m, up=args.up, credit=args.credit
             )
         ]
-    for one in heard:
-        warn(str(one.message))
+    for warning in heard:
+        warn(str(warning.message))
     recipe = recipe_of(args)
     size, k = (recipe.image.width_px, recipe.image.height_px), None
     if args.camera is not None:
         size, k = camera_of_bop(args.camera)
     seeds = dress_seeds(args.dress)
     notes: Counter[str] = Counter()
-    there = finished_views(store_from_url(args.out))
+    finished = finished_views(store_from_url(args.out))
     n_made = n_kept = 0
     n_scenes = len(args.homes) * max(1, len(seeds)) * args.scenes
     with counting_bar("views") as tell:
@@ -100,7 +100,7 @@ def _scatter(args: argparse.Namespace) -> None:
         for home in _homes_of(args.homes, recipe, seeds):
             for seed in range(recipe.seed, recipe.seed + args.scenes):
                 scene = home.scatter(
-                    found,
+                    items,
                     args.count,
                     on=args.on or None,
                     in_=args.room,
@@ -117,10 +117,10 @@ def _scatter(args: argparse.Namespace) -> None:
                     seed=seed,
                 )
                 notes.update(note.kind for note in scene.house.notes)
-                left = [c for c in cameras if (scene.id, c.id) not in there]
-                n_kept += len(cameras) - len(left)
+                todo = [c for c in cameras if (scene.id, c.id) not in finished]
+                n_kept += len(cameras) - len(todo)
                 # One by one, so that a killed command loses one view at most.
-                for camera in left:
+                for camera in todo:
                     frame = render(scene, camera, modes=args.modes, layers=args.layers)
                     frame.save(args.out)
                     n_made += 1

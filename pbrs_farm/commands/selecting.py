@@ -165,5 +165,7 @@ def _fields(recipe: Recipe, args: argparse.Namespace) -> SelectionFields:
         if getattr(args, field) is not None:
             changed[f"selection.{field}"] = str(getattr(args, field))
     # Validate all of them together, as a recipe.
-    held = {f"selection.{k}": str(v) for k, v in recipe.selection.model_dump(mode="json").items()}
-    return recipe_from_name("fast", held | changed).selection
+    thresholds = {
+        f"selection.{k}": str(v) for k, v in recipe.selection.model_dump(mode="json").items()
+    }
+    return recipe_from_name("fast", thresholds | changed).selection

@@ -169,8 +169,8 @@ def _part(name: str, table: Mapping[str, Any], common: Mapping[str, Any], file: 
     """A part: the options of [render], then its own; lists of both are joined."""
     values = values_of_table(common, PartOptions, f"{file} [render]")
     for option_name, value in values_of_table(table, PartTable, f"{file} [part.{name}]").items():
-        held = values.get(option_name)
-        values[option_name] = [*held, *value] if isinstance(held, list) else value
+        common_value = values.get(option_name)
+        values[option_name] = [*common_value, *value] if isinstance(common_value, list) else value
     homes = values.pop("homes", [])
     with _placed(file, f"part.{name}"):
         words = words_of_homes(homes)

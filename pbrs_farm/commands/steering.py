@@ -251,15 +251,15 @@ def _gc(args: argparse.Namespace) -> None:
     farm.ledger.ping()
     if args.yes:
         farm.rights.check_admin("gc --yes")
-    found = garbage(farm, keep_s, time.time())
-    n = remove(farm, found) if args.yes else 0
-    rows = [{"kind": g.kind, "objects": len(g.found), "bytes": g.n_bytes} for g in found]
+    groups = garbage(farm, keep_s, time.time())
+    n = remove(farm, groups) if args.yes else 0
+    rows = [{"kind": g.kind, "objects": len(g.found), "bytes": g.n_bytes} for g in groups]
 
     def text() -> str:
         lines = [
-            f"{g.kind:<22}{len(g.found):>9} objects {g.n_bytes / 1e6:>10.1f} MB" for g in found
+            f"{g.kind:<22}{len(g.found):>9} objects {g.n_bytes / 1e6:>10.1f} MB" for g in groups
         ]
-        lines += [f"    {key}" for g in found for key in g.found[:3]]
+        lines += [f"    {key}" for g in groups for key in g.found[:3]]
         message = f"{n} objects removed" if args.yes else "nothing is removed: --yes does it"
         return "\n".join([*lines, message])
 
@@ -325,11 +325,11 @@ def _coordinator(_args: argparse.Namespace) -> int:
 def _worker(args: argparse.Namespace) -> int:
     from workers.node.supervisor import main
 
-    given = {
+    chosen = {
         "--until": args.until,
         "--until-idle": args.until_idle,
         "--preempted-code": args.preempted_code,
     }
     return main(
-        [word for name, value in given.items() if value is not None for word in (name, str(value))]
+        [word for name, value in chosen.items() if value is not None for word in (name, str(value))]
     )

@@ -233,13 +233,13 @@ def _train(args: argparse.Namespace) -> None:
         facts={"credits": list(dict.fromkeys(credits)), **facts_of(photographs, plan)},
     )
     # Print about twenty of the logged steps.
-    every = max(plan.steps // 20 // plan.log_every, 1) * plan.log_every
+    period = max(plan.steps // 20 // plan.log_every, 1) * plan.log_every
 
     with loggers(args.log, args.out, plan_as_json(plan)) as log:
 
         def observe(row: dict[str, float]) -> None:
             log(row)
-            is_shown = row["step"] % every == 0 or row["step"] == plan.steps
+            is_shown = row["step"] % period == 0 or row["step"] == plan.steps
             if is_shown and "loss" in row:
                 echo(f"step {row['step']:>7,} loss {row['loss']:.4f} {row['views_s']:.1f} views/s")
 

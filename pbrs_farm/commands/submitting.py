@@ -71,12 +71,12 @@ def _submitted(args: argparse.Namespace, request: SubmitRequest) -> str:
     spec = _spec(request)
     # Read the homes: what each is, and where workers will find it.
     seeds = dress_seeds(request.dress) or (spec.recipe.dress.seed,)
-    found = entries_from_arguments(
+    entries = entries_from_arguments(
         home_arguments(args.homes, request.houses), seeds, models=request.models
     )
     reference = placed_reference(request.reference) if request.reference else ("", b"")
     spec = spec.model_copy(update={"reference": reference[0]})
-    houses, refs = [entry for entry, _ref in found], [ref for _entry, ref in found]
+    houses, refs = [entry for entry, _ref in entries], [ref for _entry, ref in entries]
     _warn_of_paths([ref.location for ref in refs if is_left_in_place(ref)])
     # Estimate, and touch neither the store nor Redis.
     if request.dry_run:

@@ -206,8 +206,8 @@ def _list_lamps(args: argparse.Namespace, view: Path) -> int:
     from pbrs_farm.run.relight import lamps_of_view
 
     if args.lamp or args.out is not None:
-        what = "lists the lamps and makes no picture: not with --lamp, --out"
-        raise BadInput("--list", "", what)
+        problem = "lists the lamps and makes no picture: not with --lamp, --out"
+        raise BadInput("--list", "", problem)
     rows = lamps_of_view(view)
     echo(f"{'lamp':>4} {'share':>6} {'lm':>7}  {'item':<12} {'room':<8} name")
     for row in rows:

@@ -51,7 +51,7 @@ def export_house(house: House, out: Path, name: str, **options: Any) -> int:
 def _home_form(name: str) -> HomeForm:
     form = form_of(name) if name in form_names() else None
     if not isinstance(form, HomeForm):
-        forms = (form_of(other) for other in form_names())
+        forms = (form_of(form_name) for form_name in form_names())
         hint = f"of {', '.join(form.name for form in forms if isinstance(form, HomeForm))}"
         raise BadInput("--to", name, "no such form of a home", hint=hint)
     return form

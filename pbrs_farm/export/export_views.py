@@ -114,8 +114,8 @@ def export_frames(
         size=size,
         classes=None if classes is None else class_map(classes),
     )
-    with _stored(frames) as (folder, wanted):
-        export(folder, out, name, choice=choice, shares=shares, views=wanted, **options)
+    with _stored(frames) as (folder, chosen):
+        export(folder, out, name, choice=choice, shares=shares, views=chosen, **options)
     return out
 
 
@@ -127,8 +127,8 @@ def questions_of(frames: Views) -> list[dict[str, Any]]:
     from pbrs_farm.export.questions.asking import Asker
     from pbrs_farm.export.questions.clips import clips_of
 
-    with _stored(frames) as (folder, wanted):
-        entries = [v for v in views_of(folder) if (v.house.id, v.id) in wanted]
+    with _stored(frames) as (folder, chosen):
+        entries = [v for v in views_of(folder) if (v.house.id, v.id) in chosen]
         questions = Asker().asked(clips_of([ChosenView(v, Choice()) for v in entries]))
     return [q.row(k) | {"instances": list(q.about)} for k, q in enumerate(questions)]
 
@@ -136,13 +136,13 @@ def questions_of(frames: Views) -> list[dict[str, Any]]:
 @contextmanager
 def _stored(frames: Views) -> Iterator[tuple[Path, frozenset[tuple[str, str]]]]:
     """A folder with the frames, temporary unless they have one, and the names of house and view."""
-    wanted = frozenset((ref.house, ref.view) for ref in frames.refs)
+    chosen = frozenset((ref.house, ref.view) for ref in frames.refs)
     with TemporaryDirectory(prefix="pbrs-export-") as scratch:
         folder = Path(frames.source.url)
         if not (folder / keys.FOLDERS[0]).is_dir():
             frames.save(scratch)
             folder = Path(scratch)
-        yield folder, wanted
+        yield folder, chosen
 
 
 def _by_split(views: list[ViewEntry], shares: SplitShares | None) -> dict[str, list[ViewEntry]]:

@@ -167,7 +167,7 @@ def options_from(form: Form, values: Mapping[str, Any]) -> Record | None:
 
 def no_such_option(form: Form, name: str) -> BadInput:
     """The error for an option that a form does not have; its hint names the forms that have it."""
-    owners = [other.name for other in all_forms() if name in form_options(other)]
+    owners = [owner.name for owner in all_forms() if name in form_options(owner)]
     hint = f"--to {', '.join(owners)}" if owners else did_you_mean(name, form_options(form))
     return BadInput(flag(name), "", f"{form.name} has no such option", hint=hint)
 
@@ -175,8 +175,8 @@ def no_such_option(form: Form, name: str) -> BadInput:
 def forms_table(of: str) -> str:
     """The package's forms of "views", or of "homes", as a Markdown table."""
     rows = ["| form | what is written |", "|---|---|"]
-    own = map(form_of, FORMS.own_names())
-    rows += [f"| `{form.name}` | {form.help} |" for form in own if form.of == of]
+    forms = map(form_of, FORMS.own_names())
+    rows += [f"| `{form.name}` | {form.help} |" for form in forms if form.of == of]
     return "\n".join(rows)
 
 

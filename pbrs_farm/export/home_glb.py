@@ -44,7 +44,7 @@ def glb_of_pieces(
     number = {old: new for new, old in enumerate(used)}
     materials = [house.materials[k] for k in used]
     names = {name for m in materials for name in m.texture_ids}
-    images, kept = write_textures(
+    images, all_images = write_textures(
         writer, {key: t for key, t in house.textures.items() if key in names}
     )
     narrow = replace(house, materials=tuple(materials))
@@ -87,7 +87,7 @@ def glb_of_pieces(
         "nodes": nodes,
         "meshes": meshes,
         "materials": [gltf_material(m, images) for m in materials],
-        "images": [image for image in kept if "name" in image],
+        "images": [image for image in all_images if "name" in image],
         "samplers": [{"wrapS": _REPEAT, "wrapT": _REPEAT}] if images else [],
         "textures": [{"source": i, "sampler": 0} for i in range(len(images))],
     }

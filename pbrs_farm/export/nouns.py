@@ -53,13 +53,13 @@ def noun_of(view: ChosenView, row: dict[str, Any]) -> str:
     name = str(row["class"])
     if name not in _VAGUE:
         words = str(row["name"]).lower().split()
-        found = (noun for word, noun in _OWN_WORDS.get(name, {}).items() if word in words)
-        return next(found, _COUNTED.get(name, name))
+        matches = (noun for word, noun in _OWN_WORDS.get(name, {}).items() if word in words)
+        return next(matches, _COUNTED.get(name, name))
     if row["kind"] in _NOUNS_OF_KINDS:
         return _NOUNS_OF_KINDS[row["kind"]]
     # A thing of no class is what it is called, where that is one word or two.
-    own = str(row["name"]).strip(" 0123456789")
-    return own.lower() if _VAGUE[name] and _PLAIN_NAME.fullmatch(own) else _VAGUE[name]
+    item_name = str(row["name"]).strip(" 0123456789")
+    return item_name.lower() if _VAGUE[name] and _PLAIN_NAME.fullmatch(item_name) else _VAGUE[name]
 
 
 def is_plural(noun: str) -> bool:

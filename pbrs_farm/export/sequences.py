@@ -32,14 +32,14 @@ class SequenceFrame:
     def right(self) -> ChosenView | None:
         """The nearest view to the right of the first whose rows are its rows; None without one."""
         camera_from_world = np.linalg.inv(pose_opencv(self.first))
-        found: dict[float, ChosenView] = {}
+        by_distance: dict[float, ChosenView] = {}
         for view in self.others.values():
             between = camera_from_world @ pose_opencv(view)
             aside, between[0, 3] = float(between[0, 3]), 0.0
             same_rows = np.abs(between - np.eye(4)).max() <= _SAME_ROWS
             if same_rows and aside > _SAME_ROWS and view.facts["K"] == self.first.facts["K"]:
-                found[aside] = view
-        return found[min(found)] if found else None
+                by_distance[aside] = view
+        return by_distance[min(by_distance)] if by_distance else None
 
 
 def frames_by_house(views: Sequence[ChosenView]) -> dict[str, list[SequenceFrame]]:
@@ -47,20 +47,20 @@ def frames_by_house(views: Sequence[ChosenView]) -> dict[str, list[SequenceFrame
 
     Views of other cameras of a rig are put beside its first one's; such a view alone is left out.
     """
-    others: dict[tuple[str, str], dict[str, ChosenView]] = {}
+    companions: dict[tuple[str, str], dict[str, ChosenView]] = {}
     for view in views:
         if view.shot.eye:
-            others.setdefault((view.house.id, view.shot.first.id), {})[view.shot.eye] = view
+            companions.setdefault((view.house.id, view.shot.first.id), {})[view.shot.eye] = view
     frames: dict[str, list[SequenceFrame]] = {}
     for view in views:
         if not view.shot.eye:
-            frame = SequenceFrame(view, others.get((view.house.id, view.id), {}))
+            frame = SequenceFrame(view, companions.get((view.house.id, view.id), {}))
             frames.setdefault(view.house.id, []).append(frame)
 
     def order(frame: SequenceFrame) -> tuple[float, str]:
         return float(frame.first.facts.get("frame", float("inf"))), frame.first.id
 
-    return {house: sorted(own, key=order) for house, own in frames.items()}
+    return {house: sorted(moments, key=order) for house, moments in frames.items()}
 
 
 def pose_opencv(view: ChosenView) -> F64:

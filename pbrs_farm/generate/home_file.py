@@ -496,13 +496,8 @@ def _straight_parts(wall: PlanWall) -> list[PlanWall]:
     if not wall.tops:
         return [wall]
     return [
-        replace(
-            wall,
-            start=wall.at(low),
-            end=wall.at(high),
-            tops=((0.0, low_top), (high - low, high_top)),
-        )
-        for (low, low_top), (high, high_top) in pairwise(wall.tops)
+        replace(wall, start=wall.at(low), end=wall.at(high), tops=((0.0, y0), (high - low, y1)))
+        for (low, y0), (high, y1) in pairwise(wall.tops)
         if high - low > _STEP_M
     ]
 

@@ -204,7 +204,7 @@ def _panels(x: float, top: float, kind: str) -> list[tuple[float, float, float, 
 def _handles(w: float, d: float, hinge_at_start: bool, kind: str) -> list[_Box]:
     # On either side, away from the hinges.
     side = 1.0 if hinge_at_start else -1.0
-    handle_x, front = side * (w / 2 - _FRAME_M - 0.06), d / 2 - 0.005
+    u, front = side * (w / 2 - _FRAME_M - 0.06), d / 2 - 0.005
     boxes: list[_Box] = []
     for face, out in ((front, 1.0), (front - _LEAF_M, -1.0)):
 
@@ -220,30 +220,20 @@ def _handles(w: float, d: float, hinge_at_start: bool, kind: str) -> list[_Box]:
 
         y = _HANDLE_M
         if kind == "knob":
-            boxes.append(box((handle_x - 0.01, handle_x + 0.01), (y - 0.01, y + 0.01), (0.0, 0.04)))
-            boxes.append(
-                box((handle_x - 0.026, handle_x + 0.026), (y - 0.026, y + 0.026), (0.04, 0.065))
-            )
-            boxes.append(
-                box((handle_x - 0.03, handle_x + 0.03), (y - 0.03, y + 0.03), (0.0, 0.008))
-            )
+            boxes.append(box((u - 0.01, u + 0.01), (y - 0.01, y + 0.01), (0.0, 0.04)))
+            boxes.append(box((u - 0.026, u + 0.026), (y - 0.026, y + 0.026), (0.04, 0.065)))
+            boxes.append(box((u - 0.03, u + 0.03), (y - 0.03, y + 0.03), (0.0, 0.008)))
         elif kind == "bar":
             boxes += [
-                box((handle_x - 0.008, handle_x + 0.008), (low, low + 0.02), (0.0, 0.045))
+                box((u - 0.008, u + 0.008), (low, low + 0.02), (0.0, 0.045))
                 for low in (y - 0.14, y + 0.12)
             ]
-            boxes.append(
-                box((handle_x - 0.01, handle_x + 0.01), (y - 0.17, y + 0.17), (0.04, 0.06))
-            )
+            boxes.append(box((u - 0.01, u + 0.01), (y - 0.17, y + 0.17), (0.04, 0.06)))
         else:
             if kind == "plate":
-                boxes.append(
-                    box((handle_x - 0.02, handle_x + 0.02), (y - 0.15, y + 0.07), (0.0, 0.006))
-                )
-            boxes.append(box((handle_x - 0.01, handle_x + 0.01), (y - 0.01, y + 0.01), (0.0, 0.05)))
-            boxes.append(
-                box((handle_x, handle_x - side * 0.11), (y - 0.01, y + 0.01), (0.035, 0.05))
-            )
+                boxes.append(box((u - 0.02, u + 0.02), (y - 0.15, y + 0.07), (0.0, 0.006)))
+            boxes.append(box((u - 0.01, u + 0.01), (y - 0.01, y + 0.01), (0.0, 0.05)))
+            boxes.append(box((u, u - side * 0.11), (y - 0.01, y + 0.01), (0.035, 0.05)))
     return boxes
 
 
@@ -278,20 +268,17 @@ def _sashes(
 
 def _catch(x: float, y: float, kind: str) -> list[_Box]:
     """Handle of a sash, on the room side of its upright bar that begins at x."""
-    handle_x, front = x + _SASH_M * 0.4, _SASH_DEPTH_M
+    mid, front = x + _SASH_M * 0.4, _SASH_DEPTH_M
     if kind == "knob":
-        return [((handle_x - 0.012, y - 0.012, front), (handle_x + 0.012, y + 0.012, front + 0.03))]
-    rose = ((handle_x - 0.013, y - 0.03, front), (handle_x + 0.013, y + 0.03, front + 0.008))
+        return [((mid - 0.012, y - 0.012, front), (mid + 0.012, y + 0.012, front + 0.03))]
+    rose = ((mid - 0.013, y - 0.03, front), (mid + 0.013, y + 0.03, front + 0.008))
     if kind == "bar":
         return [rose]
     reach = 0.11 if kind == "lever" else 0.075
     return [
         rose,
-        ((handle_x - 0.009, y - reach, front + 0.022), (handle_x + 0.009, y + 0.01, front + 0.036)),
-        (
-            (handle_x - 0.006, y - 0.006, front + 0.008),
-            (handle_x + 0.006, y + 0.006, front + 0.022),
-        ),
+        ((mid - 0.009, y - reach, front + 0.022), (mid + 0.009, y + 0.01, front + 0.036)),
+        ((mid - 0.006, y - 0.006, front + 0.008), (mid + 0.006, y + 0.006, front + 0.022)),
     ]
 
 

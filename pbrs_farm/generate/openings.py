@@ -189,10 +189,7 @@ def _doors_to(drawing: WallDrawing, type_: RoomType) -> Iterable[list[int]]:
         return halls, rooms_of_types(types, RoomType.KITCHEN)
     if type_ is RoomType.BATHROOM:
         return halls, rooms_of_types(types, RoomType.BEDROOM)
-    return [
-        rooms_of_types(types, entry_type)
-        for entry_type in drawing.layout.programme.entered_from(type_)
-    ]
+    return [rooms_of_types(types, t) for t in drawing.layout.programme.entered_from(type_)]
 
 
 def _add_door(

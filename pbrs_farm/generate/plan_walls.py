@@ -164,17 +164,14 @@ def corners(shape: BaseGeometry) -> tuple[Point, ...]:
     # Leave out all but one of those at one place: beside itself no corner turns, and it would go.
     points = [p for i, p in enumerate(points) if p != points[i - 1]]
     # Drop collinear points.
-    kept_points = [
+    bends = [
         p
         for i, p in enumerate(points)
         if abs(_turn(points[i - 1], p, points[(i + 1) % len(points)])) > 1e-6
     ]
     # The shoelace sum is positive for a ring that runs anticlockwise.
-    area = sum(
-        _turn((0.0, 0.0), a, b)
-        for a, b in zip(kept_points, kept_points[1:] + kept_points[:1], strict=True)
-    )
-    return tuple(kept_points if area > 0 else kept_points[::-1])
+    area = sum(_turn((0.0, 0.0), a, b) for a, b in zip(bends, bends[1:] + bends[:1], strict=True))
+    return tuple(bends if area > 0 else bends[::-1])
 
 
 def _turn(a: Point, b: Point, c: Point) -> float:

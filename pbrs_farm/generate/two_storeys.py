@@ -129,19 +129,11 @@ def _drawn_core(rng: np.random.Generator, lower: Programme, upper: Programme) ->
     is_sideways = bool(rng.random() < 0.5)
     w, d = (_STAIRS[1], _STAIRS[0]) if is_sideways else _STAIRS
     if is_sideways:
-        start = _drawn_start(rng, along, w + _LANDING, w)
-        stairs, landing, front = (
-            (start, 0, start + w, d),
-            (start + w, 0, start + w + _LANDING, d),
-            (1, 0),
-        )
+        u = _drawn_start(rng, along, w + _LANDING, w)
+        stairs, landing, front = ((u, 0, u + w, d), (u + w, 0, u + w + _LANDING, d), (1, 0))
     else:
-        start = _drawn_start(rng, along, w, w)
-        stairs, landing, front = (
-            (start, 0, start + w, d),
-            (start, d, start + w, d + _LANDING),
-            (0, 1),
-        )
+        u = _drawn_start(rng, along, w, w)
+        stairs, landing, front = ((u, 0, u + w, d), (u, d, u + w, d + _LANDING), (0, 1))
     # Turn the frame onto that side of the outline.
     origin, tip = (_on_side(side, (x, z), across) for x, z in ((0, 0), front))
     places = [_turn_rect(side, rect, across) for rect in (stairs, landing)]

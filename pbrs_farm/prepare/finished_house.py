@@ -85,9 +85,9 @@ def finished_house(
 
 
 def _through(passes: Sequence[Pass], work: Preparation) -> FinishedHouse:
-    for one in passes:
-        note_step(work.source.location, one.name)
-        work = one.run(work)
+    for house_pass in passes:
+        note_step(work.source.location, house_pass.name)
+        work = house_pass.run(work)
     return work.finished
 
 

@@ -64,10 +64,10 @@ def format_of_source(source: SourceRef) -> Format | None:
 
 def format_of_plugin(name: str) -> Format:
     """The entry of a plugin, whose code is loaded; MachineFailed if it is not installed or has another type."""
-    one = plugin("readers", name)
-    entry = one.load()
+    reader = plugin("readers", name)
+    entry = reader.load()
     if not isinstance(entry, Format):
-        raise MachineFailed(f"plugin {one.mark} brings no Format", hint="docs/plugins.md")
+        raise MachineFailed(f"plugin {reader.mark} brings no Format", hint="docs/plugins.md")
     return entry
 
 
@@ -102,9 +102,9 @@ def is_beside_homes(path: Path) -> bool:
 def summary() -> str:
     """All supported formats in one line, for hints."""
     entries = list(formats())
-    suffixes = dict.fromkeys(suffix for one in entries for suffix in one.suffixes)
-    titles = dict.fromkeys(one.title for one in entries if one.keys)
-    folders = [f"{one.files} of {one.title}" for one in entries if one.main_file]
+    suffixes = dict.fromkeys(suffix for entry in entries for suffix in entry.suffixes)
+    titles = dict.fromkeys(entry.title for entry in entries if entry.keys)
+    folders = [f"{entry.files} of {entry.title}" for entry in entries if entry.main_file]
     return f"{' '.join(suffixes)}, .json of {', '.join(titles)}, {', '.join(folders)}"
 
 

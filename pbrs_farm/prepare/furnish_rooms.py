@@ -149,12 +149,12 @@ def _furnished(
     owed = sorted(
         {(p.creator or p.library, p.licence) for p in mutable.used.values() if "BY" in p.licence}
     )
-    made = mutable.frozen()
+    after = mutable.frozen()
     if not owed:
-        return made
+        return after
     credit = "; ".join(f"{creator}, {licence}" for creator, licence in owed)
     line = "; ".join(x for x in (house.source.attribution, f"furniture: {credit}, modified") if x)
-    return replace(made, source=replace(made.source, attribution=line))
+    return replace(after, source=replace(after.source, attribution=line))
 
 
 def _kinds_of_rooms(space: HouseSpace) -> dict[str, RoomKind]:

@@ -118,9 +118,9 @@ def furnish_plan_file(
 
 def _pieces_of_things(file: PlanFile, catalogue: Catalogue) -> list[list[PlacedPiece]]:
     """Catalogue pieces for a plan's furniture, a list per storey."""
-    found: list[list[PlacedPiece]] = [[] for _ in file.storeys]
+    placed: list[list[PlacedPiece]] = [[] for _ in file.storeys]
     if not catalogue.pieces or not any(s.things for s in file.storeys):
-        return found
+        return placed
     house = _walls_of_plan(file, "home", ReadFields())
     items = box_only_items(house, file.storeys)
     furnished = with_stand_ins(replace(house, items=(*house.items, *items)), catalogue, "pieces")
@@ -139,7 +139,7 @@ def _pieces_of_things(file: PlanFile, catalogue: Catalogue) -> list[list[PlacedP
             continue
         width, height, depth = (float(v) for v in 2 * item.box.half)
         low = float(item.bounds[0, 1]) - levels[level].elevation
-        found[level].append(
+        placed[level].append(
             PlacedPiece(
                 piece,
                 float(x),
@@ -152,4 +152,4 @@ def _pieces_of_things(file: PlanFile, catalogue: Catalogue) -> list[list[PlacedP
                 room,
             )
         )
-    return found
+    return placed

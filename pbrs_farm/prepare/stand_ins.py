@@ -533,8 +533,8 @@ def _placed(
     mutable: MutableHouse, item: Item, target: Box, fit: _Fit, shape: Shape, place: _Place | None
 ) -> Item:
     size = np.ptp(shape.bounds, axis=0)
-    wanted = fit.scale * np.array([fit.piece.size[0], fit.piece.size[2], fit.piece.size[1]])
-    scale = wanted / np.maximum(size, 1e-6)
+    size_m = fit.scale * np.array([fit.piece.size[0], fit.piece.size[2], fit.piece.size[1]])
+    scale = size_m / np.maximum(size, 1e-6)
     front = target.axes[:, 2]
     turn_rad = float(np.arctan2(front[0], front[2]))
     low, high = shape.bounds * scale

@@ -50,7 +50,7 @@ def with_mirrors(house: House) -> tuple[House, tuple[str, ...]]:
     materials = list(house.materials)
     glass: dict[int, int] = {}  # material as read -> its mirror
     rooms = {room.id: room for room in house.rooms}
-    items, made = [], []
+    items, changed = [], []
     for item in house.items:
         kinds = {house.materials[s.material].kind for s in item.surfaces if len(s.faces)}
         faces = None
@@ -63,8 +63,8 @@ def with_mirrors(house: House) -> tuple[House, tuple[str, ...]]:
             items.append(item)
             continue
         items.append(_with_glass(item, faces, materials, glass))
-        made.append(item.id)
-    return replace(house, items=tuple(items), materials=tuple(materials)), tuple(made)
+        changed.append(item.id)
+    return replace(house, items=tuple(items), materials=tuple(materials)), tuple(changed)
 
 
 def with_clear_panes(house: House) -> House:
@@ -121,14 +121,14 @@ def _named_mirror(
         for s in item.surfaces
     ]
     named = tuple(s for s, is_one in zip(item.surfaces, is_named, strict=True) if is_one)
-    own = _glass_of(replace(item, surfaces=named), rooms) if named else None
-    if own is None:
+    glass = _glass_of(replace(item, surfaces=named), rooms) if named else None
+    if glass is None:
         return None
     rows = [
         np.full(len(s.faces), is_one) for s, is_one in zip(item.surfaces, is_named, strict=True)
     ]
     faces = np.concatenate(rows)
-    faces[faces] = own
+    faces[faces] = glass
     return faces
 
 
@@ -140,15 +140,15 @@ def _glass_of(item: Item, rooms: Mapping[str, Room]) -> Bools | None:
         return None
     # Collect planes, from the largest face on.
     offsets = np.einsum("ni,ni->n", normals, corners.mean(1))
-    left = areas > 0
+    rest = areas > 0
     planes: list[Bools] = []
-    while left.any() and len(planes) < 64:
-        first = int(np.argmax(np.where(left, areas, 0)))
-        plane = left & (normals @ normals[first] > _FLAT_COS)
+    while rest.any() and len(planes) < 64:
+        first = int(np.argmax(np.where(rest, areas, 0)))
+        plane = rest & (normals @ normals[first] > _FLAT_COS)
         plane &= np.abs(corners @ normals[first] - offsets[first]).max(1) < _PLANE_M
         plane[first] = True
         planes.append(plane)
-        left &= ~plane
+        rest &= ~plane
     sizes = np.array([areas[plane].sum() for plane in planes])
     if sizes.max() < max(_LEAST_M2, _LEAST_SHARE * areas.sum()):
         return None

@@ -86,9 +86,9 @@ def repair(
     for step in STEPS:
         work = step.run(work)
     counts = {name: work.facts[name] for name in StructureReport.model_fields if name in work.facts}
-    others = {name: fact for name, fact in work.facts.items() if name not in counts}
+    facts = {name: fact for name, fact in work.facts.items() if name not in counts}
     structure = work.structure.report.model_copy(update=counts)
-    return work.house, RepairReport(house_id=house.id, structure=structure, **others)
+    return work.house, RepairReport(house_id=house.id, structure=structure, **facts)
 
 
 def _without_persons_and_plants(work: Repairing) -> Repairing:
@@ -140,13 +140,13 @@ def _with_bulbs(work: Repairing) -> Repairing:
 
 def _with_room_lighting(work: Repairing) -> Repairing:
     fields = work.fields
-    house, given = with_room_lighting(
+    house, lights = with_room_lighting(
         work.house,
         fallback=fields.fallback_light,
         in_every_room=fields.lamp_in_every_room,
         lamp_lx=fields.lamp_lx,
     )
-    return work.after(house, fallback_lights=given.fallback, added_lamps=given.added)
+    return work.after(house, fallback_lights=lights.fallback, added_lamps=lights.added)
 
 
 def _with_enclosure(work: Repairing) -> Repairing:

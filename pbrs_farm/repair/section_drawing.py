@@ -38,9 +38,9 @@ def section_svg(before: House, after: House, level_id: str) -> str:
     box = f"0 0 {total:.3f} {size[1]:.3f}"
     root = svg_file(width=_WIDTH_PX, height=height_px, viewBox=box)
     element(root, "rect", width="100%", height="100%", fill="white")
-    left = _panel(root, "before", low)
+    panel = _panel(root, "before", low)
     for segments in parts:
-        _draw_walls(left, segments, fill="#c98b4a", fill_opacity="0.45", stroke="#5a3210")
+        _draw_walls(panel, segments, fill="#c98b4a", fill_opacity="0.45", stroke="#5a3210")
     right = element(root, "g", transform=f"translate({size[0] + _GAP_M:.3f} 0)")
     _draw_walls(_panel(right, "after", low), solid, fill="#3d3d3d", fill_opacity="1", stroke="none")
     return svg_text(root) + "\n"

@@ -121,8 +121,8 @@ def _against_normals(surface: Surface, faces: I32) -> Bools:
         return np.zeros(len(faces), np.bool_)
     # Compare with the mean of the corner normals; its length does not matter.
     mean = surface.normals[faces].astype(np.float64).sum(1)
-    own = unit_normals(triangle_corners(surface.positions, faces))
-    return np.asarray((mean * own).sum(1) < -1e-6)
+    normals = unit_normals(triangle_corners(surface.positions, faces))
+    return np.asarray((mean * normals).sum(1) < -1e-6)
 
 
 def _in_closed_shells(positions: F32, faces: I32) -> Bools:

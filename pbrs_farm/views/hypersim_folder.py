@@ -63,14 +63,14 @@ class HypersimFolder:
     @cached_property
     def _frames(self) -> dict[ViewRef, tuple[str, int]]:
         """View -> its camera and frame."""
-        found = {}
+        frames = {}
         for folder in sorted(self._folder.glob(f"{_SCENES}/images/scene_*_geometry_hdf5")):
             scene, camera = folder.parts[-3], folder.name[len("scene_") : -len("_geometry_hdf5")]
             for file in sorted(folder.iterdir()):
                 if match := _FRAME.fullmatch(file.name):
                     ref = ViewRef(scene, f"{camera}_{match[1]}")
-                    found[ref] = (camera, int(match[1]))
-        return found
+                    frames[ref] = (camera, int(match[1]))
+        return frames
 
     @cached_property
     def _rows(self) -> dict[str, Mapping[str, str]]:
@@ -210,8 +210,8 @@ class HypersimFolder:
 
     def _intrinsics_of(self, ref: ViewRef) -> Intrinsics:
         row = self._rows.get(ref.house)
-        found = None if row is None else _intrinsics(row)
-        return found or hypersim.usual_intrinsics(hypersim.WIDTH_PX, hypersim.HEIGHT_PX)
+        intrinsics = None if row is None else _intrinsics(row)
+        return intrinsics or hypersim.usual_intrinsics(hypersim.WIDTH_PX, hypersim.HEIGHT_PX)
 
     def _metres(self, scene: str) -> float:
         file = self._folder / scene / "_detail/metadata_scene.csv"
@@ -224,14 +224,14 @@ class HypersimFolder:
     def _pose(self, ref: ViewRef) -> F64:
         """(4, 4) world_from_camera, OpenCV's axes, metres, y up."""
         camera, frame = self._frames[ref]
-        at = (ref.house, camera)
+        key = (ref.house, camera)
         folder = self._folder / ref.house / "_detail" / camera
-        if at not in self._poses:
-            self._poses[at] = (
+        if key not in self._poses:
+            self._poses[key] = (
                 hypersim.read_dataset(folder / "camera_keyframe_positions.hdf5"),
                 hypersim.read_dataset(folder / "camera_keyframe_orientations.hdf5"),
             )
-        positions, orientations = self._poses[at]
+        positions, orientations = self._poses[key]
         if frame >= len(positions) or orientations.shape != (len(positions), 3, 3):
             raise BadInput(folder, "", f"{len(positions)} poses, and a frame {frame}")
         pose, turn = np.eye(4), hypersim.Z_UP_FROM_Y_UP.T

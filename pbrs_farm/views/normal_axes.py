@@ -51,9 +51,9 @@ def decode_normal(
     normal = np.empty(stored.shape, np.float32)
     # Each published channel becomes an axis, turned round where the sign says.
     for axis, (channel, sign) in enumerate(AXES[axes]):
-        own = normal[..., axis]
-        np.multiply(stored[..., channel], np.float32(sign * 2 / 65535), out=own)
-        own -= np.float32(sign)
+        component = normal[..., axis]
+        np.multiply(stored[..., channel], np.float32(sign * 2 / 65535), out=component)
+        component -= np.float32(sign)
     if not valid.all():
         normal[~valid] = 0
     return normal

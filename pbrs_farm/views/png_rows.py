@@ -105,14 +105,14 @@ def _png_parts(png: bytes, place: str) -> tuple[int, int, int, int, int, bytes]:
     width, height, bits, kind, _method, _filter, interlaced = struct.unpack(">IIBBBBB", png[16:29])
     if not 0 < width * height <= _MAX_PIXELS:
         raise BadInput(place, "", f"{width}x{height} pixels are too many")
-    parts, at = [], 33
-    while at + 12 <= len(png):
+    parts, position = [], 33
+    while position + 12 <= len(png):
         # A chunk: length, name, data, checksum.
-        end = at + 12 + int.from_bytes(png[at : at + 4], "big")
-        name = png[at + 4 : at + 8]
+        end = position + 12 + int.from_bytes(png[position : position + 4], "big")
+        name = png[position + 4 : position + 8]
         if name == b"IDAT":
-            parts.append(png[at + 8 : end - 4])
-        at = end
+            parts.append(png[position + 8 : end - 4])
+        position = end
         if name == b"IEND" and end <= len(png):
             return width, height, bits, kind, interlaced, b"".join(parts)
     raise BadInput(place, "", _DAMAGED)

@@ -59,23 +59,23 @@ class ShardSet:
 
     def shards_of(self, split: str | None) -> tuple[Shard, ...]:
         """The shards of a split, all for None; BadInput where there is none of that name."""
-        found = tuple(s for s in self.dataset.shards if split is None or s.split == split)
-        if not found:
+        shards = tuple(s for s in self.dataset.shards if split is None or s.split == split)
+        if not shards:
             splits = dict.fromkeys(s.split for s in self.dataset.shards)
             raise BadInput(
                 self.url, "", f"no shard of split {split}", hint=f"of {', '.join(splits)}"
             )
-        return found
+        return shards
 
     def check(self, request: SampleRequest) -> None:
         """Raise BadInput where the shards do not hold what request asks for."""
-        held = self.dataset
+        dataset = self.dataset
         for layer in request.layers:
-            if layer != "colour" and layer not in held.layers:
-                hint = f"packed: {', '.join(held.layers)}"
+            if layer != "colour" and layer not in dataset.layers:
+                hint = f"packed: {', '.join(dataset.layers)}"
                 raise BadInput(self.url, "", f"no layer {layer} in these shards", hint=hint)
-        if "colour" in request.layers and request.mode not in held.modes:
-            hint = f"packed: {', '.join(held.modes)}"
+        if "colour" in request.layers and request.mode not in dataset.modes:
+            hint = f"packed: {', '.join(dataset.modes)}"
             raise BadInput(self.url, "", f"no pictures in {request.mode} light", hint=hint)
 
     def read_at(self, shard: Shard, view: int, request: SampleRequest) -> Sample:
@@ -91,10 +91,10 @@ class ShardSet:
             raise BadInput(opened.place, "", text, hint="copy or pack it again")
         facts = self._facts_at(opened, view)
         # A part may hold several arrays: read it once.
-        held = opened.views[view]
+        packed_view = opened.views[view]
         names_of: dict[str, list[str]] = {}
         for name in array_names(request.layers):
-            names_of.setdefault(part_of_array(name, request.mode, held), []).append(name)
+            names_of.setdefault(part_of_array(name, request.mode, packed_view), []).append(name)
         arrays: Stored = {}
         for part, names in names_of.items():
             arrays |= self._arrays(opened, view, part, names, facts)

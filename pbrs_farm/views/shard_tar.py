@@ -52,20 +52,20 @@ def members_of_tar(tar: Buffer, place: str) -> Iterator[Member]:
     Only plain files with short names, as `pack` writes them: not a reader for any tar. Lazy; the
     file's bytes are not read, only headers.
     """
-    at = 0
-    while at + _BLOCK <= len(tar):
-        header = bytes(tar[at : at + _BLOCK])
+    position = 0
+    while position + _BLOCK <= len(tar):
+        header = bytes(tar[position : position + _BLOCK])
         if not any(header):
             return
         if header[257:262] != b"ustar" or header[156:157] not in (b"0", b"\0"):
-            raise BadInput(place, f"byte {at}", "not a shard of plain files: damaged")
+            raise BadInput(place, f"byte {position}", "not a shard of plain files: damaged")
         name = header[:_MAX_NAME].rstrip(b"\0").decode("utf-8", "replace")
         try:
             n_bytes = int(header[124:136].rstrip(b"\0 "), 8)
         except ValueError:
-            raise BadInput(place, f"byte {at}", "not a shard: damaged") from None
-        yield Member(name, at + _BLOCK, n_bytes)
-        at += _BLOCK + n_bytes + (-n_bytes % _BLOCK)
+            raise BadInput(place, f"byte {position}", "not a shard: damaged") from None
+        yield Member(name, position + _BLOCK, n_bytes)
+        position += _BLOCK + n_bytes + (-n_bytes % _BLOCK)
     # Two empty blocks were to come.
     raise BadInput(place, "", "ends too soon: truncated", hint="copy or pack it again")
 
@@ -83,10 +83,10 @@ class OpenShard:
         key = None
         for member in members_of_tar(tar, place):
             # The parts of a view stand together; its key ends at the first dot.
-            own, _, part = member.name.partition(".")
-            if own != key:
+            stem, _, part = member.name.partition(".")
+            if stem != key:
                 self.views.append({})
-                key = own
+                key = stem
             self.views[-1][part] = member
 
     def bytes_of(self, view: int, part: str) -> bytes:

@@ -65,8 +65,8 @@ class StoredRoot:
         return {r.id: f"no {_TABLE}" for r, files in self._files.items() if _TABLE not in files}
 
     def lacks(self, ref: ViewRef, request: SampleRequest) -> str:
-        wanted = (_file(name, request.mode) for name in array_names(request.layers))
-        return next((file for file in wanted if file not in self._files[ref]), "")
+        files = (_file(name, request.mode) for name in array_names(request.layers))
+        return next((file for file in files if file not in self._files[ref]), "")
 
     def modes(self, ref: ViewRef) -> tuple[str, ...]:
         return tuple(mode for mode in MODES if f"{mode}.png" in self._files[ref])
@@ -177,8 +177,10 @@ def finished_views(store: Store) -> frozenset[tuple[str, str]]:
     Finished is a view whose view.json is there, as that is written last. Lists the store, which
     takes long for a remote root.
     """
-    found = _files_of_views(store)
-    return frozenset((ref.house, ref.view) for ref, files in found.items() if _TABLE in files)
+    files_of_view = _files_of_views(store)
+    return frozenset(
+        (ref.house, ref.view) for ref, files in files_of_view.items() if _TABLE in files
+    )
 
 
 def copy_view(of: Store, to: Store, ref: ViewRef) -> None:
@@ -190,12 +192,12 @@ def copy_view(of: Store, to: Store, ref: ViewRef) -> None:
         _merge_view(of, to, ref)
         return
     for key in of.list(keys.house_key(ref.house)):
-        at = keys.parse_house_key(key)
-        if at is None or at.file == keys.MANIFEST or at.view not in (None, ref.view):
+        place = keys.parse_house_key(key)
+        if place is None or place.file == keys.MANIFEST or place.view not in (None, ref.view):
             continue
-        if at.view is None and at.file != _CAMERAS and at.step != "cameras":
+        if place.view is None and place.file != _CAMERAS and place.step != "cameras":
             to.put(key, of.get(key))
-        elif at.step and at.view is not None:
+        elif place.step and place.view is not None:
             copy_done(of, to, key)
     _copy_cameras(of, to, ref.house)
 
@@ -230,18 +232,18 @@ def _copy_cameras(of: Store, to: Store, house: str) -> None:
     """cameras.json and its marker; cameras from Python stand beside those that are there."""
     key, marker_key = keys.house_key(house, _CAMERAS), keys.marker_key(house, "cameras")
     data, marker = of.get(key), read_marker(of, marker_key)
-    held = to.get(key) if to.head(key) is not None else data
+    stored = to.get(key) if to.head(key) is not None else data
     if marker is None:
         raise BadInput(of.url, marker_key, "is missing")
-    if held != data:
-        views = {**views_from_json(held, key), **views_from_json(data, key)}
-        found = [views[name] for name in sorted(views)]
-        data = cameras_json(found, {"source": "given", "n_views": len(found)})
+    if stored != data:
+        views = {**views_from_json(stored, key), **views_from_json(data, key)}
+        cameras = [views[name] for name in sorted(views)]
+        data = cameras_json(cameras, {"source": "given", "n_views": len(cameras)})
         files = tuple(
             file.model_copy(update={"n_bytes": len(data), "sha256": keys.sha256(data)})
             for file in marker.files
         )
-        facts = {"views": [[v.id, v.room_id, v.score] for v in found]}
+        facts = {"views": [[v.id, v.room_id, v.score] for v in cameras]}
         marker = marker.model_copy(update={"files": files, "facts": facts})
     to.put(key, data)
     to.put(marker_key, marker.json_bytes())
@@ -271,9 +273,9 @@ def _files_of_views(store: Store) -> dict[ViewRef, set[str]]:
     """View -> its files. A folder is looked at; elsewhere the root's manifest, where there is one."""
     files: dict[ViewRef, set[str]] = {}
     for key in _keys_of(store):
-        at = keys.parse_house_key(key)
-        if at is not None and at.view is not None and not at.step:
-            files.setdefault(ViewRef(at.house, at.view), set()).add(at.file)
+        place = keys.parse_house_key(key)
+        if place is not None and place.view is not None and not place.step:
+            files.setdefault(ViewRef(place.house, place.view), set()).add(place.file)
     return files
 
 

@@ -292,16 +292,16 @@ class Frame:
         """
         rows = self._instance_rows()
         if isinstance(thing, str):
-            found = _rows_named(rows, thing)
+            rows_found = _rows_named(rows, thing)
         elif isinstance(thing, Item):
-            found = [row for row in rows if row["item"] == thing.id]
+            rows_found = [row for row in rows if row["item"] == thing.id]
         else:
-            found = [row for row in rows if row["id"] == thing]
-        if not found:
+            rows_found = [row for row in rows if row["id"] == thing]
+        if not rows_found:
             word = thing.id if isinstance(thing, Item) else str(thing)
-            known = dict.fromkeys(row[key] for row in rows for key in ("item", "name", "class"))
-            raise BadInput(self.id, word, "is not in sight", hint=did_you_mean(word, known))
-        return np.isin(self.instance, [row["id"] for row in found])
+            words = dict.fromkeys(row[key] for row in rows for key in ("item", "name", "class"))
+            raise BadInput(self.id, word, "is not in sight", hint=did_you_mean(word, words))
+        return np.isin(self.instance, [row["id"] for row in rows_found])
 
     def _instance_rows(self) -> list[dict[str, Any]]:
         rows: list[dict[str, Any]] | None = self.table.get("instances")
@@ -523,17 +523,17 @@ class Views(Sequence[Frame]):
             and (split is None or self.source.split_of(ref, shares) == split)
         ]
         lacking = {r.id: self.source.lacks(r, request) for r in refs} if request else {}
-        left_out = {at: f"no {file}" for at, file in lacking.items() if file}
-        kept = tuple(ref for ref in refs if ref.id not in left_out)
-        if not kept:
+        left_out = {view: f"no {file}" for view, file in lacking.items() if file}
+        complete = tuple(ref for ref in refs if ref.id not in left_out)
+        if not complete:
             raise BadInput(self.source.url, "", _nothing_left(split, len(refs), left_out))
-        return replace(self, refs=kept, left_out=left_out)
+        return replace(self, refs=complete, left_out=left_out)
 
 
 def _rows_named(rows: Sequence[Mapping[str, Any]], pattern: str) -> list[Mapping[str, Any]]:
     """The rows whose item has an id, else a name or a class, that matches; case counts first."""
     for keys, fold in ((("item",), str), (("name", "class"), str), (("name", "class"), str.lower)):
-        found = [
+        matches = [
             row
             for row in rows
             if any(
@@ -541,8 +541,8 @@ def _rows_named(rows: Sequence[Mapping[str, Any]], pattern: str) -> list[Mapping
                 for word in (fold(str(row[key])) for key in keys)
             )
         ]
-        if found:
-            return found
+        if matches:
+            return matches
     return []
 
 
@@ -550,5 +550,5 @@ def _nothing_left(split: str | None, n_found: int, left_out: dict[str, str]) -> 
     where = f" in split {split}" if split else ""
     if not left_out:
         return f"no view{where}"
-    at, why = next(iter(left_out.items()))
-    return f"none of {n_found} views{where} has what was asked for: {at}: {why}"
+    view, why = next(iter(left_out.items()))
+    return f"none of {n_found} views{where} has what was asked for: {view}: {why}"

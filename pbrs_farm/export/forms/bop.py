@@ -74,19 +74,21 @@ def write_bop(views: list[ChosenView], out: Path, _choice: Choice) -> None:
     for view in views:
         require_lens(view, "bop")
         scenes.setdefault(view.house.id, []).append(view)
-    for scene, (house_id, own) in enumerate(scenes.items()):
+    for scene, (house_id, house_views) in enumerate(scenes.items()):
         folder = out / _SPLIT / f"{scene:06d}"
-        _write_scene(folder, own, houses[house_id], numbers)
+        _write_scene(folder, house_views, houses[house_id], numbers)
     _write_json(out / "camera.json", _camera_json(views[0]))
 
 
 def _object_numbers(models: list[str]) -> dict[str, int]:
     """Model -> its obj_id."""
-    own = {m: int(found[1]) for m in models if (found := _OWN_NUMBER.fullmatch(m))}
+    number_of = {m: int(match[1]) for m in models if (match := _OWN_NUMBER.fullmatch(m))}
     free = (
-        k for k in range(1, len(models) + max(own.values(), default=0) + 1) if k not in own.values()
+        k
+        for k in range(1, len(models) + max(number_of.values(), default=0) + 1)
+        if k not in number_of.values()
     )
-    return {m: own[m] if m in own else next(free) for m in models}
+    return {m: number_of[m] if m in number_of else next(free) for m in models}
 
 
 def _mesh_of(item: Item, house: House) -> _ModelMesh:
@@ -101,8 +103,8 @@ def _mesh_of(item: Item, house: House) -> _ModelMesh:
         diffuse = np.rint(np.array(house.materials[surface.material].diffuse) * 255)
         rgb.append(np.tile(diffuse.astype(np.uint8), (len(surface.positions), 1)))
     world = np.concatenate(points)
-    own = world @ model_from_world[:3, :3].T + model_from_world[:3, 3]
-    return _ModelMesh(own * _MM, np.concatenate(faces).astype(np.int32), np.concatenate(rgb))
+    local = world @ model_from_world[:3, :3].T + model_from_world[:3, 3]
+    return _ModelMesh(local * _MM, np.concatenate(faces).astype(np.int32), np.concatenate(rgb))
 
 
 def _write_models(folder: Path, meshes: dict[str, _ModelMesh], numbers: dict[str, int]) -> None:
@@ -170,11 +172,11 @@ def _write_scene(
         file = f"rgb/{image:06d}.png"
         coco["images"].append({"id": image, "file_name": file, "width": size[0], "height": size[1]})
         for k, row in enumerate(rows):
-            alone, seen = _masks(view, house.items[row["id"] - 1], row["id"], cut_outs)
-            for name, mask in (("mask", alone), ("mask_visib", seen)):
+            alone, visible = _masks(view, house.items[row["id"] - 1], row["id"], cut_outs)
+            for name, mask in (("mask", alone), ("mask_visib", visible)):
                 png = png_from_array(mask.astype(np.uint8) * np.uint8(255))
                 (folder / name / f"{image:06d}_{k:06d}.png").write_bytes(png)
-            facts = _mask_facts(alone, seen, view.array("depth") > 0)
+            facts = _mask_facts(alone, visible, view.array("depth") > 0)
             info[str(image)].append(facts)
             coco["annotations"].append(
                 {
@@ -185,7 +187,7 @@ def _write_scene(
                     "ignore": False,
                     "area": facts["px_count_visib"],
                     "bbox": facts["bbox_visib"],
-                    "segmentation": compressed_runs(seen),
+                    "segmentation": compressed_runs(visible),
                     "width": size[0],
                     "height": size[1],
                 }
@@ -208,8 +210,8 @@ def _masks(
     (fx, _skew, cx), (_zero, fy, cy), _last = facts["K"]
     intrinsics = Intrinsics(facts["width_px"], facts["height_px"], fx, fy, cx, cy)
     camera = Camera(intrinsics, np.array(facts["world_from_camera_opengl"]))
-    seen = view.array("instance") == instance
-    return coverage(item, camera, cut_outs) | seen, seen
+    visible = view.array("instance") == instance
+    return coverage(item, camera, cut_outs) | visible, visible
 
 
 def _mask_facts(alone: NDArray[Any], seen: NDArray[Any], valid: NDArray[Any]) -> dict[str, Any]:

@@ -77,17 +77,19 @@ class _Seen:
 def _things(view: ChosenView) -> list[_Seen]:
     """The things that count, those with most pixels first."""
     camera_from_world = np.linalg.inv(pose_opencv(view))
-    found = []
+    things = []
     for row in sorted(view.facts["instances"], key=lambda r: (-r["pixels"], r["id"])):
-        seen = row["visible_fraction"]
-        is_seen = (seen is None or seen >= LEAST_VISIBLE) and row["fraction"] >= LEAST_FRACTION
+        visible_fraction = row["visible_fraction"]
+        is_seen = (visible_fraction is None or visible_fraction >= LEAST_VISIBLE) and row[
+            "fraction"
+        ] >= LEAST_FRACTION
         noun = noun_of(view, row) if is_seen and not _is_structure(row) else ""
         if noun:
             world = _corners(row["box3d"])
             local = world @ camera_from_world[:3, :3].T + camera_from_world[:3, 3]
             ends = (local.min(0), local.max(0), world.min(0), world.max(0))
-            found.append(_Seen(row, noun, *ends))
-    return found
+            things.append(_Seen(row, noun, *ends))
+    return things
 
 
 def _is_structure(row: dict[str, Any]) -> bool:
@@ -105,11 +107,11 @@ def _titles(things: Sequence[_Seen]) -> dict[int, str]:
     """Instance -> what tells it from the others: "the sofa", "the left chair", "the third lamp from the left"."""
     titles = {}
     for noun in dict.fromkeys(thing.noun for thing in things):
-        own = sorted((t for t in things if t.noun == noun), key=lambda t: (t.column, t.id))
-        for k, thing in enumerate(own):
-            if len(own) == 1:
+        same_noun = sorted((t for t in things if t.noun == noun), key=lambda t: (t.column, t.id))
+        for k, thing in enumerate(same_noun):
+            if len(same_noun) == 1:
                 title = f"the {noun}"
-            elif len(own) == 2:
+            elif len(same_noun) == 2:
                 title = f"the {('left', 'right')[k]} {noun}"
             else:
                 ordinal = _ORDINALS[k] if k < len(_ORDINALS) else f"{k + 1}th"
@@ -124,14 +126,11 @@ def _relation(a: _Seen, b: _Seen, *, by_axes: bool) -> str:
         return "on top of"
     if not by_axes or _is_on(b, a):
         return ""
-    apart = (
-        a.low - b.high > -_SLACK_M,
-        b.low - a.high > -_SLACK_M,
-    )  # behind it, before it, by axis
-    if not (apart[0][0] or apart[1][0]):
-        return "behind" if apart[0][2] else "in front of" if apart[1][2] else ""
+    axes = (a.low - b.high > -_SLACK_M, b.low - a.high > -_SLACK_M)  # behind it, before it, by axis
+    if not (axes[0][0] or axes[1][0]):
+        return "behind" if axes[0][2] else "in front of" if axes[1][2] else ""
     # Beside each other both in the room and in the picture.
-    if apart[0][0]:
+    if axes[0][0]:
         return "to the right of" if a.column > b.column else ""
     return "to the left of" if a.column < b.column else ""
 
@@ -192,11 +191,11 @@ def caption(view: ChosenView) -> dict[str, Any]:
 def _first_sentence(view: ChosenView, things: Sequence[_Seen]) -> str:
     # In the order of the largest of each noun.
     counts = Counter(thing.noun for thing in things)
-    seen = listed([counted(n, noun) for noun, n in counts.items()]) if counts else ""
+    nouns = listed([counted(n, noun) for noun, n in counts.items()]) if counts else ""
     room = _room(view)
     if not room:
-        return f"The picture shows {seen or 'an object'}."
-    return f"The picture shows {room} with {seen}." if seen else f"The picture shows {room}."
+        return f"The picture shows {nouns or 'an object'}."
+    return f"The picture shows {room} with {nouns}." if nouns else f"The picture shows {room}."
 
 
 def _room(view: ChosenView) -> str:
@@ -258,9 +257,9 @@ def _relation_sentences(relations: Iterable[dict[str, Any]], titles: dict[int, s
         first.setdefault(row["subject"], row)
     sentences = []
     for row in list(first.values())[:_SAID]:
-        subject, relation, other = titles[row["subject"]], row["relation"], titles[row["object"]]
+        subject, relation, base = (titles[row["subject"]], row["relation"], titles[row["object"]])
         verb = "are" if is_plural(subject.partition(" from the left")[0]) else "is"
-        sentences.append(f"{subject[0].upper()}{subject[1:]} {verb} {relation} {other}.")
+        sentences.append(f"{subject[0].upper()}{subject[1:]} {verb} {relation} {base}.")
     return sentences
 
 

@@ -142,8 +142,8 @@ def _segment(row: dict[str, Any], category: int) -> dict[str, Any]:
 
 
 def _segment_ids(instance: NDArray[Any], rows: list[dict[str, Any]]) -> NDArray[np.uint8]:
-    known = np.isin(instance, [row["id"] for row in rows])
-    ids = np.where(known, instance, 0).astype(np.uint32)
+    is_row = np.isin(instance, [row["id"] for row in rows])
+    ids = np.where(is_row, instance, 0).astype(np.uint32)
     return np.stack([ids & 255, ids >> 8 & 255, ids >> 16 & 255], axis=-1).astype(np.uint8)
 
 

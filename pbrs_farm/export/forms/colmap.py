@@ -26,14 +26,14 @@ def write_colmap(views: list[ChosenView], out: Path, _choice: Choice) -> None:
     rigs.txt and frames.txt beside them, as COLMAP 3.12 and later read them.
     """
     for house in dict.fromkeys(view.house.id for view in views):
-        own = [view for view in views if view.house.id == house]
+        house_views = [view for view in views if view.house.id == house]
         (out / house / "images").mkdir(parents=True)
         (out / house / "sparse/0").mkdir(parents=True)
         cameras: dict[tuple[str, str], int] = {}
         images: list[str] = []
         points: list[str] = []
         sensors: list[int] = []
-        for number, view in enumerate(own, start=1):
+        for number, view in enumerate(house_views, start=1):
             picture = required_picture(view, "colmap")
             (out / house / "images" / f"{view.id}.png").write_bytes(view.data(picture))
             # Each camera of a rig is a sensor, even if two are alike.
@@ -44,8 +44,8 @@ def write_colmap(views: list[ChosenView], out: Path, _choice: Choice) -> None:
             # A line of its pose and one of its points. COLMAP allows an empty one, but readers of gsplat
             # and pycolmap take it for the end of the file.
             first = len(points) + 1
-            seen = [f"{x:g} {y:g} {n}" for n, (x, y) in enumerate(pixels, start=first)]
-            line = " ".join(seen or _NO_POINT)
+            observations = [f"{x:g} {y:g} {n}" for n, (x, y) in enumerate(pixels, start=first)]
+            line = " ".join(observations or _NO_POINT)
             images.append(f"{number} {_pose_words(view)} {camera} {view.id}.png\n{line}\n")
             points += [f"{line} 0 {number} {k}" for k, line in enumerate(lines)]
         _write_lines(
@@ -54,8 +54,10 @@ def write_colmap(views: list[ChosenView], out: Path, _choice: Choice) -> None:
         _write_lines(out / house / "sparse/0/images.txt", images)
         numbered = (f"{n} {point}\n" for n, point in enumerate(points, start=1))
         _write_lines(out / house / "sparse/0/points3D.txt", numbered)
-        if any("rig" in view.facts for view in own):
-            for name, lines in zip(("rigs", "frames"), _rig_lines(own, sensors), strict=True):
+        if any("rig" in view.facts for view in house_views):
+            for name, lines in zip(
+                ("rigs", "frames"), _rig_lines(house_views, sensors), strict=True
+            ):
                 _write_lines(out / house / f"sparse/0/{name}.txt", lines)
 
 

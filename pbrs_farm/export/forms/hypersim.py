@@ -66,9 +66,9 @@ def write_hypersim(views: list[ChosenView], out: Path, choice: Choice) -> None:
     tables: dict[str, list[dict[str, Any]]] = {
         name: [] for name in (hypersim.SPLIT_CSV, hypersim.CAMERAS_CSV, _INDEX)
     }
-    for number, own in enumerate(_scenes(views)):
+    for number, scene_views in enumerate(_scenes(views)):
         scene = _scene_name(number)
-        _write_scene(out / scene, own, tables, scene)
+        _write_scene(out / scene, scene_views, tables, scene)
     for name, rows in tables.items():
         _write_table(out / name, rows)
     credits = dict.fromkeys(v.house.attribution for v in views if v.house.attribution)
@@ -77,40 +77,40 @@ def write_hypersim(views: list[ChosenView], out: Path, choice: Choice) -> None:
 
 def _scene_name(number: int) -> str:
     """`ai_VVV_NNN` of a scene by its number, from 0."""
-    volume, own = divmod(number, _MOST_SCENES)
-    return f"ai_{volume + 1:03d}_{own + 1:03d}"
+    volume, number_in_volume = divmod(number, _MOST_SCENES)
+    return f"ai_{volume + 1:03d}_{number_in_volume + 1:03d}"
 
 
 def _scenes(views: Iterable[ChosenView]) -> list[list[ChosenView]]:
     """The views by home and pin-hole: a scene has one projection."""
-    found: dict[tuple[Any, ...], list[ChosenView]] = {}
+    scenes: dict[tuple[Any, ...], list[ChosenView]] = {}
     for view in views:
         require_lens(view, "hypersim")
         i = intrinsics_of(view.facts)
         key = (view.house.id, i.width_px, i.height_px, i.fx, i.fy, i.cx, i.cy)
-        found.setdefault(key, []).append(view)
-    return list(found.values())
+        scenes.setdefault(key, []).append(view)
+    return list(scenes.values())
 
 
 def _trajectories(views: Iterable[ChosenView]) -> list[list[ChosenView]]:
     """The views by camera: single views, frames of a walk; each camera of a rig apart."""
-    found: dict[tuple[bool, str], list[ChosenView]] = {}
+    by_camera: dict[tuple[bool, str], list[ChosenView]] = {}
     for view in views:
         key = ("frame" in view.facts, view.shot.eye)
-        found.setdefault(key, []).append(view)
-    for (is_frame, _eye), own in found.items():
+        by_camera.setdefault(key, []).append(view)
+    for (is_frame, _eye), camera_views in by_camera.items():
         if is_frame:
-            own.sort(key=lambda view: int(view.facts["frame"]))
-    return [found[key] for key in sorted(found)]
+            camera_views.sort(key=lambda view: int(view.facts["frame"]))
+    return [by_camera[key] for key in sorted(by_camera)]
 
 
 def _write_scene(
     folder: Path, views: list[ChosenView], tables: Mapping[str, list[dict[str, Any]]], scene: str
 ) -> None:
     detail = folder / "_detail"
-    cameras = {f"cam_{k:02d}": own for k, own in enumerate(_trajectories(views))}
-    for camera, own in cameras.items():
-        for frame, view in enumerate(own):
+    cameras = {f"cam_{k:02d}": camera_views for k, camera_views in enumerate(_trajectories(views))}
+    for camera, camera_views in cameras.items():
+        for frame, view in enumerate(camera_views):
             files = _frame(view)
             for (part, name), array in files.items():
                 file = folder / hypersim.frame_file(camera, frame, part, name)
@@ -119,11 +119,11 @@ def _write_scene(
                     file.write_bytes(array)
                 else:
                     hypersim.write_dataset(file, array)
-            at: dict[str, Any] = {"scene_name": scene, "camera_name": camera, "frame_id": frame}
-            tables[_INDEX].append(at | {"house": view.house.id, "view": view.id})
+            place: dict[str, Any] = {"scene_name": scene, "camera_name": camera, "frame_id": frame}
+            tables[_INDEX].append(place | {"house": view.house.id, "view": view.id})
             split = {"included_in_public_release": True, "exclude_reason": ""}
-            tables[hypersim.SPLIT_CSV].append(at | split | {"split_partition_name": "train"})
-        for name, array in _trajectory(own).items():
+            tables[hypersim.SPLIT_CSV].append(place | split | {"split_partition_name": "train"})
+        for name, array in _trajectory(camera_views).items():
             hypersim.write_dataset(detail / camera / f"{name}.hdf5", array)
     for name, array in _boxes(views).items():
         hypersim.write_dataset(detail / "mesh" / f"{name}.hdf5", array)
@@ -156,10 +156,10 @@ def _boxes(views: Iterable[ChosenView]) -> dict[str, NDArray[Any]]:
         axes = hypersim.Z_UP_FROM_Y_UP @ np.array(box["axes"], np.float64).T
         up = int(np.abs(axes[2]).argmax())
         order = [(up + 1) % 3, (up + 2) % 3, up]
-        own = axes[:, order] * np.where(axes[2, up] < 0, -1.0, 1.0)
-        own[:, 1] *= np.sign(np.linalg.det(own)) or 1.0
+        upright = axes[:, order] * np.where(axes[2, up] < 0, -1.0, 1.0)
+        upright[:, 1] *= np.sign(np.linalg.det(upright)) or 1.0
         centre[number] = hypersim.Z_UP_FROM_Y_UP @ np.array(box["centre"], np.float64)
-        size[number], turn[number] = 2 * np.array(box["half"], np.float64)[order], own
+        size[number], turn[number] = 2 * np.array(box["half"], np.float64)[order], upright
     name = "metadata_semantic_instance_bounding_box_object_aligned_2d"
     return {f"{name}_positions": centre, f"{name}_extents": size, f"{name}_orientations": turn}
 
@@ -205,13 +205,13 @@ def _geometry(view: ChosenView) -> dict[str, NDArray[Any]]:
     z = np.where(depth < np.iinfo(np.uint16).max, depth, 0) / 1000
     if view.has("depth_z"):
         z = view.array("depth_z").astype(np.float64)
-    i, seen = intrinsics_of(view.facts), z > 0
-    along = np.where(seen, z * hypersim.ray_lengths(i), np.nan)
+    i, is_visible = intrinsics_of(view.facts), z > 0
+    along = np.where(is_visible, z * hypersim.ray_lengths(i), np.nan)
     whole = np.int16 if int(instance.max(initial=0)) <= _INT16 else np.int32
     semantic = view.array("semantic") if view.choice.classes is None else None
     pose, turn = pose_opencv(view), hypersim.Z_UP_FROM_Y_UP
     local = opengl_normals(view)
-    found: dict[str, NDArray[Any]] = {
+    arrays: dict[str, NDArray[Any]] = {
         "depth_meters": along.astype(np.float32),
         "position": _positions(z, i, pose, turn),
         "normal_cam": local,
@@ -220,11 +220,11 @@ def _geometry(view: ChosenView) -> dict[str, NDArray[Any]]:
         "render_entity_id": np.where(instance > 0, instance.astype(np.int32), np.int32(-1)),
     }
     if semantic is not None:
-        found["semantic"] = np.where(semantic > 0, semantic.astype(np.int16), np.int16(-1))
+        arrays["semantic"] = np.where(semantic > 0, semantic.astype(np.int16), np.int16(-1))
     if view.has("normal_shading"):
         bent = opengl_normals(view, "normal_shading")
-        found |= {"normal_bump_cam": bent, "normal_bump_world": _in_world(bent, pose, turn)}
-    return found
+        arrays |= {"normal_bump_cam": bent, "normal_bump_world": _in_world(bent, pose, turn)}
+    return arrays
 
 
 def _positions(z: F64, i: Any, pose: F64, turn: F64) -> F32:
@@ -244,17 +244,17 @@ def _light(view: ChosenView) -> dict[str, NDArray[np.float16]]:
 
     No residual is negative (`intrinsic_parts`).
     """
-    found: dict[str, NDArray[np.float16]] = {}
+    light_arrays: dict[str, NDArray[np.float16]] = {}
     if view.has("albedo"):
-        found["diffuse_reflectance"] = _half(linear_from_srgb(view.array("albedo") / 255))
+        light_arrays["diffuse_reflectance"] = _half(linear_from_srgb(view.array("albedo") / 255))
     parts = intrinsic_parts(view)
     if parts is not None:
         names = "diffuse_reflectance", "diffuse_illumination", "residual"
-        found |= {name: _half(part) for name, part in zip(names, parts, strict=True)}
-        light, shading, rest = (found[name].astype(np.float32) for name in names)
-        return found | {"color": _half(light * shading + rest)}
+        light_arrays |= {name: _half(part) for name, part in zip(names, parts, strict=True)}
+        light, shading, rest = (light_arrays[name].astype(np.float32) for name in names)
+        return light_arrays | {"color": _half(light * shading + rest)}
     colour = _colour(view)
-    return found if colour is None else found | {"color": _half(colour)}
+    return light_arrays if colour is None else light_arrays | {"color": _half(colour)}
 
 
 def _colour(view: ChosenView) -> F32 | None:
@@ -267,9 +267,9 @@ def _colour(view: ChosenView) -> F32 | None:
     if develop.get("denoised", False):
         aovs = denoise_aovs(aovs)
     groups = GROUPS_OF_MODE[Mode(view.picture)] if view.picture else ()
-    wanted = groups or (Group.OUTDOOR, Group.INDOOR)
+    parts = groups or (Group.OUTDOOR, Group.INDOOR)
     total = np.zeros_like(aovs.outdoor)
-    for group in wanted:
+    for group in parts:
         total = total + (aovs.outdoor if group is Group.OUTDOOR else aovs.indoor)
     return np.asarray(total, np.float32)
 
@@ -327,9 +327,11 @@ def join_splits(out: Path, splits: tuple[str, ...], _choice: Choice) -> None:
 def _card(out: Path) -> str:
     rows, frames = _table(out / hypersim.CAMERAS_CSV), len(_table(out / _INDEX))
     usual = hypersim.cam_from_uv(hypersim.usual_intrinsics(hypersim.WIDTH_PX, hypersim.HEIGHT_PX))
-    others = [row["scene_name"] for row in rows if not _is_usual(row, usual)]
-    camera = "holds for every scene" if not others else f"does NOT hold for {', '.join(others[:9])}"
-    camera += "" if len(others) <= 9 else f" and {len(others) - 9} more"
+    unusual = [row["scene_name"] for row in rows if not _is_usual(row, usual)]
+    camera = (
+        "holds for every scene" if not unusual else f"does NOT hold for {', '.join(unusual[:9])}"
+    )
+    camera += "" if len(unusual) <= 9 else f" and {len(unusual) - 9} more"
     has_light = any(out.glob("ai_*/images/*_final_hdf5/*.color.hdf5"))
     has_parts = any(out.glob("ai_*/images/*_final_hdf5/*.diffuse_illumination.hdf5"))
     light = (
@@ -357,9 +359,9 @@ Frames: {frames}. Scenes: {len(rows)}. `index.csv` says which view each is, `{_C
 
 def _is_usual(row: Mapping[str, str], usual: F64) -> bool:
     size = int(row["settings_output_img_width"]), int(row["settings_output_img_height"])
-    own = np.array([[float(row[f"M_cam_from_uv_{r}{c}"]) for c in range(3)] for r in range(3)])
+    matrix = np.array([[float(row[f"M_cam_from_uv_{r}{c}"]) for c in range(3)] for r in range(3)])
     return size == (hypersim.WIDTH_PX, hypersim.HEIGHT_PX) and bool(
-        np.allclose(own, usual, atol=1e-5)
+        np.allclose(matrix, usual, atol=1e-5)
     )
 
 

@@ -59,14 +59,16 @@ def _labels(view: ChosenView) -> dict[str, bytes]:
         disparity = view.array("disparity")
         files["disp_occ_0/{}_10.png"] = png_from_array(disparity)
         if view.has("occlusion_stereo"):
-            seen = view.array("occlusion_stereo") == _SEEN
-            files["disp_noc_0/{}_10.png"] = png_from_array(np.where(seen, disparity, np.uint16(0)))
+            is_seen = view.array("occlusion_stereo") == _SEEN
+            files["disp_noc_0/{}_10.png"] = png_from_array(
+                np.where(is_seen, disparity, np.uint16(0))
+            )
     if view.has("flow_forward"):
-        flow, there = view.array("flow_forward"), view.array("depth") > 0
-        files["flow_occ/{}_10.png"] = png_from_array(kitti_flow(flow, there))
+        flow, has_depth = view.array("flow_forward"), view.array("depth") > 0
+        files["flow_occ/{}_10.png"] = png_from_array(kitti_flow(flow, has_depth))
         if view.has("occlusion_forward"):
-            seen = view.array("occlusion_forward") == _SEEN
-            files["flow_noc/{}_10.png"] = png_from_array(kitti_flow(flow, seen))
+            is_seen = view.array("occlusion_forward") == _SEEN
+            files["flow_noc/{}_10.png"] = png_from_array(kitti_flow(flow, is_seen))
     return files
 
 

@@ -70,13 +70,13 @@ def _corners(view: ChosenView) -> F64:
     rows: dict[str, list[list[float]]] = {"ceiling": [], "floor": []}
     for row in view.facts.get("layout", ()):
         rows[row["at"]].append(row["world"])
-    found = np.array([rows["ceiling"], rows["floor"]], np.float64).reshape(2, -1, 3)
-    plan = found[0][:, [0, 2]]
+    rows_of_corners = np.array([rows["ceiling"], rows["floor"]], np.float64).reshape(2, -1, 3)
+    plan = rows_of_corners[0][:, [0, 2]]
     before, after = np.roll(plan, 1, axis=0), np.roll(plan, -1, axis=0)
-    along, here = after - before, plan - before
-    off = np.abs(along[:, 0] * here[:, 1] - along[:, 1] * here[:, 0])
+    along, offsets = after - before, plan - before
+    off = np.abs(along[:, 0] * offsets[:, 1] - along[:, 1] * offsets[:, 0])
     is_bend = off > _STRAIGHT_M * np.linalg.norm(along, axis=1)
-    return np.asarray(np.moveaxis(found, 0, 1)[is_bend])
+    return np.asarray(np.moveaxis(rows_of_corners, 0, 1)[is_bend])
 
 
 def aligned_axes(view: ChosenView) -> F64:
@@ -88,8 +88,8 @@ def aligned_axes(view: ChosenView) -> F64:
     walls = np.roll(plan, -1, axis=0) - plan
     x, z = walls[np.linalg.norm(walls, axis=1).argmax()]
     ahead = pose_opencv(view)[:3, 2]
-    wall, own = np.arctan2(z, x), np.arctan2(ahead[2], ahead[0])
-    heading = wall + np.pi / 2 * np.round((own - wall) / (np.pi / 2))
+    wall, yaw = np.arctan2(z, x), np.arctan2(ahead[2], ahead[0])
+    heading = wall + np.pi / 2 * np.round((yaw - wall) / (np.pi / 2))
     forward, down = np.array([np.cos(heading), 0, np.sin(heading)]), np.array([0, -1.0, 0])
     return np.stack([np.cross(down, forward), down, forward], axis=1)
 
@@ -104,12 +104,12 @@ def turned_picture(picture: NDArray[np.uint8], aligned_from_camera: F64) -> NDAr
     scale = np.array([2 * np.pi / WIDTH_PX, np.pi / HEIGHT_PX])
     plane = np.stack([x.ravel() - WIDTH_PX / 2, y.ravel() - HEIGHT_PX / 2], axis=1) * scale
     # Rows of directions: the inverse of a turn is its transpose.
-    seen = equirect_of_directions(directions_of_equirect(plane) @ aligned_from_camera) / scale
-    at = np.stack([seen[:, 1] + HEIGHT_PX / 2 - 0.5, seen[:, 0] + WIDTH_PX / 2 - 0.5 + 1])
+    pixels = equirect_of_directions(directions_of_equirect(plane) @ aligned_from_camera) / scale
+    indices = np.stack([pixels[:, 1] + HEIGHT_PX / 2 - 0.5, pixels[:, 0] + WIDTH_PX / 2 - 0.5 + 1])
     # Between the four nearest pixels; the left edge adjoins the right one.
     around = np.concatenate([picture[:, -1:], picture, picture[:, :1]], axis=1).astype(np.float64)
     planes = [
-        ndimage.map_coordinates(around[..., k], at, order=1, mode="nearest") for k in range(3)
+        ndimage.map_coordinates(around[..., k], indices, order=1, mode="nearest") for k in range(3)
     ]
     return np.rint(np.stack(planes, axis=-1)).astype(np.uint8).reshape(HEIGHT_PX, WIDTH_PX, 3)
 

@@ -37,17 +37,17 @@ def write_nerfstudio(views: list[ChosenView], out: Path, _choice: Choice) -> Non
     from the home's y up. Views without a picture are an error.
     """
     for house in dict.fromkeys(view.house.id for view in views):
-        own = [view for view in views if view.house.id == house]
-        models = {intrinsics_of(view.facts).lens.model for view in own}
+        house_views = [view for view in views if view.house.id == house]
+        models = {intrinsics_of(view.facts).lens.model for view in house_views}
         if len(models) > 1:
             text = f"has one lens model a house, these views have {' and '.join(sorted(models))}"
             raise BadInput("--to", "nerfstudio", text)
         transforms = {
-            "camera_model": _MODELS[intrinsics_of(own[0].facts).lens.model],
+            "camera_model": _MODELS[intrinsics_of(house_views[0].facts).lens.model],
             "orientation_override": "none",
             "depth_unit_scale_factor": 0.001,
             "applied_transform": Z_UP_FROM_Y_UP[:3].tolist(),
-            "frames": [_frame(view, out / house) for view in own],
+            "frames": [_frame(view, out / house) for view in house_views],
         }
         (out / house / "transforms.json").write_text(
             json.dumps(transforms, indent=1) + "\n", "utf-8"

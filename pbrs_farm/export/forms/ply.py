@@ -40,18 +40,18 @@ def write_ply(views: list[ChosenView], out: Path, choice: Choice) -> None:
 
 def point_cloud(view: ChosenView) -> NDArray[np.void]:
     """(N,) records of the pixels that see a surface, row by row: x y z float32, and where the view has them red green blue, nx ny nz, label, instance."""
-    points, seen = _seen_points(view)
+    points, is_seen = _seen_points(view)
     columns: dict[str, NDArray[Any]] = dict(zip("xyz", points.astype(np.float32).T, strict=True))
     if view.has("normal"):
-        normals = _world_normals(view)[seen].astype(np.float32)
+        normals = _world_normals(view)[is_seen].astype(np.float32)
         columns |= dict(zip(("nx", "ny", "nz"), normals.T, strict=True))
     if view.picture is not None:
-        colours = view.array(view.picture)[seen]
+        colours = view.array(view.picture)[is_seen]
         columns |= dict(zip(("red", "green", "blue"), colours.T, strict=True))
     if view.has("semantic"):
-        columns["label"] = view.array("semantic")[seen].astype(np.uint16)
+        columns["label"] = view.array("semantic")[is_seen].astype(np.uint16)
     if view.has("instance"):
-        columns["instance"] = view.array("instance")[seen]
+        columns["instance"] = view.array("instance")[is_seen]
     # One record a point, its properties side by side without gaps.
     fields = [(name, values.dtype.newbyteorder("<")) for name, values in columns.items()]
     records = np.empty(len(points), fields)
@@ -62,13 +62,13 @@ def point_cloud(view: ChosenView) -> NDArray[np.void]:
 
 def _header(view: ChosenView, choice: Choice, vertices: NDArray[np.void]) -> bytes:
     dtype = vertices.dtype
-    seen = np.unique(vertices["label"]) if "label" in (dtype.names or ()) else ()
+    labels = np.unique(vertices["label"]) if "label" in (dtype.names or ()) else ()
     lines = [
         "ply",
         "format binary_little_endian 1.0",
         f"comment {view.house.id}/{view.id}, metres, y up",
         *([f"comment {view.house.attribution}"] if view.house.attribution else []),
-        *(f"comment label {k} {choice.class_names[int(k)]}" for k in seen if k),
+        *(f"comment label {k} {choice.class_names[int(k)]}" for k in labels if k),
         f"element vertex {len(vertices)}",
         *(f"property {_TYPES[dtype[name].name]} {name}" for name in dtype.names or ()),
         "end_header",
@@ -80,20 +80,20 @@ def _seen_points(view: ChosenView) -> tuple[F64, Mask]:
     """(N, 3) points in the world, metres, and (H, W) the pixels that they are of."""
     if view.has("position"):
         position = view.array("position")
-        seen = np.asarray(view.array("depth") > 0) & np.isfinite(position).all(-1)
-        return position[seen].astype(np.float64), seen
+        is_seen = np.asarray(view.array("depth") > 0) & np.isfinite(position).all(-1)
+        return position[is_seen].astype(np.float64), is_seen
     intrinsics = intrinsics_of(view.facts)
     if not intrinsics.lens.is_pinhole:
-        what = f"lens.model {intrinsics.lens.model} needs the layer position"
-        raise BadInput(f"{view.house.id}/{view.id}", "", what, hint="run with --layers position")
+        problem = f"lens.model {intrinsics.lens.model} needs the layer position"
+        raise BadInput(f"{view.house.id}/{view.id}", "", problem, hint="run with --layers position")
     depth = view.array("depth")
     # The farthest value is that depth or any beyond it.
-    seen = np.asarray((depth > 0) & (depth < _FARTHEST_MM))
-    rows, columns = np.nonzero(seen)
+    is_seen = np.asarray((depth > 0) & (depth < _FARTHEST_MM))
+    rows, columns = np.nonzero(is_seen)
     rays = intrinsics.directions(np.stack([columns + 0.5, rows + 0.5], axis=1))
     pose = pose_opencv(view)
-    local = rays * (depth[seen] / 1000)[:, None]
-    return local @ pose[:3, :3].T + pose[:3, 3], seen
+    local = rays * (depth[is_seen] / 1000)[:, None]
+    return local @ pose[:3, :3].T + pose[:3, 3], is_seen
 
 
 def _world_normals(view: ChosenView) -> F64:

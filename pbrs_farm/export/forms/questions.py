@@ -106,14 +106,14 @@ def _conversation(number: int, question: Question, medium: str) -> dict[str, Any
     if question.options:
         text = "\n".join([text, *question.options])
         answer = f"{question.ground_truth}. {question.answer}"
-    what = "video" if medium.endswith(".mp4") else "image"
+    kind = "video" if medium.endswith(".mp4") else "image"
     return {
         "id": f"{DATASET}__{number}",
         "type": "mc" if question.options else "oe",
         "data_source": DATASET,
-        what: medium,
+        kind: medium,
         "conversations": [
-            {"from": "human", "value": f"<{what}>\n{text}", "task": question.kind},
+            {"from": "human", "value": f"<{kind}>\n{text}", "task": question.kind},
             {"from": "gpt", "value": answer},
         ],
     }

@@ -36,14 +36,14 @@ def write_released(views: list[ChosenView], out: Path, _choice: Choice) -> None:
     for view in views:
         houses[view.house.id].append(view)
     good = []  # lines of the list of good views
-    for house, own in houses.items():
-        for number, view in enumerate(own):
+    for house, house_views in houses.items():
+        for number, view in enumerate(house_views):
             place = {"house": house, "id": f"{number:06d}"}
             for layer, published in FILES.items():
                 if view.has(layer):
                     _write_file(out / published.format(**place), view.data(layer))
             good.append("{house}/{id}\n".format(**place))
-        _write_cameras(out / "camera_v2" / house, own)
+        _write_cameras(out / "camera_v2" / house, house_views)
     (out / "data_goodlist_v2.txt").write_text("".join(good), "utf-8")
 
 

@@ -31,18 +31,18 @@ def write_tapvid(views: list[ChosenView], out: Path, _choice: Choice) -> None:
     none of them sees are left out. BadInput for a house without tracks.npz.
     """
     videos: dict[str, dict[str, Any]] = {}
-    others: list[ChosenView] = []
+    stills: list[ChosenView] = []
     for house, moments in frames_by_house(views).items():
         frames = [m.first for m in moments if m.first.facts.get("frame") is not None]
-        others += [m.first for m in moments if m.first.facts.get("frame") is None]
-        others += [view for m in moments for view in m.others.values()]
+        stills += [m.first for m in moments if m.first.facts.get("frame") is None]
+        stills += [view for m in moments for view in m.others.values()]
         if frames:
             videos[house] = _video(frames)
     if not videos:
         hint = "pbrs-farm run HOME --cameras walk --tracks"
         raise BadInput("--to", "tapvid", "no view is a frame of a sequence", hint=hint)
     (out / _FILE).write_bytes(pickle.dumps(videos, _PROTOCOL))
-    name_left_out(out, others, "is no frame of a film, or another camera's of a rig")
+    name_left_out(out, stills, "is no frame of a film, or another camera's of a rig")
 
 
 def _video(frames: list[ChosenView]) -> dict[str, Any]:
@@ -58,19 +58,19 @@ def _video(frames: list[ChosenView]) -> dict[str, Any]:
     unknown = [frame.id for frame in frames if frame.id not in number]
     if unknown:
         raise BadInput(path, unknown[0], "is no frame of these tracks")
-    at = [number[frame.id] for frame in frames]
+    columns = [number[frame.id] for frame in frames]
     pictures = [
         array_from_png(frame.data(required_picture(frame, "tapvid")), f"{house.id}/{frame.id}")
         for frame in frames
     ]
     rendered = frames[0].entry.facts
     size = np.array([rendered["width_px"], rendered["height_px"]], np.float32)
-    occluded = tracks["occluded"][:, at]
-    seen = ~occluded.all(1)
+    occluded = tracks["occluded"][:, columns]
+    is_seen = ~occluded.all(1)
     return {
         "video": np.stack(pictures)[..., :3],
-        "points": (tracks["points"][:, at] / size)[seen].astype(np.float32),
-        "occluded": occluded[seen],
+        "points": (tracks["points"][:, columns] / size)[is_seen].astype(np.float32),
+        "occluded": occluded[is_seen],
     }
 
 

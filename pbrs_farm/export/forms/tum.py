@@ -34,14 +34,14 @@ def write_tum(views: list[ChosenView], out: Path, _choice: Choice) -> None:
         for frame, time in timed:
             for eye, view in {"": frame.first, **frame.others}.items():
                 by_eye.setdefault(eye, []).append((view, time))
-        for eye, own in by_eye.items():
-            _write_trajectory(out / house, eye and f"_{eye}", own)
-            written |= {(house, view.id) for view, _time in own}
+        for eye, moments in by_eye.items():
+            _write_trajectory(out / house, eye and f"_{eye}", moments)
+            written |= {(house, view.id) for view, _time in moments}
     if not written:
         hint = "pbrs-farm run HOME --cameras walk"
         raise BadInput("--to", "tum", "no view is a frame of a sequence", hint=hint)
-    others = [view for view in views if (view.house.id, view.id) not in written]
-    name_left_out(out, others, "has no frame of a sequence that is exported")
+    left_out = [view for view in views if (view.house.id, view.id) not in written]
+    name_left_out(out, left_out, "has no frame of a sequence that is exported")
 
 
 def _write_trajectory(folder: Path, side: str, timed: Sequence[tuple[ChosenView, float]]) -> None:
@@ -53,9 +53,9 @@ def _write_trajectory(folder: Path, side: str, timed: Sequence[tuple[ChosenView,
         require_lens(view, "tum", "radtan")
         files = {"rgb": view.data(required_picture(view, "tum")), "depth": _depth(view)}
         for name, data in files.items():
-            at = f"{name}{side}/{time:.6f}.png"
-            (folder / at).write_bytes(data)
-            rows[name].append(f"{time:.6f} {at}")
+            file = f"{name}{side}/{time:.6f}.png"
+            (folder / file).write_bytes(data)
+            rows[name].append(f"{time:.6f} {file}")
         rows["groundtruth"].append(_trajectory_row(time, pose_opencv(view)))
     for name, lines in rows.items():
         (folder / f"{name}{side}.txt").write_text("\n".join(lines) + "\n", "utf-8")

@@ -43,15 +43,15 @@ def write_usd(home: ExportedHome, folder: Path) -> None:
 
 def _write_textures(house: House, folder: Path) -> dict[str, str]:
     """Texture id -> its file's name, relative to the stage."""
-    found = {}
+    files = {}
     for key, texture in house.textures.items():
         if texture.media_type not in GLTF_IMAGES:
             continue
         (folder / "textures").mkdir(exist_ok=True)
         name = f"textures/{key}{_SUFFIXES[texture.media_type]}"
         (folder / name).write_bytes(texture.data)
-        found[key] = f"./{name}"
-    return found
+        files[key] = f"./{name}"
+    return files
 
 
 class _Stage:

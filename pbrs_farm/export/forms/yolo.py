@@ -92,8 +92,8 @@ def names_lines(choice: Choice) -> list[str]:
     """The classes by number, as data.yaml has them."""
     names = choice.class_names.values()
     # A user's name may be anything: JSON's text is YAML's, too.
-    said = names if choice.classes is None else map(json.dumps, names)
-    return ["names:", *(f"  {k}: {name}" for k, name in enumerate(said))]
+    class_words = names if choice.classes is None else map(json.dumps, names)
+    return ["names:", *(f"  {k}: {name}" for k, name in enumerate(class_words))]
 
 
 def write_yaml(out: Path, splits: tuple[str, ...], fields: list[str]) -> None:
@@ -104,11 +104,11 @@ def write_yaml(out: Path, splits: tuple[str, ...], fields: list[str]) -> None:
     """
     folders = {name: f"{name}/images" for name in splits} or {"train": "images", "val": "images"}
     remarks = [] if splits else ["# without --split, train and val are all views"]
-    for name, other in (("train", "val"), ("val", "train")):
+    for name, substitute in (("train", "val"), ("val", "train")):
         if name not in folders:
-            other = other if other in folders else next(iter(folders))
-            folders[name] = folders[other]
-            remarks.append(f"# the split left {name} empty, so {other} stands in for it")
+            substitute = substitute if substitute in folders else next(iter(folders))
+            folders[name] = folders[substitute]
+            remarks.append(f"# the split left {name} empty, so {substitute} stands in for it")
     lines = [*remarks, *(f"{name}: {folders[name]}" for name in SPLITS if name in folders)]
     lines += fields
     (out / "data.yaml").write_text("\n".join(lines) + "\n", "utf-8")

@@ -26,8 +26,8 @@ def write_yolo_semantic(views: list[ChosenView], out: Path, choice: Choice) -> N
     the ids), 255 where nothing is or it has no class. BadInput for more than 255 classes.
     """
     if len(choice.class_names) > _IGNORED:
-        what = f"{len(choice.class_names)} classes: a mask holds {_IGNORED}"
-        raise BadInput("--to yolo-semantic", "", what, hint="fewer classes in --classes")
+        problem = f"{len(choice.class_names)} classes: a mask holds {_IGNORED}"
+        raise BadInput("--to yolo-semantic", "", problem, hint="fewer classes in --classes")
     number = np.full(max(choice.class_names) + 1, _IGNORED, np.uint8)
     number[list(choice.class_names)] = np.arange(len(choice.class_names))
 

@@ -69,7 +69,7 @@ class Asker:
         return [question for clip in clips for question in self._of_clip(clip)]
 
     def _of_clip(self, clip: Clip) -> list[Question]:
-        found = []
+        questions = []
         for kind in KINDS:
             if kind.of_walks_only and not clip.is_walk:
                 continue
@@ -80,10 +80,10 @@ class Asker:
                 if draft is None:
                     break
                 drafts = [d for d in drafts if set(d.about) != set(draft.about)]
-                found.append(self._worded(clip, kind, draft, rng))
+                questions.append(self._worded(clip, kind, draft, rng))
                 if not drafts:
                     break
-        return found
+        return questions
 
     def _take_rarest(self, kind: QuestionKind, drafts: Sequence[Draft]) -> Draft | None:
         """Take the first draft with the rarest answer, and count that answer.
@@ -94,15 +94,15 @@ class Asker:
         """
         count = self._answers[kind.name]
         draft = min(drafts, key=lambda d: count[d.answer])
-        others = count.total() - count[draft.answer]
-        least = min((count[answer] for answer in kind.answers), default=others)
+        n_other = count.total() - count[draft.answer]
+        least = min((count[answer] for answer in kind.answers), default=n_other)
         if count[draft.answer] >= least + _MOST_APART:
             return None
         count[draft.answer] += 1
         return draft
 
     def _worded(self, clip: Clip, kind: QuestionKind, draft: Draft, rng: random.Random) -> Question:
-        here = "in the video" if clip.is_walk else "in the image"
+        medium = "in the video" if clip.is_walk else "in the image"
         style = rng.choice(kind.styles)
         truth, options = draft.answer, list(draft.options)
         if options:
@@ -114,7 +114,7 @@ class Asker:
             count[truth] += 1
             wrong.insert(_LETTERS.index(truth), draft.answer)
             options = wrong
-        text = style.format(**draft.words, here=here, choices=", ".join(options))
+        text = style.format(**draft.words, here=medium, choices=", ".join(options))
         lettered = tuple(f"{_LETTERS[k]}. {o}" for k, o in enumerate(options))
         return Question(clip.name, kind.name, text, truth, lettered, draft.about)
 
@@ -140,15 +140,15 @@ def blind_scores(questions: Sequence[Question]) -> dict[str, tuple[int, float]]:
         by_kind[question.kind].append(question)
     scores = {}
     for kind in (k.name for k in KINDS if k.name in by_kind):
-        own = by_kind[kind]
-        if own[0].options:
-            counts = Counter(q.ground_truth for q in own), Counter(q.answer for q in own)
-            best = max(count.most_common(1)[0][1] for count in counts) / len(own)
+        of_kind = by_kind[kind]
+        if of_kind[0].options:
+            counts = Counter(q.ground_truth for q in of_kind), Counter(q.answer for q in of_kind)
+            best = max(count.most_common(1)[0][1] for count in counts) / len(of_kind)
         else:
-            truths = [float(q.ground_truth) for q in own]
+            truths = [float(q.ground_truth) for q in of_kind]
             best = max(
                 float(np.mean([mean_relative_accuracy(guess, t) for t in truths]))
                 for guess in sorted(set(truths))
             )
-        scores[kind] = len(own), best
+        scores[kind] = len(of_kind), best
     return scores

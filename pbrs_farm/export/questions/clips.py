@@ -126,9 +126,9 @@ class Clip:
         for thing in self.things:
             groups[thing.noun].append(thing)
         return {
-            noun: own
-            for noun, own in sorted(groups.items())
-            if is_countable(noun) and all(t.first_seen is not None for t in own)
+            noun: things
+            for noun, things in sorted(groups.items())
+            if is_countable(noun) and all(t.first_seen is not None for t in things)
         }
 
     @cached_property
@@ -138,13 +138,13 @@ class Clip:
         Nor is there another of the same own name: a coat rack that is furniture, and one of clothes.
         """
         names = Counter(thing.item.name for thing in self.things)
-        alone = (own[0] for own in self.by_noun.values() if len(own) == 1)
+        alone = (things[0] for things in self.by_noun.values() if len(things) == 1)
         return [thing for thing in alone if names[thing.item.name] == 1]
 
     @cached_property
     def footprints(self) -> dict[str, list[tuple[Item, Any]]]:
         """Room id -> what a walker would meet there between the floor and head height, seen from above."""
-        met: dict[str, list[tuple[Item, Any]]] = defaultdict(list)
+        obstacles: dict[str, list[tuple[Item, Any]]] = defaultdict(list)
         floors = {room.id: room.floor_y for room in self.house.rooms}
         for item in self.house.items:
             floor_y = floors.get(item.room_id or "")
@@ -152,8 +152,8 @@ class Clip:
                 continue
             low, high = item.bounds[:, 1]
             if high > floor_y + _STEPPED_OVER_M and low < floor_y + _HEAD_M:
-                met[item.room_id or ""].append((item, _plan(item)))
-        return met
+                obstacles[item.room_id or ""].append((item, _plan(item)))
+        return obstacles
 
     @cached_property
     def rooms_entered(self) -> list[Room]:
@@ -191,8 +191,8 @@ class Clip:
         way = line.difference(shapely.union(a.plan, b.plan)).buffer(_WAY_M / 2, cap_style="flat")
         if way.is_empty or not shapely.Polygon(room.polygon).contains(way):
             return False
-        others = (p for item, p in self.footprints[room.id] if item not in (a.item, b.item))
-        return not any(plan.intersects(way) for plan in others)
+        obstacles = (p for item, p in self.footprints[room.id] if item not in (a.item, b.item))
+        return not any(plan.intersects(way) for plan in obstacles)
 
     def gap_m(self, a: Thing, b: Thing) -> float:
         """Metres between the nearest places of two things' surfaces; kept.
@@ -217,9 +217,9 @@ def is_countable(noun: str) -> bool:
 
 
 def _gap_m(a: Thing, b: Thing) -> float:
-    apart, nearest = (np.asarray(found) for found in b.points.query(a.points.data))
-    best = float(apart.min())
-    starts = np.argsort(apart, kind="stable")[:_STARTS]
+    gaps, nearest = (np.asarray(pair) for pair in b.points.query(a.points.data))
+    best = float(gaps.min())
+    starts = np.argsort(gaps, kind="stable")[:_STARTS]
     for start in starts:
         place = np.asarray(b.points.data[nearest[start]])
         for _ in range(_STEPS):
@@ -239,10 +239,10 @@ def _nearest_place(triangles: F64, place: F64) -> tuple[F64, float]:
     to_box = np.linalg.norm(np.maximum(np.maximum(low - place, place - high), 0.0), axis=1)
     to_corner = np.linalg.norm(triangles.reshape(-1, 3) - place, axis=1).min()
     near = triangles[to_box <= to_corner + 1e-9]
-    found = trimesh.triangles.closest_point(near, np.broadcast_to(place, (len(near), 3)))
-    gaps = np.linalg.norm(found - place, axis=1)
+    places = trimesh.triangles.closest_point(near, np.broadcast_to(place, (len(near), 3)))
+    gaps = np.linalg.norm(places - place, axis=1)
     k = int(gaps.argmin())
-    return np.asarray(found[k]), float(gaps[k])
+    return np.asarray(places[k]), float(gaps[k])
 
 
 def clips_of(views: Sequence[ChosenView]) -> Iterator[Clip]:
@@ -266,10 +266,10 @@ def clips_of(views: Sequence[ChosenView]) -> Iterator[Clip]:
 
 def _clip(name: str, views: Sequence[ChosenView], house: House) -> Clip:
     items = {item.id: item for item in house.items}
-    found: dict[int, Thing] = {}
+    things: dict[int, Thing] = {}
     for k, view in enumerate(views):
         for row, noun, item in _noticed(view, items):
-            thing = found.setdefault(row["id"], Thing(int(row["id"]), noun, item, k))
+            thing = things.setdefault(row["id"], Thing(int(row["id"]), noun, item, k))
             share = row["visible_fraction"]
             share = 1.0 if share is None else float(share)
             if row["truncated"]:
@@ -278,7 +278,7 @@ def _clip(name: str, views: Sequence[ChosenView], house: House) -> Clip:
             is_seen = share >= LEAST_VISIBLE and row["fraction"] >= LEAST_FRACTION
             if is_seen and thing.first_seen is None:
                 thing.first_seen = k
-    return Clip(name, views, house, [found[k] for k in sorted(found)])
+    return Clip(name, views, house, [things[k] for k in sorted(things)])
 
 
 def _noticed(

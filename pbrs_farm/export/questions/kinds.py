@@ -72,29 +72,31 @@ def _tried(
     rng: random.Random, things: Sequence[Thing], n: int, most: int = _MOST_TRIED
 ) -> Iterator[tuple[Thing, ...]]:
     """Ordered choices of n things, each at most once, in a drawn order."""
-    seen: set[tuple[int, ...]] = set()
+    done: set[tuple[int, ...]] = set()
     if len(things) < n:
         return
     if n <= 2:
-        every = list(permutations(range(len(things)), n))
-        rng.shuffle(every)
-        for chosen in every[:most]:
+        orders = list(permutations(range(len(things)), n))
+        rng.shuffle(orders)
+        for chosen in orders[:most]:
             yield tuple(things[k] for k in chosen)
         return
     for _ in range(most):
         chosen = tuple(rng.sample(range(len(things)), n))
-        if chosen not in seen:
-            seen.add(chosen)
+        if chosen not in done:
+            done.add(chosen)
             yield tuple(things[k] for k in chosen)
 
 
 def _counts(clip: Clip, _rng: random.Random) -> Iterator[Draft]:
     """How many there are of a noun, from two on, where nothing that looks alike is called otherwise."""
     nouns = {thing.noun for thing in clip.things}
-    for noun, own in clip.by_noun.items():
+    for noun, things in clip.by_noun.items():
         is_alike = any(noun in group and len(group & nouns) > 1 for group in _LOOK_ALIKE)
-        if len(own) > 1 and not is_alike:
-            yield Draft({"many": plural(noun)}, str(len(own)), (), tuple(t.instance for t in own))
+        if len(things) > 1 and not is_alike:
+            yield Draft(
+                {"many": plural(noun)}, str(len(things)), (), tuple(t.instance for t in things)
+            )
 
 
 def _distances(clip: Clip, rng: random.Random) -> Iterator[Draft]:
@@ -124,15 +126,15 @@ def _room_sizes(clip: Clip, _rng: random.Random) -> Iterator[Draft]:
 
 def _nearest(clip: Clip, rng: random.Random) -> Iterator[Draft]:
     """Which of four things is nearest to a fifth."""
-    for target, *others in _tried(rng, clip.single, 5):
-        gaps = sorted((clip.gap_m(target, other), other.noun) for other in others)
+    for target, *candidates in _tried(rng, clip.single, 5):
+        gaps = sorted((clip.gap_m(target, candidate), candidate.noun) for candidate in candidates)
         nearest, second = gaps[0][0], gaps[1][0]
         if second >= max(_CLEARLY * nearest, nearest + _CLEARLY_M):
             yield Draft(
                 {"a": target.noun},
                 gaps[0][1],
-                tuple(other.noun for other in others),
-                (target.instance, *(other.instance for other in others)),
+                tuple(candidate.noun for candidate in candidates),
+                (target.instance, *(candidate.instance for candidate in candidates)),
             )
 
 
@@ -141,9 +143,9 @@ def bearing_deg(stand: F64, face: F64, to: F64) -> float:
 
     stand, face, to: (2,) x and z in metres; world y is up and right-handed.
     """
-    ahead, there = face - stand, to - stand
+    ahead, aim = face - stand, to - stand
     right = np.array([-ahead[1], ahead[0]])
-    return float(np.degrees(np.arctan2(there @ right, there @ ahead)))
+    return float(np.degrees(np.arctan2(aim @ right, aim @ ahead)))
 
 
 def _side(bearing: float) -> str:
@@ -178,11 +180,11 @@ def _directions(
 
     def drafts(clip: Clip, rng: random.Random) -> Iterator[Draft]:
         for a, b, c in _tried(rng, clip.single, 3):
-            apart = [
+            distances = [
                 float(np.linalg.norm(x.middle - y.middle)) for x, y in ((a, b), (a, c), (b, c))
             ]
             is_crowded = a.plan.intersects(b.plan) or a.plan.intersects(c.plan)
-            if min(apart) < _STEP_APART_M or is_crowded or not clip.stands_on_floor(a):
+            if min(distances) < _STEP_APART_M or is_crowded or not clip.stands_on_floor(a):
                 continue
             answer = answer_of(bearing_deg(a.middle, b.middle, c.middle), _MARGIN_DEG)
             if answer and all(

@@ -80,16 +80,16 @@ class _Picture:
         """The median depth of its pixels; NaN where it has none."""
         if self.depth_m is None:
             return float("nan")
-        own = self.depth_m[self.instance == thing.instance]
-        own = own[np.isfinite(own)]
-        return float(np.median(own)) if len(own) else float("nan")
+        depths = self.depth_m[self.instance == thing.instance]
+        depths = depths[np.isfinite(depths)]
+        return float(np.median(depths)) if len(depths) else float("nan")
 
     def colour_shares(self, thing: Thing) -> Counter[str]:
         """Colour -> share of its pixels; none of what shows its surroundings or shines as a metal."""
         if self.colour_words is None or self._mirrors(thing):
             return Counter()
-        own = self.colour_words[self.instance == thing.instance]
-        counts = np.bincount(own, minlength=len(_COLOURS)) / max(len(own), 1)
+        words = self.colour_words[self.instance == thing.instance]
+        counts = np.bincount(words, minlength=len(_COLOURS)) / max(len(words), 1)
         return Counter({name: float(counts[k]) for k, name in enumerate(_COLOURS)})
 
     def mean_colour(self, thing: Thing) -> F64:
@@ -167,14 +167,14 @@ def references_of(clip: Clip) -> list[Reference]:
     for thing in clip.things:
         groups.setdefault(thing.noun, []).append(thing)
     singles = {t.instance for t in clip.single}
-    found: list[Reference] = []
-    for noun, own in sorted(groups.items()):
+    references: list[Reference] = []
+    for noun, things in sorted(groups.items()):
         if not is_countable(noun):
             continue
-        for phrase, thing in _phrases(picture, noun, own, singles):
+        for phrase, thing in _phrases(picture, noun, things, singles):
             if thing.first_seen is not None:
-                found.append(Reference(phrase, thing.instance))
-    return found
+                references.append(Reference(phrase, thing.instance))
+    return references
 
 
 def _phrases(
@@ -215,8 +215,10 @@ def _by_colour(picture: _Picture, noun: str, own: Sequence[Thing]) -> Iterator[t
     shares = [picture.colour_shares(t) for t in own]
     for k, thing in enumerate(own):
         for colour in _COLOURS:
-            others = [s[colour] for j, s in enumerate(shares) if j != k]
-            is_its = shares[k][colour] >= _OF_COLOUR and max(others, default=0.0) < _OF_ANOTHER
+            other_shares = [s[colour] for j, s in enumerate(shares) if j != k]
+            is_its = (
+                shares[k][colour] >= _OF_COLOUR and max(other_shares, default=0.0) < _OF_ANOTHER
+            )
             if is_its and _is_of_another_colour(picture, thing, own):
                 yield f"the {colour} {noun}", thing
 
@@ -224,20 +226,20 @@ def _by_colour(picture: _Picture, noun: str, own: Sequence[Thing]) -> Iterator[t
 def _is_of_another_colour(picture: _Picture, thing: Thing, own: Sequence[Thing]) -> bool:
     """Than all others of its name, so that no two shades beside a border of two words tell them apart."""
     mean = picture.mean_colour(thing)
-    others = (picture.mean_colour(t) for t in own if t is not thing)
-    return all(np.linalg.norm(other - mean) >= _COLOURS_APART for other in others)
+    other_colours = (picture.mean_colour(t) for t in own if t is not thing)
+    return all(np.linalg.norm(colour - mean) >= _COLOURS_APART for colour in other_colours)
 
 
 def _by_support(
     picture: _Picture, noun: str, own: Sequence[Thing], singles: set[int]
 ) -> Iterator[tuple[str, Thing]]:
-    for other in picture.clip.things:
-        if other.instance not in singles or other.noun == noun:
+    for support in picture.clip.things:
+        if support.instance not in singles or support.noun == noun:
             continue
-        on = [t for t in own if _stands_on(t, other)]
+        on = [t for t in own if _stands_on(t, support)]
         # All that may stand on it are known: one, and the others do not.
         if len(on) == 1 and len(own) > 1:
-            yield f"the {noun} on the {other.noun}", on[0]
+            yield f"the {noun} on the {support.noun}", on[0]
 
 
 def _stands_on(a: Thing, b: Thing) -> bool:

@@ -59,11 +59,8 @@ def furnish_report(
     broken, walked, area = [], 0.0, 0.0
     grounds = [_ground_rect(p) for p in pieces]
     for number, room in enumerate(plan.rooms):
-        room_pieces = [p for p in pieces if p.room == number]
-        broken += [
-            f"{room.name}: no {group_names}"
-            for group_names in missing(room.type, room_pieces, catalogue)
-        ]
+        placed = [p for p in pieces if p.room == number]
+        broken += [f"{room.name}: no {group}" for group in missing(room.type, placed, catalogue)]
         space = room_space(plan, number)
         standing = [r for p, r in zip(pieces, grounds, strict=True) if p.elevation < 0.4]
         walk = WalkMap(space, standing)
@@ -72,7 +69,7 @@ def furnish_report(
             broken.append(f"{room.name}: its doors are not joined")
         walked += walk.share(region) * room.area if region is not None else 0.0
         area += room.area
-        broken += _blocked(space, room_pieces)
+        broken += _blocked(space, placed)
     broken += _overlapping_pieces(pieces, grounds)
     n = sum(p.elevation < _ON_FLOOR_M for p in pieces)
     return FurnishReport(tuple(broken), n / area, walked / area)

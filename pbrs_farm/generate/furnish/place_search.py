@@ -133,14 +133,9 @@ def arranged(
         search.nodes += 1
         if after is None:
             continue
-        remaining = [p.free_of(mask, place) for p, mask in zip(places, alive, strict=True)]
+        masks = [p.free_of(mask, place) for p, mask in zip(places, alive, strict=True)]
         search.descend(
-            1,
-            remaining,
-            after,
-            (*before.standing, place),
-            before.missing,
-            before.score + place.score,
+            1, masks, after, (*before.standing, place), before.missing, before.score + place.score
         )
     if search.best.score == -np.inf:
         search.limit = search.nodes + 4 * nodes

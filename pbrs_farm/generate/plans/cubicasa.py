@@ -107,20 +107,13 @@ def _floors(path: Path, root: Element) -> list[_Floor]:
     ]
     while waiting:
         group, matrix, floor, kind, words = waiting.pop()
-        classes = tuple((group.get("class") or "").split())
+        tags = tuple((group.get("class") or "").split())
         matrix = _then(matrix, group.get("transform") or "")
-        if classes and classes[0] == "Floorplan":
+        if tags and tags[0] == "Floorplan":
             floors.append(floor := _Floor())
-        elif classes and classes[0] in (
-            "Space",
-            "Wall",
-            "Door",
-            "Window",
-            "Railing",
-            "FixedFurniture",
-        ):
-            kind, words = classes[0], classes[1:]
-        elif classes and classes[0] in _NOT_DRAWN:
+        elif tags and tags[0] in ("Space", "Wall", "Door", "Window", "Railing", "FixedFurniture"):
+            kind, words = tags[0], tags[1:]
+        elif tags and tags[0] in _NOT_DRAWN:
             continue
         name = str(group.tag).rpartition("}")[2]
         if name == "polygon" and kind:
@@ -232,14 +225,10 @@ def _things_of_shape(words: Sequence[str], shape: Polygon) -> list[Thing]:
 def _opened(rooms: list[dict[str, Any]], left_out: LeftOut) -> list[dict[str, Any]]:
     """The rooms, those whose sides touch without a wall between made one, of the larger one's type."""
     shapes: list[BaseGeometry] = [Polygon(r["polygon"]) for r in rooms]
-    remaining_rooms = list(range(len(rooms)))
+    rest = list(range(len(rooms)))
     for i in range(len(rooms)):
         for j in range(i):
-            if (
-                i not in remaining_rooms
-                or j not in remaining_rooms
-                or "balcony" in (rooms[i]["type"], rooms[j]["type"])
-            ):
+            if i not in rest or j not in rest or "balcony" in (rooms[i]["type"], rooms[j]["type"]):
                 continue
             touch = shapes[i].buffer(0.02).intersection(shapes[j].boundary)
             if touch.length < _OPEN_M or shapes[i].distance(shapes[j]) > 0.02:
@@ -252,10 +241,10 @@ def _opened(rooms: list[dict[str, Any]], left_out: LeftOut) -> list[dict[str, An
             into, merged = (j, i) if shapes[j].area >= shapes[i].area else (i, j)
             joined = largest_part(joined.simplify(0.02)) or joined
             shapes[into] = joined
-            remaining_rooms.remove(merged)
+            rest.remove(merged)
             rooms[into] = rooms[into] | {"polygon": [list(p) for p in joined.exterior.coords[:-1]]}
             left_out.add("two rooms without a wall between are one")
-    return [rooms[k] for k in remaining_rooms]
+    return [rooms[k] for k in rest]
 
 
 FORMAT = PlanFormat(

@@ -313,11 +313,8 @@ class _Openings:
             if tall < _LEAST_TALL_M:
                 raise BadInput(self.path, place, "is higher than its wall")
         if self.is_of_machine:
-            for opening in self.found:
-                if (
-                    opening.wall == number
-                    and abs(opening.along - along) < (opening.width + width) / 2
-                ):
+            for prior in self.found:
+                if prior.wall == number and abs(prior.along - along) < (prior.width + width) / 2:
                     raise BadInput(self.path, place, "overlaps another in its wall")
         hole = shapely.Point(wall.at(along)).buffer(wall.thickness / 2 + 0.15)
         beside = [k for k, ground in enumerate(self._grounds) if ground.intersects(hole)]

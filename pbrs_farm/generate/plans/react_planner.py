@@ -56,21 +56,13 @@ class _File(BaseModel):
 
 def plan_of_react_planner(path: Path, value: Any) -> ParsedPlan:
     """Read the plan, one storey per layer. Raises BadInput, naming the place."""
-    file_fields = checked(_File, value, path)
-    if file_fields.unit not in _METRES:
-        raise BadInput(
-            path, "unit", f"no such unit: {file_fields.unit[:20]}", hint=", ".join(_METRES)
-        )
+    fields = checked(_File, value, path)
+    if fields.unit not in _METRES:
+        raise BadInput(path, "unit", f"no such unit: {fields.unit[:20]}", hint=", ".join(_METRES))
     left_out = LeftOut()
-    layers = sorted(file_fields.layers.items(), key=lambda row: row[1].altitude)
+    layers = sorted(fields.layers.items(), key=lambda row: row[1].altitude)
     drawn = [
-        _Drawing(
-            path,
-            f"layers.{key}"[:60],
-            layer,
-            _METRES[file_fields.unit],
-            math.sqrt(file_fields.scale),
-        )
+        _Drawing(path, f"layers.{key}"[:60], layer, _METRES[fields.unit], math.sqrt(fields.scale))
         for key, layer in layers
         if layer.lines
     ]

@@ -194,12 +194,8 @@ def _hssd(path: Path, name: str, notes: LibraryNotes) -> ModelTable:
     for row in rows:
         if len(row) <= max(at_id, at_class) or not _is_plain(row[at_id].strip()):
             continue
-        model_id, words = row[at_id].strip(), row[at_class].strip().replace("_", " ")
-        ways = (
-            f"objects/{model_id[0]}/{model_id}.glb",
-            f"objects/{model_id}.glb",
-            f"{model_id}.glb",
-        )
+        uid, words = row[at_id].strip(), row[at_class].strip().replace("_", " ")
+        ways = (f"objects/{uid[0]}/{uid}.glb", f"objects/{uid}.glb", f"{uid}.glb")
         file = next((w for w in ways if (path / w).is_file()), ways[0])
         quarters = _front_of_config(path / file.replace(".glb", ".object_config.json"))
         models[file] = ModelRow(name=words, label=words, quarters=quarters, creator="HSSD")

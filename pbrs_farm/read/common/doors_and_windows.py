@@ -224,22 +224,17 @@ def merge_holes(holes: list[Hole]) -> list[Hole]:
     """
     merged: list[Hole] = []
     for hole in holes:
-        same = next((k for k, same_hole in enumerate(merged) if _is_same(same_hole, hole)), None)
+        same = next((k for k, twin in enumerate(merged) if _is_same(twin, hole)), None)
         if same is None:
             merged.append(hole)
             continue
-        same_hole = merged[same]
-        across = same_hole.axes[:, 2]
-        offset = float((hole.centre - same_hole.centre) @ across)
-        ends = [
-            -same_hole.size[2] / 2,
-            same_hole.size[2] / 2,
-            offset - hole.size[2] / 2,
-            offset + hole.size[2] / 2,
-        ]
+        twin = merged[same]
+        across = twin.axes[:, 2]
+        z = float((hole.centre - twin.centre) @ across)
+        ends = [-twin.size[2] / 2, twin.size[2] / 2, z - hole.size[2] / 2, z + hole.size[2] / 2]
         depth, middle = max(ends) - min(ends), (max(ends) + min(ends)) / 2
         merged[same] = replace(
-            same_hole, centre=same_hole.centre + middle * across, size=(*same_hole.size[:2], depth)
+            twin, centre=twin.centre + middle * across, size=(*twin.size[:2], depth)
         )
     return merged
 

@@ -510,10 +510,7 @@ def _is_piece(seen: NodeClass) -> bool:
 def _class_of_part_of_name(name: str) -> NodeClass | None:
     """The class of the first part of a name that says a piece: a base cabinet of "Base Cabinet-2 Doors"."""
     classes = (class_of_node_name(part) for part in _BETWEEN.split(name))
-    return next(
-        (part_class for part_class in classes if part_class is not None and _is_piece(part_class)),
-        None,
-    )
+    return next((c for c in classes if c is not None and _is_piece(c)), None)
 
 
 def _type_name(product: Any) -> str:

@@ -80,18 +80,14 @@ def shut_leaves(
 
 def _told_leaves(meshes: Sequence[Mesh], matrix: F64, told: Sequence[Joint]) -> Iterator[Leaf]:
     for number, joint in enumerate(told, 1):
-        placed_joint = joint.placed(matrix)
+        hung = joint.placed(matrix)
         name = f"hinge_{number}"
         parts = [
             transform_points(matrix, m.positions) for m in meshes if hangs_on(m, frozenset([name]))
         ]
-        if (
-            placed_joint.kind is JointKind.REVOLUTE
-            and abs(placed_joint.axis[1]) > _UPRIGHT
-            and parts
-        ):
-            hinge = np.array(placed_joint.point)[[0, 2]]
-            yield Leaf(name, hinge, np.concatenate(parts), float(np.sign(placed_joint.axis[1])))
+        if hung.kind is JointKind.REVOLUTE and abs(hung.axis[1]) > _UPRIGHT and parts:
+            hinge = np.array(hung.point)[[0, 2]]
+            yield Leaf(name, hinge, np.concatenate(parts), float(np.sign(hung.axis[1])))
 
 
 def _find_leaf(joint: str, parts: list[F64], hinge_parts: list[F64]) -> Leaf | None:

@@ -137,8 +137,8 @@ class StageNodes:
         mesh = self._mesh(prim)
         if mesh is not None:
             node["mesh"] = mesh
-        prim_class = self._class(prim, above, node)
-        in_lamp = above.in_lamp or (prim_class is not None and prim_class.kind is ItemKind.LAMP)
+        cls = self._class(prim, above, node)
+        in_lamp = above.in_lamp or (cls is not None and cls.kind is ItemKind.LAMP)
         in_lamp = in_lamp or bool(
             prim.GetAttribute(EXTRAS_ATTRIBUTE).Get()
         )  # says what its lights are
@@ -146,11 +146,7 @@ class StageNodes:
             self._light(prim, node, is_part=above.in_lamp)
         self._nodes[above.node]["children"].append(len(self._nodes))
         self._nodes.append(node)
-        label = (
-            prim_class
-            if prim_class and prim_class.is_tagged and prim_class.kind in _STRUCTURE
-            else above.structure
-        )
+        label = cls if cls and cls.is_tagged and cls.kind in _STRUCTURE else above.structure
         return _Above(len(self._nodes) - 1, above.depth + 1, path, in_lamp, label)
 
     def _class(self, prim: Any, above: _Above, node: _Row) -> NodeClass | None:

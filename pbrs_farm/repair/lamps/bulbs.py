@@ -81,9 +81,9 @@ def _with_bulbs(
     corners = corners_of_surfaces(item.surfaces)
     lights, done = [], []
     for number, light in enumerate(item.lights):
-        given = light.radius_m if light.radius_m > 0 else fields.bulb_radius_m
+        nominal = light.radius_m if light.radius_m > 0 else fields.bulb_radius_m
         emitting = tuple(k for k in light.emitting if len(surfaces[k].faces))
-        radius, moved = given, 0.0
+        radius, moved = nominal, 0.0
         if emitting:
             # Let the surfaces that the source names shine.
             for k in emitting:
@@ -92,7 +92,7 @@ def _with_bulbs(
                 )
         else:
             # Set a sphere where none shines; later bulbs must not touch it.
-            centre, radius = _fitting_sphere(np.array(light.position), given, corners)
+            centre, radius = _fitting_sphere(np.array(light.position), nominal, corners)
             moved = float(np.linalg.norm(centre - np.array(light.position)))
             emitting = (len(surfaces),)
             surfaces.append(icosphere("bulb", centre, radius, materials.bulb(light.rgb_linear)))
@@ -104,7 +104,7 @@ def _with_bulbs(
                 item_id=item.id,
                 source=number,
                 bulb_added=not light.emitting or emitting != light.emitting,
-                radius_given_m=_round_key(given),
+                radius_given_m=_round_key(nominal),
                 radius_m=_round_key(radius),
                 moved_m=_round_key(moved),
             )

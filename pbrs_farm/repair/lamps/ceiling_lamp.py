@@ -137,17 +137,17 @@ def _tall_footprint(item: Item, room: Room) -> plan.Shape | None:
 def _walls_inside(house: House, room: Room, area: plan.Shape) -> list[plan.Shape]:
     """Plan areas of full-height walls farther inside the room than its own walls."""
     inner = plan.grown(area, -_OWN_WALL_M)
-    found = []
+    walls = []
     for item in house.items:
         if item.kind is not ItemKind.WALL or not item.n_faces or inner.is_empty:
             continue
         (x0, low, z0), (x1, high, z1) = item.bounds
         is_tall = low < room.floor_y + _HEAD_M and high > room.ceiling_y - _TALL_M
         if is_tall and inner.intersects(shapely.box(x0, z0, x1, z1)):
-            found += [
+            walls += [
                 plan.polygon_of_triangles(s.positions.astype(float), s.faces) for s in item.surfaces
             ]
-    return found
+    return walls
 
 
 def _within_bounds(item: Item, point: F64, by_m: float) -> bool:

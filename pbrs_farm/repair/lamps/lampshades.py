@@ -47,8 +47,8 @@ def with_shades(
         # Split the shades of this lamp off its surfaces.
         mine = [scene.parts[p] for p in shades if scene.parts[p][0] == k]
         for j in sorted({part[1] for part in mine}):
-            wanted = [part[2] for part in mine if part[1] == j]
-            is_shade = np.isin(scene.labels[k, j], wanted)
+            numbers = [part[2] for part in mine if part[1] == j]
+            is_shade = np.isin(scene.labels[k, j], numbers)
             item = _split_off(item, j, is_shade, _shade_of(item.surfaces[j].material, materials))
             names[item.id] = (*names.get(item.id, ()), house.items[k].surfaces[j].name)
         lights = tuple(
@@ -91,14 +91,14 @@ def _with_more_shades(
 ) -> LightOutput:
     """Add to shades the parts that stop most of this source's light, until enough gets out."""
     while True:
-        found = light_output_of_source(scene, item, source, shades, fields.shade_transmission)
+        output = light_output_of_source(scene, item, source, shades, fields.shade_transmission)
         # Stop once enough light escapes, or no part blocks much of the remainder.
-        worst = int(np.argmax(found.blocked)) if len(found.blocked) else -1
+        worst = int(np.argmax(output.blocked)) if len(output.blocked) else -1
         mine = sum(scene.parts[p][0] == item for p in shades)
-        if found.ratio >= fields.min_escape or mine >= _MOST_SHADES:
-            return found
-        if worst < 0 or found.blocked[worst] < _LEAST_BLOCKED:
-            return found
+        if output.ratio >= fields.min_escape or mine >= _MOST_SHADES:
+            return output
+        if worst < 0 or output.blocked[worst] < _LEAST_BLOCKED:
+            return output
         shades.append(worst)
 
 

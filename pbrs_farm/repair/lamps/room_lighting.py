@@ -44,21 +44,21 @@ def with_room_lighting(
     gets one for the rest. 0: all added lights are alike, and a room with any lamp gets none.
     """
     rooms, lights = [], []
-    given: dict[str, list[str]] = {FALLBACK: [], ADDED_LAMP: []}
+    rooms_lit: dict[str, list[str]] = {FALLBACK: [], ADDED_LAMP: []}
     areas = [plan.polygon_of_room(r.polygon) for r in house.rooms]
     glazed = {i.id for i in house.items if _has_pane(i, house.materials)}
     lamps = [i for i in house.items if any(_shines(light) for light in i.lights)]
     boxes = _plan_boxes(house.items)
     for room, area in zip(house.rooms, areas, strict=True):
         lit_by = []
-        here = _items_near(house, boxes, area)
+        near = _items_near(house, boxes, area)
         own_lm = sum(_flux_in(lamp, room, area) for lamp in lamps)
         wanted_lm = flux_for_floor(area.area, lamp_lx)
         if own_lm > 0:
             lit_by.append("lamps")
         if any(_opens_on(o, room, area, glazed) for o in house.openings):
             lit_by.append("windows")
-        if not room.has_ceiling and _sees_sky(here, room, area):
+        if not room.has_ceiling and _sees_sky(near, room, area):
             lit_by.append("sky")
         # Hang a light where neither lamp nor daylight reaches, and where people live without one.
         tag = ""
@@ -67,11 +67,11 @@ def with_room_lighting(
         elif in_every_room and own_lm <= _DIM * wanted_lm and room.has_floor:
             tag = ADDED_LAMP if is_lived_in(room, area.area) else ""
         rest_lm = max(wanted_lm - own_lm, 0.0)
-        lamp = ceiling_lamp(here, room, len(house.materials), tag, rest_lm) if tag else None
+        lamp = ceiling_lamp(near, room, len(house.materials), tag, rest_lm) if tag else None
         if lamp is not None:
             lit_by.append(tag)
             lights.append(lamp)
-            given[tag].append(room.id)
+            rooms_lit[tag].append(room.id)
         elif tag == FALLBACK:
             # Nothing is above the room, whatever its source says.
             lit_by.append("sky")
@@ -80,17 +80,17 @@ def with_room_lighting(
     if lights:
         materials = (*materials, Material("fallback_bulb", kind=MaterialKind.BULB))
     lighted = replace(house, rooms=tuple(rooms), items=(*house.items, *lights), materials=materials)
-    return lighted, GivenLights(tuple(given[FALLBACK]), tuple(given[ADDED_LAMP]))
+    return lighted, GivenLights(tuple(rooms_lit[FALLBACK]), tuple(rooms_lit[ADDED_LAMP]))
 
 
 def _plan_boxes(items: Sequence[Item]) -> F64:
     """(N, 2, 2) bounds in plan, as much larger as a turned box may be; NaN of an item without faces."""
-    found = np.full((len(items), 2, 2), np.nan)
+    boxes = np.full((len(items), 2, 2), np.nan)
     for k, item in enumerate(items):
         if item.n_faces:
             low, high = item.bounds[:, [0, 2]]
-            found[k] = low - (high - low).max(), high + (high - low).max()
-    return found
+            boxes[k] = low - (high - low).max(), high + (high - low).max()
+    return boxes
 
 
 def _items_near(house: House, boxes: F64, area: plan.Shape) -> House:

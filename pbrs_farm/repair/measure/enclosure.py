@@ -49,11 +49,11 @@ class Space:
 
         "" when the space is closed.
         """
-        own = dict(self.reasons).get(room_id)
-        if own is not None or not self.reasons:
-            return own or ""
-        other, reason = self.reasons[0]
-        return f"it opens into {other}, of which {reason}"
+        reason_of_room = dict(self.reasons).get(room_id)
+        if reason_of_room is not None or not self.reasons:
+            return reason_of_room or ""
+        room, reason = self.reasons[0]
+        return f"it opens into {room}, of which {reason}"
 
 
 def spaces_of_rooms(
@@ -68,14 +68,14 @@ def spaces_of_rooms(
     links: list[tuple[int, int]] = []  # rooms that open into each other, by index
     reasons: dict[int, str] = {}
     for i in range(len(rooms)):
-        found = [
+        openings = [
             # Look sideways, down and up.
             _open_sides_of_room(i, rooms, areas, walls, covers),
             _open_above_or_below(i, rooms, areas, covers, above=False),
             _open_above_or_below(i, rooms, areas, covers, above=True),
         ]
-        links += [(i, j) for linked, _ in found for j in linked]
-        why = [reason for _, reason in found if reason]
+        links += [(i, j) for linked, _ in openings for j in linked]
+        why = [reason for _, reason in openings if reason]
         if why:
             reasons[i] = "; ".join(why)
     # Connect the rooms by their links; one link of a room to itself keeps the array 2-d.
@@ -110,11 +110,11 @@ def _open_sides_of_room(
     bare = ~_walled(points + 0.01 * outward, floor, ceiling, walls)
     linked = []
     for j in plan.near_to(areas[i], range(len(rooms)), areas.__getitem__, 2 * max(_PROBES_M)):
-        other = rooms[j]
+        neighbour = rooms[j]
         if (
             j == i
-            or other.floor_y > room.ceiling_y - GAP_M
-            or other.ceiling_y < room.floor_y + GAP_M
+            or neighbour.floor_y > room.ceiling_y - GAP_M
+            or neighbour.ceiling_y < room.floor_y + GAP_M
         ):
             continue
         # Step out of the bare samples until another room of this height is met.
@@ -156,8 +156,8 @@ def edge_samples(area: plan.Shape) -> tuple[F64, F64]:
 def _ceiling_at(points: F64, room: Room, covers: Sequence[Cover]) -> F64:
     # Take the lowest ceiling above each point that belongs to this room's height.
     y = np.full(len(points), room.ceiling_y)
-    own = plan.polygon_of_room(room.polygon)
-    for cover in plan.near_to(own, covers, lambda c: c.area, 0.0):
+    area = plan.polygon_of_room(room.polygon)
+    for cover in plan.near_to(area, covers, lambda c: c.area, 0.0):
         if not cover.is_ceiling:
             continue
         heights = cover.plane.at(points)
@@ -202,12 +202,12 @@ def _open_above_or_below(
         if plan.common(bare, areas[j]).area > _OPEN_AREA_M2:
             linked.append(j)
             bare = plan.without(bare, plan.grown(areas[j], GAP_M))
-    what = "ceiling" if above else "floor"
+    part = "ceiling" if above else "floor"
     if bare.area <= _OPEN_AREA_M2:
         return linked, ""
     # Report the area that no cover reaches, without the slack of GAP_M.
     exact = plan.common(plan.without(areas[i], *near), plan.grown(bare, 2 * GAP_M))
-    return linked, f"{exact.area:.1f} m2 of it have no {what}"
+    return linked, f"{exact.area:.1f} m2 of it have no {part}"
 
 
 def bare_area(
@@ -230,8 +230,8 @@ def _covers_of(room: Room, covers: Sequence[Cover], *, above: bool) -> list[plan
 def _storey_next(room: Room, rooms: Sequence[Room], *, above: bool) -> list[int]:
     # List the rooms one storey up (or down), wherever they lie in plan.
     gaps = [
-        other.floor_y - room.ceiling_y if above else room.floor_y - other.ceiling_y
-        for other in rooms
+        storey_room.floor_y - room.ceiling_y if above else room.floor_y - storey_room.ceiling_y
+        for storey_room in rooms
     ]
     return [
         j for j, gap in enumerate(gaps) if rooms[j] is not room and -GAP_M <= gap <= _STOREY_GAP_M

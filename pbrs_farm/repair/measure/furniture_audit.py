@@ -52,8 +52,10 @@ def _is_furniture(item: Item) -> bool:
 def _pairs_of_boxes(boxes: F64, by_m: float) -> Iterator[tuple[int, int]]:
     """Indices i < j of boxes (N, 2, 3) that meet when grown by by_m together."""
     for i in range(len(boxes)):
-        apart = (boxes[i + 1 :, 0] > boxes[i, 1] + by_m) | (boxes[i + 1 :, 1] < boxes[i, 0] - by_m)
-        for j in np.flatnonzero(~apart.any(1)):
+        is_apart = (boxes[i + 1 :, 0] > boxes[i, 1] + by_m) | (
+            boxes[i + 1 :, 1] < boxes[i, 0] - by_m
+        )
+        for j in np.flatnonzero(~is_apart.any(1)):
             yield i, i + 1 + int(j)
 
 
@@ -93,17 +95,17 @@ def _solid(item: Item) -> Manifold | None:
 
 
 def _floating(house: House, pieces: Sequence[Item], boxes: F64) -> Iterator[Floating]:
-    others = [i for i in house.items if not _is_furniture(i) and i.n_faces]
-    around = np.concatenate([boxes, np.array([i.bounds for i in others]).reshape(-1, 2, 3)])
+    rest = [i for i in house.items if not _is_furniture(i) and i.n_faces]
+    around = np.concatenate([boxes, np.array([i.bounds for i in rest]).reshape(-1, 2, 3)])
     for k, piece in enumerate(pieces):
-        apart = (around[:, 0] > boxes[k, 1] + _TOUCH_M) | (around[:, 1] < boxes[k, 0] - _TOUCH_M)
+        is_apart = (around[:, 0] > boxes[k, 1] + _TOUCH_M) | (around[:, 1] < boxes[k, 0] - _TOUCH_M)
         # Pass over what touches another item, and our own ceiling lights.
-        touched = ~apart.any(1)
+        touched = ~is_apart.any(1)
         touched[k] = False
         if touched.any() or (piece.lights and "added" in piece.tags):
             continue
         # Measure down to the highest item below.
-        below = ~apart[:, [0, 2]].any(1) & (around[:, 1, 1] <= boxes[k, 0, 1])
+        below = ~is_apart[:, [0, 2]].any(1) & (around[:, 1, 1] <= boxes[k, 0, 1])
         below[k] = False
         gap = boxes[k, 0, 1] - around[below, 1, 1].max() if below.any() else np.inf
         yield Floating(item_id=piece.id, gap_m=round(float(gap), 4) if np.isfinite(gap) else -1.0)
@@ -112,8 +114,8 @@ def _floating(house: House, pieces: Sequence[Item], boxes: F64) -> Iterator[Floa
 def _duplicates(pieces: Sequence[Item], boxes: F64) -> Iterator[tuple[str, str]]:
     for i, a in enumerate(pieces):
         # Compare places first: few pieces share one, and of those class and mesh size.
-        apart = np.abs(boxes[i + 1 :] - boxes[i]).max((1, 2))
-        for j in i + 1 + np.flatnonzero(apart < _SAME_M):
+        difference = np.abs(boxes[i + 1 :] - boxes[i]).max((1, 2))
+        for j in i + 1 + np.flatnonzero(difference < _SAME_M):
             b = pieces[int(j)]
             if (a.source_class, a.n_faces) == (b.source_class, b.n_faces):
                 yield a.id, b.id

@@ -72,19 +72,19 @@ def leaks_of_house(
     closed = [s for s in spaces if s.is_closed]
     occluder = occluder_from(shell) if closed else None
     rng = np.random.default_rng(0)  # fixed: the report is a function of the house
-    found = []
+    measured = []
     for space in closed:
         inside = [a for r in (*space.rooms, *space.wells) for a in interiors[r]]
         origins, directions = _rays(inside, meter, rng)
         assert occluder is not None
-        found.append(_measure_space(space, origins, directions, normals, occluder, meter, rng))
+        measured.append(_measure_space(space, origins, directions, normals, occluder, meter, rng))
     areas = {r.id: float(shapely.area(plan.polygon_of_room(r.polygon))) for r in house.rooms}
     in_closed = sum(areas[r] for s in closed for r in s.rooms)
     return LeakReport(
-        spaces=tuple(found),
-        n_rays=sum(s.n_rays for s in found),
-        n_blind=sum(s.n_blind for s in found),
-        n_sky=sum(s.n_sky for s in found),
+        spaces=tuple(measured),
+        n_rays=sum(s.n_rays for s in measured),
+        n_blind=sum(s.n_blind for s in measured),
+        n_sky=sum(s.n_sky for s in measured),
         closed_share=round(in_closed / max(sum(areas.values()), 1e-9), 4),
     )
 
@@ -122,17 +122,17 @@ def _edge_starts(interior: RoomInterior, step_m: float, rng: np.random.Generator
     """Points within 5 mm of the edges where walls, floor and ceiling meet, in the interior."""
     inset = 0.5 * WITHIN_M
     knee = interior.low.raised(interior.foot_m + inset)  # top of the baseboards
-    found = [
+    point_sets = [
         *_points_along_edges(interior.foot, interior.low.raised(inset), step_m, rng),
         *_points_along_edges(interior.area, interior.high.raised(-inset), step_m, rng),
         *_points_on_sides(interior.area, knee, interior.high.raised(-inset), step_m, rng),
     ]
     if interior.foot_m > 0:
-        found += _points_on_sides(
+        point_sets += _points_on_sides(
             interior.foot, interior.low.raised(inset), knee.raised(-2 * inset), step_m, rng
         )
     # Scatter the starts, but less than their distance from the edge.
-    points = np.concatenate([np.zeros((0, 3)), *found])
+    points = np.concatenate([np.zeros((0, 3)), *point_sets])
     return np.asarray(points + rng.uniform(-0.4, 0.4, points.shape) * WITHIN_M)
 
 
@@ -145,26 +145,26 @@ def _inner_rings(area: Shape) -> list[shapely.LinearRing]:
 def _points_along_edges(
     area: Shape, plane: Plane, step_m: float, rng: np.random.Generator
 ) -> list[F64]:
-    found = []
+    points_by_edge = []
     for ring in _inner_rings(area):
         n = max(int(ring.length / step_m), 8)
         steps = ring.length * (np.arange(n) + rng.random()) / n  # stratified, one random shift
         points = shapely.get_coordinates(shapely.line_interpolate_point(ring, steps))
-        found.append(lifted(points, plane.at(points)))
-    return found
+        points_by_edge.append(lifted(points, plane.at(points)))
+    return points_by_edge
 
 
 def _points_on_sides(
     area: Shape, low: Plane, high: Plane, step_m: float, rng: np.random.Generator
 ) -> list[F64]:
-    found = []
+    points_by_side = []
     for ring in _inner_rings(area):
         corners = np.asarray(ring.coords)[:-1]
         for corner, y0, y1 in zip(corners, low.at(corners), high.at(corners), strict=True):
             n = max(int((y1 - y0) / step_m), 2)
             y = y0 + (np.arange(n) + rng.random()) / n * (y1 - y0)
-            found.append(lifted(np.tile(corner, (n, 1)), y))
-    return found
+            points_by_side.append(lifted(np.tile(corner, (n, 1)), y))
+    return points_by_side
 
 
 def _points_in_interior(interior: RoomInterior, n: int, rng: np.random.Generator) -> F64:
@@ -172,14 +172,14 @@ def _points_in_interior(interior: RoomInterior, n: int, rng: np.random.Generator
     if n == 0 or shapely.is_empty(area):
         return np.zeros((0, 3))
     x0, z0, x1, z1 = area.bounds
-    found = np.zeros((0, 2))
+    inside = np.zeros((0, 2))
     # Reject points of the box outside the room.
-    while len(found) < n:
+    while len(inside) < n:
         points = rng.uniform((x0, z0), (x1, z1), (4 * n, 2))
-        found = np.concatenate([found, points[shapely.contains_xy(area, *points.T)]])
-    found = found[:n]
-    low, high = interior.low.at(found) + 0.02, interior.high.at(found) - 0.02
-    return lifted(found, low + rng.random(n) * (high - low))
+        inside = np.concatenate([inside, points[shapely.contains_xy(area, *points.T)]])
+    inside = inside[:n]
+    low, high = interior.low.at(inside) + 0.02, interior.high.at(inside) - 0.02
+    return lifted(inside, low + rng.random(n) * (high - low))
 
 
 def _measure_space(
@@ -204,12 +204,12 @@ def _measure_space(
             for a, b in zip(p[gone][: _MAX_LEAKS - len(leaks)], d[gone], strict=False)
         ]
         # Go on from the front of faces; absorb rays that see a back, inside a solid.
-        met = np.flatnonzero(~gone)
-        n, towards = normals.take(face[met], 0), d.take(met, 0)
+        hits = np.flatnonzero(~gone)
+        n, towards = normals.take(face[hits], 0), d.take(hits, 0)
         is_front = dots(towards, n) < 0
         if flight == 0:
-            n_blind = len(met) - int(is_front.sum())
-        front, n = met[is_front], n[is_front]
+            n_blind = len(hits) - int(is_front.sum())
+        front, n = hits[is_front], n[is_front]
         reached = p[front] + towards[is_front] * distance[front, None].astype(np.float64)
         # Bounce diffusely: a point on a unit sphere that touches the face.
         d = _unit(_unit(rng.normal(size=n.shape)) + n)

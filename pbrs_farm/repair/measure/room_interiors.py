@@ -92,16 +92,16 @@ def _hung(area: Shape, room: Room, covers: Sequence[Cover]) -> list[tuple[Shape,
         heights = cover.plane.at(shapely.get_coordinates(shape))
         if heights.max() > room.floor_y + _LEAST_M and heights.min() < room.ceiling_y - _LOWER_M:
             near.append((shape, cover.plane))
-    found = []
+    parts = []
     for i, (shape, plane) in enumerate(near):
         # Where two roofs meet, each is the ceiling on its own side of the ridge or valley.
-        for j, (other, below) in enumerate(near):
-            if i == j or shapely.is_empty(both := plan.common(shape, other)):
+        for j, (neighbour, below) in enumerate(near):
+            if i == j or shapely.is_empty(shared := plan.common(shape, neighbour)):
                 continue
-            above = plan.common(both, _where_above(plane, below, or_equal=j < i))
+            above = plan.common(shared, _where_above(plane, below, or_equal=j < i))
             shape = plan.without(shape, above)
-        found.append((shape, plane))
-    return found
+        parts.append((shape, plane))
+    return parts
 
 
 def _where_above(a: Plane, b: Plane, *, or_equal: bool) -> Shape:

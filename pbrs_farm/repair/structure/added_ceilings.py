@@ -67,15 +67,15 @@ def with_ceilings(house: House) -> House:
     covers = [
         cover_of_surfaces(i) for i in house.items if i.kind in (ItemKind.FLOOR, ItemKind.CEILING)
     ]
-    made: list[Item] = []
+    ceilings: list[Item] = []
     closed: dict[str, Room] = {}
     # From the top storey down: a ceiling just added also covers rooms below it.
     for room in sorted(house.rooms, key=lambda r: -r.floor_y):
-        found = None if room.has_ceiling or is_outdoors(room) else _closed(room, house, covers)
-        if found is None:
+        ceiling = None if room.has_ceiling or is_outdoors(room) else _closed(room, house, covers)
+        if ceiling is None:
             continue
-        surface, closed[room.id] = found
-        made.append(
+        surface, closed[room.id] = ceiling
+        ceilings.append(
             Item(
                 id=f"added_ceiling_{room.id}",
                 name=f"Ceiling of {room.name or 'room ' + room.id}",
@@ -88,13 +88,13 @@ def with_ceilings(house: House) -> House:
                 tags=(ADDED_CEILING,),
             )
         )
-        covers.append(cover_of_surfaces(made[-1]))
-    if not made:
+        covers.append(cover_of_surfaces(ceilings[-1]))
+    if not ceilings:
         return house
     return replace(
         house,
         rooms=tuple(closed.get(r.id, r) for r in house.rooms),
-        items=(*house.items, *reversed(made)),
+        items=(*house.items, *reversed(ceilings)),
         materials=(*house.materials, Material("added ceiling", diffuse=(0.93, 0.93, 0.93))),
     )
 
@@ -128,11 +128,11 @@ def _closed(room: Room, house: House, covers: Sequence[_Cover]) -> tuple[Surface
     for polygon in polygons_of(bare, min_area_m2=MIN_HOLE_M2):
         rings = [np.asarray(r.coords)[:-1] for r in (polygon.exterior, *polygon.interiors)]
         if is_level:
-            own = [(counter_clockwise(r), np.full(len(r), level_y)) for r in rings]
+            bent = [(counter_clockwise(r), np.full(len(r), level_y)) for r in rings]
         else:
-            own = [_bent(r, walls, level_y) for r in rings]
-        parts.append([points for points, _y in own])
-        heights.append(np.concatenate([y for _points, y in own]))
+            bent = [_bent(r, walls, level_y) for r in rings]
+        parts.append([points for points, _y in bent])
+        heights.append(np.concatenate([y for _points, y in bent]))
     if not parts:
         return None
     surface = level_or_sloped("ceiling", parts, heights, len(house.materials))
@@ -158,7 +158,7 @@ def _bare(
 ) -> plan.Shape:
     """The part of a room without a ceiling of its own or one at the top of a void, and without stairs."""
     above = [c for c in covers if c.low_y > room.floor_y + MIN_WALL_HEIGHT_M / 2]
-    own = [c.area for c in above if c.is_ceiling and c.low_y < level_y + MAX_STOREY_GAP_M]
+    ceilings = [c.area for c in above if c.is_ceiling and c.low_y < level_y + MAX_STOREY_GAP_M]
     floors = plan.union(
         c.area for c in above if not c.is_ceiling and c.low_y < level_y + MAX_STOREY_GAP_M
     )
@@ -169,7 +169,7 @@ def _bare(
         if is_below and low[1] < level_y - MIN_WALL_HEIGHT_M / 2 and high[1] > level_y - _BESIDE_M
     ]
     roofs = [_roof(i) for i in house.items if _is_roof(i, room, area)]
-    return plan.without(area, *own, plan.without(high, floors), *stairs, *roofs)
+    return plan.without(area, *ceilings, plan.without(high, floors), *stairs, *roofs)
 
 
 def _is_roof(item: Item, room: Room, area: plan.Shape) -> bool:
@@ -188,12 +188,12 @@ def _roof(item: Item) -> plan.Shape:
 
 def _beside_rooms(points: F64, room: Room, rooms: Sequence[Room]) -> Bools:
     """Whether points (N, 2) lie beside another room of the same storey."""
-    found = np.zeros(len(points), np.bool_)
-    for other in rooms:
-        if other is not room and abs(other.floor_y - room.floor_y) < MIN_WALL_HEIGHT_M / 2:
-            near = plan.grown(plan.polygon_of_room(other.polygon), _BESIDE_M)
-            found |= shapely.contains_xy(near, points[:, 0], points[:, 1])
-    return found
+    is_beside = np.zeros(len(points), np.bool_)
+    for neighbour in rooms:
+        if neighbour is not room and abs(neighbour.floor_y - room.floor_y) < MIN_WALL_HEIGHT_M / 2:
+            near = plan.grown(plan.polygon_of_room(neighbour.polygon), _BESIDE_M)
+            is_beside |= shapely.contains_xy(near, points[:, 0], points[:, 1])
+    return is_beside
 
 
 class _WallTops:
@@ -258,11 +258,11 @@ def _bent(ring: Points2, walls: _WallTops, otherwise: float) -> tuple[Points2, F
     """The ring with the points at which the tops of the walls along it bend, and their heights."""
     points, is_corner = _stepped_ring(counter_clockwise(ring))
     tops = walls.at(points)
-    known = np.isfinite(tops)
+    is_known = np.isfinite(tops)
     way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
-    if known.any():
+    if is_known.any():
         round_ = float(way[-1] + np.linalg.norm(points[0] - points[-1]))
-        tops = np.interp(way, way[known], tops[known], period=round_)
+        tops = np.interp(way, way[is_known], tops[is_known], period=round_)
     else:
         tops = np.full(len(points), otherwise)
     # Of the places between two corners keep those that lie off the straight line.

@@ -206,12 +206,12 @@ def patches_from_solid(solid: Manifold, table: TagTable) -> list[Patch]:
     # Collect the faces of each tag, in their order, with the vertices they use.
     order = np.argsort(tag_of_face, kind="stable")
     starts = np.searchsorted(tag_of_face[order], np.arange(len(tags) + 1))
-    found = [
+    patches = [
         _compact(tag, vertices, triangles[order[a:b]])
         for tag, (a, b) in zip(tags, pairwise(starts), strict=True)
         if a < b
     ]
-    return sorted(found, key=lambda p: (p.tag.item, p.tag.surface, p.tag.material))
+    return sorted(patches, key=lambda p: (p.tag.item, p.tag.surface, p.tag.material))
 
 
 def _tags_of_faces(mesh: manifold3d.Mesh64, table: TagTable) -> tuple[list[Tag], I64]:

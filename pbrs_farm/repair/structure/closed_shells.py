@@ -155,15 +155,15 @@ def components(patches: Sequence[Patch]) -> list[I64]:
 
 def _split(patches: Sequence[Patch], labels: Sequence[I64]) -> list[list[Patch]]:
     """The parts of the patches that each shell is made of, with the vertices they use."""
-    every = np.unique(np.concatenate(labels))
+    labels_used = np.unique(np.concatenate(labels))
     # Keep the patches of a single shell unchanged.
-    if len(every) == 1:
+    if len(labels_used) == 1:
         return [list(patches)]
-    shells: list[list[Patch]] = [[] for _ in every]
+    shells: list[list[Patch]] = [[] for _ in labels_used]
     for patch, label in zip(patches, labels, strict=True):
         # Sort the faces by shell, in their order within it: a plant has 60,000 leaves.
         order = np.argsort(label, kind="stable")
-        starts = np.searchsorted(label[order], every)
+        starts = np.searchsorted(label[order], labels_used)
         for shell, (a, b) in enumerate(pairwise([*starts.tolist(), len(order)])):
             if a < b:
                 shells[shell].append(_part(patch, order[a:b]))

@@ -66,9 +66,9 @@ def with_parts_apart(house: House) -> tuple[House, int]:
     """
     moved = set[tuple[int, int]]()
     for _ in range(_ROUNDS):
-        house, found = _move_parts_once(house)
-        moved |= found
-        if not found:
+        house, moved_now = _move_parts_once(house)
+        moved |= moved_now
+        if not moved_now:
             break
     return house, len(moved)
 
@@ -85,11 +85,11 @@ def _move_parts_once(house: House) -> tuple[House, set[tuple[int, int]]]:
         corners_of_surfaces(s for s in house.items[k].surfaces if s.material == m) for k, m in parts
     ]
     of = np.repeat(np.arange(len(parts)), [len(c) for c in corners])
-    every = np.concatenate([np.zeros((0, 3, 3)), *corners])
+    faces = np.concatenate([np.zeros((0, 3, 3)), *corners])
     items, moved = list(house.items), set[tuple[int, int]]()
-    for part, other, normal, offset in _pairs_in_one_plane(every, of):
+    for part, earlier, normal, offset in _pairs_in_one_plane(faces, of):
         k, material = parts[part]
-        mine, its = (_Faces(c, unit_normals(c)) for c in (every[of == part], every[of == other]))
+        mine, its = (_Faces(c, unit_normals(c)) for c in (faces[of == part], faces[of == earlier]))
         if _is_met(mine, its, normal, offset):
             continue
         surfaces = [
@@ -116,12 +116,12 @@ def _pairs_in_one_plane(corners: F64, of: NDArray[np.intp]) -> list[tuple[int, i
     keys = np.round(np.column_stack([normals * 1e3, offsets / _COINCIDE_M])).astype(np.int64)
     plane = np.unique(keys @ [1, 4_001, 16_008_001, 64_048_012_001], return_inverse=True)[1]
     order = np.argsort(plane, kind="stable")
-    own = of[faces[order]]
+    part_of_face = of[faces[order]]
     start = np.r_[0, np.flatnonzero(np.diff(plane[order])) + 1]
     end = np.r_[start[1:], len(order)]
-    found = []
+    pairs = []
     # Faces of a plane are in the order of their parts: where the first and the last differ are several.
-    for k in np.flatnonzero(own[start] != own[end - 1]):
+    for k in np.flatnonzero(part_of_face[start] != part_of_face[end - 1]):
         group = order[start[k] : end[k]]
         normal, offset = normals[group[0]], float(offsets[group[0]])
         members = {
@@ -131,22 +131,23 @@ def _pairs_in_one_plane(corners: F64, of: NDArray[np.intp]) -> list[tuple[int, i
         boxes = {p: (c.min((0, 1)), c.max((0, 1))) for p, c in members.items()}
         for part in sorted(members, reverse=True):
             low, high = boxes[part]
-            for other in members:
-                if other >= part:
+            for earlier in members:
+                if earlier >= part:
                     continue
-                spans = np.minimum(high, boxes[other][1]) - np.maximum(low, boxes[other][0])
+                spans = np.minimum(high, boxes[earlier][1]) - np.maximum(low, boxes[earlier][0])
                 # Of their boxes the two longer sides bound the area, but for a plane's slant.
                 longer = np.sort(spans)[1:]
                 if spans.min() < -_COINCIDE_M or longer[0] < 0 or 2 * longer.prod() < _SEEN_M2:
                     continue
                 axes = np.linalg.svd(normal[None])[2][1:]
                 shared = shapely.intersection(
-                    _outline_of_faces(members[part], axes), _outline_of_faces(members[other], axes)
+                    _outline_of_faces(members[part], axes),
+                    _outline_of_faces(members[earlier], axes),
                 )
                 if float(shapely.area(shared)) > _SEEN_M2:
-                    found.append((part, other, normal, offset))
+                    pairs.append((part, earlier, normal, offset))
                     break
-    return found
+    return pairs
 
 
 def _moved_in_plane(surface: Surface, normal: F64, offset: float) -> Surface:
@@ -160,12 +161,12 @@ def _moved_in_plane(surface: Surface, normal: F64, offset: float) -> Surface:
 
 def _move_out_of_planes(item: Item, walls: Sequence[Item]) -> Item:
     low, high = item.bounds
-    own, around = _faces_of_structure([item], low, high), _faces_of_structure(walls, low, high)
-    if not len(own.normals) or not len(around.normals):
+    mine, around = (_faces_of_structure([item], low, high), _faces_of_structure(walls, low, high))
+    if not len(mine.normals) or not len(around.normals):
         return item
     surfaces = list(item.surfaces)
     done: list[tuple[F64, float]] = []
-    for normal, offset in _shared_planes(own, around):
+    for normal, offset in _shared_planes(mine, around):
         # Two keys may round one plane: move it once.
         if any(normal @ n > _PARALLEL and abs(offset - o) < 2 * _COINCIDE_M for n, o in done):
             continue

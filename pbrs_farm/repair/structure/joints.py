@@ -35,7 +35,7 @@ def joints_between_walls(
     Second: how many of them bridge a gap (the others lie inside walls that touch). rooms: plan
     area of all rooms, into which no corner is filled.
     """
-    found: list[tuple[Wall, Manifold]] = []
+    parts: list[tuple[Wall, Manifold]] = []
     n_gaps = 0
     tree = shapely.STRtree([w.footprint for w in walls])
     for i, a in enumerate(walls):
@@ -44,18 +44,18 @@ def joints_between_walls(
             if j <= i or walls[j].item == a.item:
                 continue
             solids = _joint(a, walls[j], rooms, table)
-            found += [(a, s) for s in solids]
+            parts += [(a, s) for s in solids]
             n_gaps += bool(solids) and a.footprint.distance(walls[j].footprint) > _GAP_SEEN_M
-    return found, n_gaps
+    return parts, n_gaps
 
 
 def _joint(a: Wall, b: Wall, rooms: plan.Shape, table: TagTable) -> list[Manifold]:
     # Fill the area near both walls, set back behind their faces.
-    both = plan.union([a.footprint, b.footprint])
+    area = plan.union([a.footprint, b.footprint])
     near = plan.common(plan.grown(a.footprint, GAP_M), plan.grown(b.footprint, GAP_M))
     if a.thickened and b.thickened:
-        both, near = _outer_corner(a, b, rooms)
-    inner = plan.grown(plan.closed(both, GAP_M), -_RECESS_M)
+        area, near = _outer_corner(a, b, rooms)
+    inner = plan.grown(plan.closed(area, GAP_M), -_RECESS_M)
     areas = polygons_of(plan.common(near, inner))
     # Bridge walls that both end short of their corner.
     if not any(_touches(p, a) and _touches(p, b) for p in areas):
@@ -142,15 +142,15 @@ def joints_with_surface(
                 feet.append(_Foot(wall, polygon, start, float(gap.max())))
     # Reach from inside the wall to the middle of the slab.
     far = surface.plane.raised(away * depth_m)
-    found = []
+    parts = []
     for foot in [*feet, *_joint_between(feet, is_ceiling=surface.is_ceiling)]:
         low, high = (foot.start, far) if surface.is_ceiling else (far, foot.start)
         corners = shapely.get_coordinates(foot.area)
         if (high.at(corners) - low.at(corners)).min() < _RECESS_M:
             continue
         tags = (foot.wall.tag("joint"),) * 3
-        found += [(foot.wall, s) for s in solid_prisms([foot.area], low, high, tags, table)]
-    return found
+        parts += [(foot.wall, s) for s in solid_prisms([foot.area], low, high, tags, table)]
+    return parts
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -165,7 +165,7 @@ class _Foot:
 
 def _joint_between(feet: Sequence[_Foot], *, is_ceiling: bool) -> list[_Foot]:
     # Fill the corners of walls that end visibly short: drawn back, their feet are apart.
-    found = []
+    corners = []
     for a, b in combinations(feet, 2):
         if a.wall is b.wall or max(a.gap_m, b.gap_m) <= _GAP_SEEN_M:
             continue
@@ -177,12 +177,12 @@ def _joint_between(feet: Sequence[_Foot], *, is_ceiling: bool) -> list[_Foot]:
             y = shorter.wall.bottom_y - GAP_M if is_ceiling else shorter.wall.high_y + GAP_M
             shorter = replace(shorter, start=level_plane(y))
         areas = polygons_of(_hull_of_ends(a.area, b.area))
-        found += [replace(shorter, area=area) for area in areas]
-    return found
+        corners += [replace(shorter, area=area) for area in areas]
+    return corners
 
 
 def _is_loose(a: Wall, b: Wall) -> bool:
     # Rooms cut MARGIN_M off what fills a corner: ask whether the walls share a wider part of it.
     thin = [plan.grown(w.footprint, -0.5 * MARGIN_M) for w in (a, b)]
-    both = plan.grown(plan.union([a.footprint, b.footprint]), -0.5 * MARGIN_M)
-    return not any(all(p.intersects(t) for t in thin) for p in polygons_of(both))
+    area = plan.grown(plan.union([a.footprint, b.footprint]), -0.5 * MARGIN_M)
+    return not any(all(p.intersects(t) for t in thin) for p in polygons_of(area))

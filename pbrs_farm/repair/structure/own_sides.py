@@ -36,15 +36,15 @@ def with_own_sides_visible(
     Walls without a room are unchanged.
     """
     areas = {r.id: plan.polygon_of_room(r.polygon) for r in rooms}
-    found = []
+    visible = []
     for wall in walls:
         if wall.room_id is None:
-            found.append(wall)
+            visible.append(wall)
             continue
         footprint, cutters = wall.footprint, []
         for room in rooms:
-            apart = room.floor_y > wall.high_y or room.ceiling_y < wall.bottom_y
-            if room.id == wall.room_id or apart:
+            is_apart = room.floor_y > wall.high_y or room.ceiling_y < wall.bottom_y
+            if room.id == wall.room_id or is_apart:
                 continue
             reach = plan.grown(_volume_in_plan(room.id, wall.room_id, areas), _COINCIDE_M)
             polygons = polygons_of(_rim(footprint, reach))
@@ -54,16 +54,16 @@ def with_own_sides_visible(
             footprint = plan.without(footprint, *polygons)
         if cutters:
             wall = replace(wall, solid=subtract(wall.solid, cutters), footprint=footprint)
-        found.append(wall)
-    return found
+        visible.append(wall)
+    return visible
 
 
 def _volume_in_plan(room_id: str, owner_id: str, areas: dict[str, plan.Shape]) -> plan.Shape:
     # Give what two outlines share to the smaller room: a bathroom drawn inside a living room.
-    area, own = areas[room_id], areas.get(owner_id)
-    if own is None or own.area >= area.area or plan.common(area, own).area < _OVERLAP_M2:
+    area, base = areas[room_id], areas.get(owner_id)
+    if base is None or base.area >= area.area or plan.common(area, base).area < _OVERLAP_M2:
         return area
-    return plan.without(area, own)
+    return plan.without(area, base)
 
 
 def _rim(footprint: plan.Shape, reach: plan.Shape) -> plan.Shape:
@@ -72,7 +72,7 @@ def _rim(footprint: plan.Shape, reach: plan.Shape) -> plan.Shape:
         return shapely.Polygon()
     # Lay the wall along x.
     axes = along_and_across(footprint)
-    left = shapely.transform(plan.without(footprint, reach), lambda p: p @ axes.T)
+    remains = shapely.transform(plan.without(footprint, reach), lambda p: p @ axes.T)
     whole = shapely.transform(footprint, lambda p: p @ axes.T)
     x0, z0, x1, z1 = whole.bounds
     least_m = min(_LEAST_LEFT_M, _LEAST_LEFT_SHARE * (z1 - z0))
@@ -80,7 +80,7 @@ def _rim(footprint: plan.Shape, reach: plan.Shape) -> plan.Shape:
     size = x1 - x0 + z1 - z0
     spans = [
         shapely.box(p.bounds[0], z0 - size, p.bounds[2], z1 + size)
-        for p in polygons_of(plan.opened(left, least_m))
+        for p in polygons_of(plan.opened(remains, least_m))
     ]
     goes_on = plan.on_grid(shapely.transform(plan.union(spans), lambda p: p @ axes))
     return plan.common(reach, goes_on)

@@ -98,9 +98,9 @@ def without(shape: Shape, *others: Shape) -> Shape:
 
     Rounded to the grid; an empty shape among the others costs nothing.
     """
-    for other in others:
-        if not shapely.is_empty(other):
-            shape = _areal(shapely.difference(shape, other, grid_size=GRID_M))
+    for cutter in others:
+        if not shapely.is_empty(cutter):
+            shape = _areal(shapely.difference(shape, cutter, grid_size=GRID_M))
     return shape
 
 

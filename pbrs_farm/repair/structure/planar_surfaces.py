@@ -89,26 +89,26 @@ def floors_and_ceilings_from_house(house: House, table: TagTable) -> FloorsAndCe
     What is neither is named with the reason and stays as it was read. The ground outside is taken
     only where it is solid.
     """
-    found = FloorsAndCeilings([], {}, {}, [])
+    surfaces = FloorsAndCeilings([], {}, {}, [])
     for index, item in enumerate(house.items):
         if item.kind not in (ItemKind.FLOOR, ItemKind.CEILING, ItemKind.GROUND):
             continue
         shells = shells_from_item(item, index, table)
         if shells is not None:
-            found.solid[index] = [solid for solid, _ in shells]
+            surfaces.solid[index] = [solid for solid, _ in shells]
             if item.kind is not ItemKind.GROUND:
                 for solid, patches in shells:
-                    found.covers.extend(_covers_of_solid(item, solid, patches))
+                    surfaces.covers.extend(_covers_of_solid(item, solid, patches))
         # Leave the ground around the house alone, unless it is solid.
         elif item.kind is ItemKind.GROUND:
             continue
         else:
             planar = list(_planar_surfaces(item, index))
             if planar:
-                found.planar.extend(planar)
+                surfaces.planar.extend(planar)
             elif item.surfaces:
-                found.left[index] = "it is no closed solid and has no face that lies flat"
-    return found
+                surfaces.left[index] = "it is no closed solid and has no face that lies flat"
+    return surfaces
 
 
 def _covers_of_solid(item: Item, solid: Manifold, patches: Sequence[Patch]) -> list[Cover]:
@@ -124,18 +124,18 @@ def _covers_of_solid(item: Item, solid: Manifold, patches: Sequence[Patch]) -> l
 
 def _sloped_undersides(patches: Sequence[Patch]) -> list[Cover]:
     """The planes of the underside of a roof; none where it is level, or made of very many faces."""
-    found = []
+    covers = []
     for p in patches:
         down = p.faces[unit_normals(p.positions[p.faces])[:, 1] < -_UP]
         for faces in facets(p.positions, down):
             plane = plane_of_points(p.positions[np.unique(faces)])
             area = plan.polygon_of_triangles(p.positions, faces)
             if plane is not None and not shapely.is_empty(area):
-                found.append(Cover(True, area, plane))
-    heights = [c.plane.at(shapely.get_coordinates(c.area)) for c in found]
-    if not found or len(found) > _MOST_FACETS or np.ptp(np.concatenate(heights)) < _LEVEL_M:
+                covers.append(Cover(True, area, plane))
+    heights = [c.plane.at(shapely.get_coordinates(c.area)) for c in covers]
+    if not covers or len(covers) > _MOST_FACETS or np.ptp(np.concatenate(heights)) < _LEVEL_M:
         return []
-    return found
+    return covers
 
 
 def _planar_surfaces(item: Item, index: int) -> Iterator[PlanarSurface]:

@@ -101,26 +101,26 @@ def uv_parts(positions: F64, faces: NDArray[np.integer], uvs: F64) -> tuple[UvPa
     mirrored within a surface has another mapping in each part.
     """
     parts: list[UvPart] = []
-    left = faces
-    while len(left):
+    remaining = faces
+    while len(remaining):
         if len(parts) == _MOST_UV_PARTS:
             return ()
-        corners = np.unique(left)
+        corners = np.unique(remaining)
         uv, off = affine_uv_map(positions[corners], uvs[corners])
         if off > MAX_UV_OFF:
             # Not one map for all: that of the largest face, for all faces that it fits.
-            largest = left[np.argmax(_plan_areas(positions, left))]
+            largest = remaining[np.argmax(_plan_areas(positions, remaining))]
             uv, _ = affine_uv_map(positions[largest], uvs[largest])
         # Pictures repeat: tiles that all begin at 0 lie as one floor whose picture goes on.
-        off_by = (uv(positions) - uvs)[left]
+        off_by = (uv(positions) - uvs)[remaining]
         whole = np.rint(off_by)
         mine = (np.abs(off_by - whole) <= MAX_UV_OFF).all((1, 2)) & (
             np.ptp(whole, axis=1) == 0
         ).all(1)
         if not mine.any():
             return ()
-        parts.append(UvPart(plan.polygon_of_triangles(positions, left[mine]), uv))
-        left = left[~mine]
+        parts.append(UvPart(plan.polygon_of_triangles(positions, remaining[mine]), uv))
+        remaining = remaining[~mine]
     return tuple(parts)
 
 
@@ -140,12 +140,12 @@ def polygons_of(shape: plan.Shape, *, min_area_m2: float = 1e-6) -> list[shapely
     Lines and points that intersections leave are dropped. The order (by bounds, then area)
     makes repair deterministic whatever order shapely gives.
     """
-    found = [
+    polygons = [
         p
         for p in shapely.get_parts(shapely.get_parts(shape)).tolist()
         if isinstance(p, shapely.Polygon) and p.area > min_area_m2
     ]
-    return sorted(found, key=lambda p: (p.bounds, p.area))
+    return sorted(polygons, key=lambda p: (p.bounds, p.area))
 
 
 def prism(

@@ -46,8 +46,8 @@ def footprints_of_surfaces(
     footprints = []
     for surface in surfaces:
         # Close the gaps between neighbours at this height and the walls between them.
-        others = plan.near_to(surface.area, surfaces, lambda s: s.area, 1.0)
-        mates = [s.area for s in others if _is_level_with(surface, s)]
+        nearby = plan.near_to(surface.area, surfaces, lambda s: s.area, 1.0)
+        mates = [s.area for s in nearby if _is_level_with(surface, s)]
         near = plan.near_to(surface.area, walls, lambda w: w.footprint, 1.0)
         feet = [w.footprint for w in near if _wall_meets_surface(surface, w)]
         whole = plan.closed(plan.union([*mates, *feet]), 2 * GAP_M)
@@ -85,7 +85,7 @@ def visible_areas(
 
     Under walls, where two footprints meet, the earlier one. Surfaces at other heights do not count.
     """
-    own = []
+    areas = []
     for i, surface in enumerate(surfaces):
         near = plan.near_to(surface.area, range(len(surfaces)), lambda j: surfaces[j].area, 1.0)
         same = [j for j in near if j != i and _same_height(surface, surfaces[j])]
@@ -94,8 +94,8 @@ def visible_areas(
         # Show the ring under the walls, except under an earlier footprint.
         ring = plan.without(footprints[i], surface.area, *(surfaces[j].area for j in same))
         ring = plan.without(ring, *(footprints[j] for j in same if j < i))
-        own.append(plan.union([mine, ring]))
-    return own
+        areas.append(plan.union([mine, ring]))
+    return areas
 
 
 def _same_height(a: PlanarSurface, b: PlanarSurface) -> bool:
@@ -153,10 +153,10 @@ def bridge_gaps(
     """
     solids = []
     for k, surface in enumerate(surfaces):
-        others = [s.area for j, s in enumerate(surfaces) if j != k and s.item == surface.item]
-        if not others:
+        other_areas = [s.area for j, s in enumerate(surfaces) if j != k and s.item == surface.item]
+        if not other_areas:
             continue
-        whole = plan.union([surface.area, *others])
+        whole = plan.union([surface.area, *other_areas])
         # Reach a little past the crease, behind the visible layers.
         area = plan.common(plan.grown(surface.area, 0.2 * thickness_m), whole)
         away = 1.0 if surface.is_ceiling else -1.0

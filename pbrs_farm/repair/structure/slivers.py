@@ -74,9 +74,13 @@ class _Mesh:
 
     def result(self) -> tuple[F64, I64, I64]:
         """Vertices, living faces, their labels."""
-        kept = [f for f, alive in enumerate(self._alive) if alive]
-        faces = np.array([self._faces[f] for f in kept], np.int64).reshape(-1, 3)
-        return np.array(self._vertices), faces, np.array([self._labels[f] for f in kept], np.int64)
+        rows = [f for f, alive in enumerate(self._alive) if alive]
+        faces = np.array([self._faces[f] for f in rows], np.int64).reshape(-1, 3)
+        return (
+            np.array(self._vertices),
+            faces,
+            np.array([self._labels[f] for f in rows], np.int64),
+        )
 
     def _slivers(self) -> list[int]:
         vertices = np.array(self._vertices)[:, :3]
@@ -87,8 +91,8 @@ class _Mesh:
         corners = np.array(self._vertices)[:, :3][np.array(self._faces, np.int64)]
         longest = np.linalg.norm(corners - np.roll(corners, -1, 1), axis=2).max(1)
         is_thin = face_areas(corners) <= np.maximum(MIN_AREA_M2, 0.5 * _THIN_M * longest)
-        found = np.flatnonzero(is_thin & np.array(self._alive)).tolist()
-        return sorted(found, key=lambda f: -longest[f])
+        slivers = np.flatnonzero(is_thin & np.array(self._alive)).tolist()
+        return sorted(slivers, key=lambda f: -longest[f])
 
     def _dissolve_one(self, f: int) -> None:
         places = [self._place[v] for v in self._faces[f]]
@@ -113,12 +117,12 @@ class _Mesh:
             k for k in range(3) if self._place[face[k]] == c and self._place[face[(k + 1) % 3]] == a
         )
         first, second, third = (face[(k + j) % 3] for j in range(3))
-        start, end, at = self._vertices[first], self._vertices[second], self._vertices[b]
+        start, end, point = self._vertices[first], self._vertices[second], self._vertices[b]
         # Interpolate properties there, but keep b's exact position.
         along = end[:3] - start[:3]
-        t = float(np.clip((at[:3] - start[:3]) @ along / max(along @ along, 1e-300), 0.0, 1.0))
+        t = float(np.clip((point[:3] - start[:3]) @ along / max(along @ along, 1e-300), 0.0, 1.0))
         middle = start + t * (end - start)
-        middle[:3] = at[:3]
+        middle[:3] = point[:3]
         new = len(self._vertices)
         self._vertices.append(middle)
         self._place.append(self._place[b])

@@ -55,19 +55,19 @@ def with_undersides(house: House) -> House:
     covers = [i for i in house.items if i.kind in (ItemKind.FLOOR, ItemKind.CEILING)]
     above = corners_of_surfaces([s for i in covers for s in i.surfaces])
     items: list[Item] = []
-    made: list[Item] = []
+    undersides: list[Item] = []
     for item in house.items:
         is_floor = item.kind is ItemKind.FLOOR and item.n_faces
         stand = _seen_from(item, stands, above) if is_floor else None
-        own, under = _parted(item) if stand is not None else (item.surfaces, ())
-        if stand is None or not under or not own:
+        upper, under = _parted(item) if stand is not None else (item.surfaces, ())
+        if stand is None or not under or not upper:
             items.append(item)
             continue
-        items.append(replace(item, surfaces=own))
+        items.append(replace(item, surfaces=upper))
         level_id, room_id = item.level_id, None
         if stand.room is not None:
             level_id, room_id = stand.room.level_id, stand.room.id
-        made.append(
+        undersides.append(
             Item(
                 id=f"{UNDERSIDE}_{item.id}",
                 name=f"Underside of {item.name or item.id}",
@@ -80,7 +80,7 @@ def with_undersides(house: House) -> House:
                 tags=(UNDERSIDE,),
             )
         )
-    return house.with_items([*items, *made])
+    return house.with_items([*items, *undersides])
 
 
 def _seen_from(item: Item, stands: Sequence[_Stand], above: F64) -> _Stand | None:
@@ -114,9 +114,9 @@ def _seen_from(item: Item, stands: Sequence[_Stand], above: F64) -> _Stand | Non
 
 def _parted(item: Item) -> tuple[tuple[Surface, ...], tuple[Surface, ...]]:
     """The surfaces of a floor without the faces that look down, and those faces."""
-    own, under = [], []
+    upper, under = [], []
     for s in item.surfaces:
         down = unit_normals(corners_of_surfaces([s]))[:, 1] < MAX_UNDERSIDE_NORMAL_Y
-        own += [part_of(s, s.faces[~down], s.name)] if not down.all() else []
+        upper += [part_of(s, s.faces[~down], s.name)] if not down.all() else []
         under += [part_of(s, s.faces[down], s.name)] if down.any() else []
-    return tuple(own), tuple(under)
+    return tuple(upper), tuple(under)

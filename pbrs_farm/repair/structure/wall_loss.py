@@ -40,11 +40,11 @@ def side_areas(
     order. surfaces: item index -> new surfaces; other items are unchanged.
     """
     before, after = [0.0] * len(house.items), [0.0] * len(house.items)
-    for wall, own, rest in zip(walls, cut, left, strict=True):
+    for wall, cut_wall, rest in zip(walls, cut, left, strict=True):
         area = _seen_from_the_side(rest, wall.footprint)
         after[wall.item] += area
         # Cut the openings out of the wall as it was; where nothing else was cut, that is the rest.
-        if own.solid is not wall.solid:
+        if cut_wall.solid is not wall.solid:
             area = _seen_from_the_side(
                 _cut_openings_of_wall(house.openings, wall, table), wall.footprint
             )

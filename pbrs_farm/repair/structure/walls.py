@@ -116,7 +116,7 @@ def walls_from_house(
     rooms: plan area of all rooms; planar walls are thickened away from it.
     """
     walls: list[Wall] = []
-    left: dict[int, str] = {}
+    unchanged: dict[int, str] = {}
     for index, item in enumerate(house.items):
         if item.kind is not ItemKind.WALL or not item.surfaces:
             continue
@@ -127,10 +127,10 @@ def walls_from_house(
         # Thicken planar items, and leave the others.
         thick = _thickened(item, index, table, rooms, thickness_m)
         if thick is None:
-            left[index] = "its surfaces bound no closed solid and lie in no one plane"
+            unchanged[index] = "its surfaces bound no closed solid and lie in no one plane"
         else:
             walls.append(thick)
-    return walls, left
+    return walls, unchanged
 
 
 def _wall_of_solid(

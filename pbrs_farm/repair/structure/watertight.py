@@ -60,10 +60,10 @@ def repaired_structure(house: House, thickness_m: float) -> Structure:
     uprights, left = walls_from_house(house, table, rooms, thickness_m)
     walls = [w for w in uprights if not w.is_board]
     horizontal = floors_and_ceilings_from_house(house, table)
-    found = stairwells_of_house(house, walls, horizontal.planar, _covers(horizontal))
-    planar = [*horizontal.planar, *found.surfaces]
+    wells = stairwells_of_house(house, walls, horizontal.planar, _covers(horizontal))
+    planar = [*horizontal.planar, *wells.surfaces]
     covers = _covers(replace(horizontal, planar=planar))
-    lived = (*house.rooms, *found.wells)
+    lived = (*house.rooms, *wells.wells)
     doors = thresholds(house, walls)
 
     # Thicken floors and ceilings, join walls to walls and to slabs, but never inside a room.
@@ -79,14 +79,14 @@ def repaired_structure(house: House, thickness_m: float) -> Structure:
 
     # Cut the openings, united everything, and take the faces back by item.
     cut_parts, plugs, idle = cut_openings(house.openings, parts, table)
-    solids = [*cut_parts, *slabs, *(s for found in horizontal.solid.values() for s in found)]
+    solids = [*cut_parts, *slabs, *(s for wells in horizontal.solid.values() for s in wells)]
     surfaces = _surfaces_by_item(unite(solids), table) if solids else {}
     touched = {w.item for w in uprights} | {s.item for s in planar} | set(horizontal.solid)
     areas = side_areas(house, uprights, wholes, cut_parts[: len(wholes)], surfaces, table)
     report = _report_of_counts(walls, planar, set(horizontal.solid)).model_copy(
         update={
             "n_joints_closed": n_gaps,
-            "n_stairwells_closed": len(found.surfaces),
+            "n_stairwells_closed": len(wells.surfaces),
             "n_openings": len(house.openings),
             "n_openings_cut": len(plugs),
             "left_as_is": _left_as_is(house, {**left, **horizontal.left}, idle),
@@ -99,7 +99,7 @@ def repaired_structure(house: House, thickness_m: float) -> Structure:
         {i: surfaces.get(i, ()) for i in sorted(touched)},
         plugs,
         report,
-        spaces_of_rooms(house.rooms, found.wells, standing, covers),
+        spaces_of_rooms(house.rooms, wells.wells, standing, covers),
         {r.id: interiors_of_room(r, wholes, planar, horizontal.covers) for r in lived},
     )
 
@@ -108,8 +108,8 @@ def _parts_of_joints(
     joints: Sequence[tuple[Wall, Manifold]], volumes: Sequence[RoomVolume], table: TagTable
 ) -> list[WallPart]:
     # Keep joints out of every room.
-    kept = [(w, without_volumes(s, w.tag("joint"), None, volumes, table)) for w, s in joints]
-    return [WallPart(w, solid, is_joint=True) for w, solid in kept]
+    outside = [(w, without_volumes(s, w.tag("joint"), None, volumes, table)) for w, s in joints]
+    return [WallPart(w, solid, is_joint=True) for w, solid in outside]
 
 
 def _report_of_counts(
@@ -146,24 +146,24 @@ def _slabs(
     thickness_m: float,
     table: TagTable,
 ) -> list[Manifold]:
-    found = []
+    slabs = []
     visible = visible_areas(planar, footprints)
-    for surface, footprint, own in zip(planar, footprints, visible, strict=True):
+    for surface, footprint, visible_area in zip(planar, footprints, visible, strict=True):
         # Keep slabs out of every room but their own.
-        for solid in slab(surface, footprint, own, thickness_m, table):
-            found.append(
+        for solid in slab(surface, footprint, visible_area, thickness_m, table):
+            slabs.append(
                 without_volumes(solid, surface.tag("hidden"), surface.item, volumes, table)
             )
-    return found + bridge_gaps(planar, thickness_m, table)
+    return slabs + bridge_gaps(planar, thickness_m, table)
 
 
 def _surfaces_by_item(solid: Manifold, table: TagTable) -> dict[int, tuple[Surface, ...]]:
-    found: dict[int, list[Surface]] = {}
+    by_item: dict[int, list[Surface]] = {}
     for patch in patches_from_solid(solid, table):
         surface = surface_from_patch(with_metric_uv(patch))
         if surface is not None:
-            found.setdefault(patch.tag.item, []).append(surface)
-    return {item: tuple(surfaces) for item, surfaces in found.items()}
+            by_item.setdefault(patch.tag.item, []).append(surface)
+    return {item: tuple(surfaces) for item, surfaces in by_item.items()}
 
 
 def with_structure(house: House, structure: Structure) -> tuple[House, list[Removed]]:

@@ -27,14 +27,14 @@ def stored_parts(
 ) -> tuple[Stored, dict[str, bytes]]:
     """(arrays of the labels, part name -> bytes of colour in each mode) of a view."""
     pictures = {}
-    wanted, *of_colour = packing.requests()
+    labels, *of_colour = packing.requests()
     for request in of_colour:
         colour = resize_stored(root.arrays(ref, request), size)["colour"]
         if packing.colour == "jpeg":
             pictures[f"{request.mode}.jpg"] = jpeg_from_array(colour, packing.quality)
         else:
             pictures[f"{request.mode}.png"] = png_of_rows(colour)
-    return resize_stored(root.arrays(ref, wanted), size), pictures
+    return resize_stored(root.arrays(ref, labels), size), pictures
 
 
 def facts_json(facts: ViewFacts, size: Size) -> bytes:

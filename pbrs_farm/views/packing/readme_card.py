@@ -93,8 +93,8 @@ def _homes(facts: RootFacts) -> str:
         (_card_cell(h.id), h.n_views, _card_cell(h.licence) or "none named", _card_cell(h.author))
         for h in facts.homes[:_MOST_HOMES]
     ]
-    left = len(facts.homes) - len(rows)
-    more = f"\n\n... and {left} more homes." if left else ""
+    n_more = len(facts.homes) - len(rows)
+    more = f"\n\n... and {n_more} more homes." if n_more else ""
     return _table(("home", "views", "licence", "author"), rows) + more
 
 
