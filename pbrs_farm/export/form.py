@@ -174,7 +174,7 @@ def no_such_option(form: Form, name: str) -> BadInput:
 
 def forms_table(of: str) -> str:
     """The package's forms of "views", or of "homes", as a Markdown table."""
-    rows = ["| form | what is written |", "|---|---|"]
+    rows = ["| form | files |", "|---|---|"]
     forms = map(form_of, FORMS.own_names())
     rows += [f"| `{form.name}` | {form.help} |" for form in forms if form.of == of]
     return "\n".join(rows)

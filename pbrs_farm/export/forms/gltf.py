@@ -18,4 +18,4 @@ def write_gltf(home: ExportedHome, folder: Path) -> None:
     (folder / f"{home.house.id}.glb").write_bytes(data)
 
 
-FORM = HomeForm("gltf", write_gltf, "`<id>/<id>.glb`, which `pbrs-farm run` reads back")
+FORM = HomeForm("gltf", write_gltf, "`<id>/<id>.glb`, readable by `pbrs-farm run`")

@@ -181,8 +181,9 @@ def _collision(parts: tuple[F64, ...]) -> bytes:
 FORM = HomeForm(
     "habitat",
     write_habitat,
-    "a Habitat data set: the building as stage, an object with collision parts for each thing, an"
-    " articulated object for what opens, regions, and `navigable/<id>.json`, the outlines where a disc of 0.2 m can stand",
+    "a Habitat data set: the building as stage, an object with collision parts for each item, an"
+    " articulated object for each item with joints, regions, and `navigable/<id>.json`, the outlines of the floor"
+    " area free for a disc of 0.2 m",
     remark=COLLIDES,
     up="y",
 )

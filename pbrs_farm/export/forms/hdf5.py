@@ -87,12 +87,12 @@ FORM = ViewForm(
     write_hdf5,
     "`<n>.hdf5` per view with BlenderProc's keys: `colors`, `depth`, `normals` ((n + 1) / 2, OpenGL"
     " camera axes), `category_id_segmaps`, `instance_segmaps`, `instance_attribute_maps`, `campose`"
-    " (its `cam_K` counts from the centre of the first pixel: cx = (W - 1) / 2); `index.jsonl`",
+    " ((0, 0) of its `cam_K` is the centre of the first pixel: cx = (W - 1) / 2); `index.jsonl`",
     has_classes=True,
     convention=Convention(
         0,
         has_k=True,
         axes="camera x right, y up, z backward; the home's world, y up, m",
-        depth="m, along the axis (`depth` where no pin-hole)",
+        depth="m, along the axis (`depth` unless pin-hole)",
     ),
 )

@@ -370,7 +370,7 @@ FORM = ViewForm(
     write_hypersim,
     "the layout of Hypersim (extra `selection`): `ai_VVV_NNN/images/scene_cam_XX_{final_hdf5,final_preview,geometry_hdf5}`,"
     " `_detail` with cameras and boxes, `metadata_images_split_scene_v1.csv`, `metadata_camera_parameters.csv`;"
-    " `index.csv` and `README.md` of ours; with `--split` one root whose table has the splits",
+    " also our `index.csv` and `README.md`; with `--split` one root whose table has the splits",
     finish=join_splits,
     convention=Convention(
         0.5,

@@ -111,7 +111,7 @@ FORM = ViewForm(
     "kitti",
     write_kitti,
     "KITTI 2015: `image_2`, `image_3`, `disp_occ_0`, `disp_noc_0`, `flow_occ`, `flow_noc`, `calib`"
-    " (its P2 and P3 count from the centre of the first pixel)",
+    " ((0, 0) of P2 and P3 is the centre of the first pixel)",
     convention=Convention(
         0,
         has_k=True,

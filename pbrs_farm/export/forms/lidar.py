@@ -175,8 +175,8 @@ FORM = ViewForm(
     "a laser scan at each view's eye (`--scanner`: "
     + ", ".join(f"`{name}`" for name in LIDARS)
     + "):"
-    " `<house>/<view>.ply` and `.pcd`, `<house>/poses.txt`; a return has place, range as measured and exact,"
-    " intensity, ring, class, instance, normal, and what glass and mirrors it came by",
+    " `<house>/<view>.ply` and `.pcd`, `<house>/poses.txt`; a return has position, measured and exact range,"
+    " intensity, ring, class, instance, normal, and the glass and mirrors on its way",
     options=LidarOptions,
     convention=Convention(
         None,

@@ -247,6 +247,6 @@ FORM = HomeForm(
     "mjcf",
     write_mjcf,
     "a model of MuJoCo (extra `physics`): `<id>/<id>.xml`, `meshes/` and `textures/`, metres, z up; doors"
-    " and drawers have joints, loose things are free bodies at rest",
+    " and drawers have joints, loose items are free bodies at rest",
     up="z",
 )

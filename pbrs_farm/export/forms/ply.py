@@ -111,7 +111,7 @@ FORM = ViewForm(
     write_ply,
     "`<house>/<view>.ply`, binary: a vertex for each pixel with a depth: `x y z` in metres of the"
     " world (y up), `nx ny nz` in its axes, `red green blue` of the picture, `label` (NYU40, or"
-    " yours) and `instance`; from the layer `position` where there is one, else from depth and K of"
+    " yours) and `instance`; from the layer `position` if present, else from depth and K of"
     " a pin-hole",
     has_classes=True,
     convention=Convention(None, has_k=False, axes="the home's world, y up, m"),

@@ -190,7 +190,7 @@ FORM = ViewForm(
     write_questions,
     "`questions.parquet` and `questions.jsonl` (columns and kinds of VSI-Bench), `conversations.jsonl`"
     " (a record a question, as LLaVA and SIMS-V train on), `refs.json` and `instances.json` (phrases"
-    " that fit one thing, as RefCOCO), `blind_scores.csv`; `pbrs_farm/<scene_name>.png`, of walks `.mp4`",
+    " that fit a single item, as RefCOCO), `blind_scores.csv`; `pbrs_farm/<scene_name>.png`, of walks `.mp4`",
     has_classes=True,
     convention=Convention(0.5, has_k=False, axes=""),
 )

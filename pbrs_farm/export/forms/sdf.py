@@ -244,7 +244,7 @@ FORM = HomeForm(
     "sdf",
     write_sdf,
     "a world of Gazebo, SDF 1.9: `<id>/<id>.sdf` and `meshes/`, metres, z up, gravity; doors and drawers have"
-    " joints and stand shut",
+    " joints and are closed",
     remark=COLLIDES,
     up="z",
 )

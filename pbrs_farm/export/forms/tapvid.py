@@ -78,7 +78,7 @@ FORM = ViewForm(
     "tapvid",
     write_tapvid,
     "`tapvid.pkl` as TAP-Vid's DAVIS: house id -> `video`, `points` (N, T, 2) as shares of width and height,"
-    " `occluded` (N, T); of films that were run with `--tracks`",
+    " `occluded` (N, T); for films rendered with `--tracks`",
     convention=Convention(
         0.5, has_k=False, axes="x right, y down from the upper left corner, 0..1"
     ),

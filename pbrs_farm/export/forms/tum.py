@@ -77,8 +77,8 @@ FORM = ViewForm(
     "tum",
     write_tum,
     "`rgb.txt`, `depth.txt`, `groundtruth.txt`; depth 5000 a metre; the right views of pairs in"
-    " `rgb_right.txt`, `depth_right.txt`, `groundtruth_right.txt`, other cameras of a rig likewise; views that are no frames are named"
-    " in `left_out.txt`",
+    " `rgb_right.txt`, `depth_right.txt`, `groundtruth_right.txt`, other cameras of a rig likewise; `left_out.txt` names views"
+    " outside sequences",
     convention=Convention(
         None,
         has_k=False,

@@ -94,7 +94,7 @@ FORM = HomeForm(
     "urdf",
     write_urdf,
     "a URDF: `<id>/<id>.urdf`, `meshes/` and `textures/`, metres, z up; doors and drawers have joints and"
-    " stand shut, loose things have floating joints",
+    " are closed, loose items have floating joints",
     remark=COLLIDES,
     up="z",
 )

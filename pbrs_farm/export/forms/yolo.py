@@ -118,10 +118,9 @@ FORM = ViewForm(
     "yolo",
     write_yolo,
     "`images/<house>__<view>.png`, `labels/<house>__<view>.txt` (boxes; class = NYU40 id - 1; none for"
-    " wall, floor, ceiling), `data.yaml`, whose folders count from its own: it works from any"
-    " directory. `train` and `val` always stand there; where no home is in one it is the other's"
-    " folder, and a comment and the command say so. Views without a picture are named in"
-    " `left_out.txt`",
+    " wall, floor, ceiling), `data.yaml`, whose folders are relative to it: it works from any"
+    " directory. It always has `train` and `val`; if no home is in one, both name the same"
+    " folder, and a comment and the command say so. `left_out.txt` names views without a picture",
     has_classes=True,
     finish=write_data_yaml,
     convention=Convention(0.5, has_k=False, axes="shares of the picture, from its corner"),

@@ -35,8 +35,8 @@ def _polygon_lines(view: ChosenView) -> Iterable[str]:
 FORM = ViewForm(
     "yolo-seg",
     write_yolo_seg,
-    "as `yolo`; a line is a polygon of what is seen: one a connected part of an item's mask, its"
-    " outline within a pixel of the mask's; a hole is cut by going to it, around it and back",
+    "as `yolo`; a line has the polygon of a connected part of an item's mask, within"
+    " a pixel of the mask's outline; the polygon goes to each hole, around it and back",
     has_classes=True,
     finish=write_data_yaml,
     convention=Convention(0.5, has_k=False, axes="shares of the picture, from its corner"),
