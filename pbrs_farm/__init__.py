@@ -106,14 +106,14 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     if name == "__version__":
-        found: Any = _version()
+        value: Any = _version()
     elif name in _PUBLIC:
         module, _, attribute = _PUBLIC[name].partition(":")
-        found = getattr(import_module(module), attribute)
+        value = getattr(import_module(module), attribute)
     else:
         raise AttributeError(f"module 'pbrs_farm' has no attribute {name!r}")
-    globals()[name] = found
-    return found
+    globals()[name] = value
+    return value
 
 
 def _version() -> str:

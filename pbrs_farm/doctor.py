@@ -100,27 +100,27 @@ def _python() -> Finding:
 
 
 def packages() -> Finding:
-    found, missing = [], []
+    versions, missing = [], []
     for package in PACKAGES:
         try:
-            found.append(f"{package} {version(package)}")
+            versions.append(f"{package} {version(package)}")
         except PackageNotFoundError:
             missing.append(package)
     if missing:
         text = "not installed: " + ", ".join(missing)
         extras = sorted({EXTRA_OF[name] for name in missing if name in EXTRA_OF})
         return Finding("packages", "missing", text, install_command(*extras), True)
-    return Finding("packages", "ok", ", ".join(found))
+    return Finding("packages", "ok", ", ".join(versions))
 
 
 def _extras() -> Finding:
     missing = missing_extras()
     if not missing:
         # `all` leaves it out: torch is large, and only networks need it.
-        apart = f" but study, which trains networks: {install_command('study')}"
-        return Finding("extras", "ok", "all" + apart * (not is_installed("torch")))
-    given = "; ".join(f"{name}: {GIVES[name]}" for name in missing)
-    return Finding("extras", "degraded", f"not installed: {given}", install_command(*missing))
+        exception = f" but study, which trains networks: {install_command('study')}"
+        return Finding("extras", "ok", "all" + exception * (not is_installed("torch")))
+    features = "; ".join(f"{name}: {GIVES[name]}" for name in missing)
+    return Finding("extras", "degraded", f"not installed: {features}", install_command(*missing))
 
 
 def llvm() -> Finding:

@@ -244,10 +244,10 @@ def _upright(scanlines: NDArray[Any], data: bytes) -> NDArray[Any]:
     The line before the pixels says which way they run ("-Y 64 +X 128" from the top, "+Y" from below,
     "+X ... -Y" by columns), x to the right and y up (Ward, Radiance file formats).
     """
-    found = _RESOLUTION.search(data[:_HDR_HEADER_BYTES])
-    if found is None:
+    match = _RESOLUTION.search(data[:_HDR_HEADER_BYTES])
+    if match is None:
         return scanlines
-    first, axis, second = found.groups()
+    first, axis, second = match.groups()
     if axis == b"Y":
         rows = scanlines[::-1] if first == b"+" else scanlines
         return rows[:, ::-1] if second == b"-" else rows
@@ -339,16 +339,16 @@ def _decoded(data: bytes, name: str, suffix: str, kind: str) -> tuple[NDArray[An
 
 def _is_cut_short(png: bytes) -> bool:
     """True if a chunk of the PNG is longer than the rest of the file."""
-    at = 8  # behind the signature
-    while at < len(png):
+    position = 8  # behind the signature
+    while position < len(png):
         # A chunk: length, type, data, checksum.
-        end = at + 12 + int.from_bytes(png[at : at + 4], "big")
+        end = position + 12 + int.from_bytes(png[position : position + 4], "big")
         if end > len(png):
             return True
-        if png[at + 4 : at + 8] == b"IEND":
+        if png[position + 4 : position + 8] == b"IEND":
             return False
-        at = end
-    return at == 8
+        position = end
+    return position == 8
 
 
 def _reason(fault: str, path: Path) -> str:

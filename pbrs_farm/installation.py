@@ -86,12 +86,12 @@ def install_command(*extras: str) -> str:
     extras: names of pyproject.toml; "" is ignored. In a checkout the command installs the checkout,
     since no index has it; a wheel takes its extras by name. For hints of errors: nothing is run.
     """
-    wanted = [name for name in extras if name]
-    names = f"[{','.join(wanted)}]" if wanted else ""
+    chosen = [name for name in extras if name]
+    names = f"[{','.join(chosen)}]" if chosen else ""
     checkout = checkout_folder()
     if checkout is not None:
         return f"{pip_command()} install -e '{checkout}{names}'"
-    return f"{pip_command()} install {'--force-reinstall ' * (not wanted)}'pbrs-farm{names}'"
+    return f"{pip_command()} install {'--force-reinstall ' * (not chosen)}'pbrs-farm{names}'"
 
 
 def pip_command() -> str:
@@ -100,8 +100,8 @@ def pip_command() -> str:
     For hints of what to install: the words go before "install", and always reach the environment
     that runs us.
     """
-    found = shutil.which("pip")
-    is_ours = found is not None and Path(found).parent == Path(sys.executable).parent
+    path = shutil.which("pip")
+    is_ours = path is not None and Path(path).parent == Path(sys.executable).parent
     return "pip" if is_ours else f"{sys.executable} -m pip"
 
 

@@ -146,8 +146,8 @@ __all__ = [*_PLACES]
 def __getattr__(name: str) -> Any:
     if name not in _PLACES:
         raise AttributeError(f"module 'pbrs_farm.plugin' has no attribute {name!r}")
-    globals()[name] = found = resolve_name(_PLACES[name])
-    return found
+    globals()[name] = value = resolve_name(_PLACES[name])
+    return value
 
 
 def __dir__() -> list[str]:

@@ -146,8 +146,8 @@ class TimeLeft:
         home_s, n_homes = sum(self._home_s.values()), max(1, len(self._home_s))
         views_a_home = home_s / n_homes / (self._view_s / n_made) if self._view_s else 0.0
         done = n_made + views_a_home * len(self._home_s)
-        left = self._n_left(part) + views_a_home * self._n_unknown()
-        return left * (now_s - self._began_s) / done
+        n_left = self._n_left(part) + views_a_home * self._n_unknown()
+        return n_left * (now_s - self._began_s) / done
 
     def _n_left(self, part: float) -> float:
         return max(0.0, self._expected_views() - self._n_ended - part)
@@ -221,8 +221,8 @@ class _PlainLines(ProgressReporter):
             self._tell_share(name, clock, event)
         elif event.kind == "end" and event.view_id is not None:
             self._told_s.pop(name, None)
-            seconds, made = self._seconds.pop(name, 0.0), self._made.pop(name, 0)
-            how = f"{seconds:.1f} s" if made else "already there"
+            seconds, was_made = self._seconds.pop(name, 0.0), self._made.pop(name, 0)
+            how = f"{seconds:.1f} s" if was_made else "already there"
             _write_line(f"{clock} {name}: {how}; {self._left.views_text}{self._time_left()}")
 
     def _tell_share(self, name: str, clock: str, event: Event) -> None:

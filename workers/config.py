@@ -147,14 +147,14 @@ def config_from_environment(environment: Mapping[str, str] | None = None) -> Far
     limits = f"{_PREFIX}LIMITS_"
     of_limits = {n: text for n, text in env.items() if n.startswith(limits)}
     of_farm = {n: text for n, text in env.items() if n.startswith(_PREFIX) and n not in of_limits}
-    given: dict[str, Any] = {"worker": platform.node()} | _read_setting(
+    values: dict[str, Any] = {"worker": platform.node()} | _read_setting(
         FarmConfig, of_farm, _PREFIX
     )
     # Looking for a temporary folder fails where none can be written, as in a read-only container.
-    if "scratch" not in given:
-        given["scratch"] = Path(tempfile.gettempdir())
+    if "scratch" not in values:
+        values["scratch"] = Path(tempfile.gettempdir())
     return FarmConfig(
-        **given,
+        **values,
         redis_url=Secret(_with_password(settings.redis_url.reveal(), password)),
         store_url=env.get("PBRS_STORE", ""),
         store=settings.store,

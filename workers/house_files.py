@@ -39,7 +39,7 @@ def entries_from_arguments(
     house.
     """
     # Take each house once, whatever arguments name it.
-    found: dict[str, tuple[HouseEntry, SourceRef]] = {}
+    entries: dict[str, tuple[HouseEntry, SourceRef]] = {}
     files = SourceFiles()
     for word in words_of_homes(arguments):
         note_step(word, "read")
@@ -49,8 +49,8 @@ def entries_from_arguments(
                 source=_source_in_store(ref).model_dump_json(),
                 sha256=ref.fingerprint,
             )
-            found.setdefault(ref.house_id, (entry, ref))
-    return list(found.values())
+            entries.setdefault(ref.house_id, (entry, ref))
+    return list(entries.values())
 
 
 def upload(store: Store, refs: Sequence[SourceRef]) -> None:
@@ -196,12 +196,12 @@ def fill_cache(store: Store, *, with_furniture: bool = False) -> None:
     The example homes' package, and the furniture's where a house is dressed or made.
     """
     # Download only required packages that are missing here.
-    wanted = [homes_package.PACKAGE] if homes_package.cached() is None else []
+    packages = [homes_package.PACKAGE] if homes_package.cached() is None else []
     if with_furniture and not has_furniture():
-        wanted.append(furniture_package.PACKAGE)
-    for key in store.list(FOLDER) if wanted else ():
+        packages.append(furniture_package.PACKAGE)
+    for key in store.list(FOLDER) if packages else ():
         name = key.removeprefix(FOLDER)
-        if name.endswith(".deb") and name.partition("_")[0] in wanted:
+        if name.endswith(".deb") and name.partition("_")[0] in packages:
             cache_folder().mkdir(parents=True, exist_ok=True)
             write_whole(cache_folder() / name, store.get(key))
 

@@ -32,7 +32,7 @@ def store_id(store: Store) -> str:
     16 random hex digits. Of several processes with a new store one writes, and all read that id. Two URLs with
     one id are one store.
     """
-    if not (known := known_store_id(store)):
+    if not (identity := known_store_id(store)):
         store.put_if_absent(KEY, secrets.token_hex(8).encode())
-        known = known_store_id(store)
-    return known
+        identity = known_store_id(store)
+    return identity

@@ -130,11 +130,11 @@ def _deb(package: str, tested_version: str, path: Path) -> Deb:
 @lru_cache(maxsize=16)
 def _sha256(path: Path, size: int, mtime_ns: int) -> str:
     # Keep the hash beside the file, under its size and date: a hundred megabytes take a while.
-    note, held = path.with_name(f"{path.name}.sha256"), [""]
+    note, cached = path.with_name(f"{path.name}.sha256"), [""]
     with contextlib.suppress(OSError):
-        held = note.read_text("ascii", "replace").split()
-    if len(held) == 3 and held[1:] == [str(size), str(mtime_ns)]:
-        return held[0]
+        cached = note.read_text("ascii", "replace").split()
+    if len(cached) == 3 and cached[1:] == [str(size), str(mtime_ns)]:
+        return cached[0]
     with path.open("rb") as file:
         sha256 = hashlib.file_digest(file, "sha256").hexdigest()
     with contextlib.suppress(OSError):  # works without a writable cache

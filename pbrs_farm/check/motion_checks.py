@@ -62,12 +62,12 @@ def check_motion(case: ViewCase) -> None:
     cast = cast.some((cast.face >= 0) & (np.abs(depth - cast.z * 1000) <= 1.0 + cast.z))
     for relation, names in _LAYERS.items():
         layers = {n: case.arrays[n] for n in names if n in case.arrays}
-        other = OtherView.of(view, relation)
-        if other is None:
+        partner = OtherView.of(view, relation)
+        if partner is None:
             case.expect("motion")(not layers, f"{[*layers]} without a {relation} view")
             continue
         then = _Then.at(case, view.table["partners"][relation].get("time_s"))
-        right, ties = _judge_layers(view, other, cast, layers, then)
+        right, ties = _judge_layers(view, partner, cast, layers, then)
         all_right = np.logical_and.reduce([np.ones(len(cast), bool), *right.values()])
         wrong = np.nonzero(~all_right)[0]
         if len(wrong) and then.carry is not None:
@@ -75,7 +75,7 @@ def check_motion(case: ViewCase) -> None:
             some = cast.some(wrong)
             faces = of_another_part(some.face, some.origin, some.directions, case.scene)
             wrong, some = wrong[faces >= 0], replace(some, face=faces).some(faces >= 0)
-            again, _ = _judge_layers(view, other, some, layers, then)
+            again, _ = _judge_layers(view, partner, some, layers, then)
             either = wrong[np.logical_and.reduce(list(again.values()))]
             for name in layers:
                 right[name][either] = ties[name][either] = True
@@ -162,17 +162,17 @@ def check_partners(case: HouseCase) -> None:
             name = _name_of_partner(view, relation, case.house.camera_rows)
             words = {"row": row, "relation": relation}
             judge("partner name", view.place, case.tally, name=name, **words)
-            other = views.get(str(row["view"]))
-            if other is None:
+            partner = views.get(str(row["view"]))
+            if partner is None:
                 continue
             expect = case.tally.at("partners", view.place)
             pose, k = (np.array(row[n], np.float64) for n in ("world_from_camera_opencv", "K"))
             same = pose.shape == (4, 4) and (
-                np.abs(pose - other.world_from_camera).max() < _SAME
-                and np.abs(k - other.k).max() < _SAME
+                np.abs(pose - partner.world_from_camera).max() < _SAME
+                and np.abs(k - partner.k).max() < _SAME
             )
-            expect(same, f"the {relation} view {other.folder.name} has another camera")
-            judge("partner time", view.place, case.tally, other=other.table, name=other.folder.name, **words)  # fmt: skip
+            expect(same, f"the {relation} view {partner.folder.name} has another camera")
+            judge("partner time", view.place, case.tally, other=partner.table, name=partner.folder.name, **words)  # fmt: skip
 
 
 def _name_of_partner(
@@ -184,13 +184,13 @@ def _name_of_partner(
         return view.shot.partner(1 if relation == "next" else -1).id
     # The nearest of the instant's cameras beside it that have its orientation.
     row, beside = camera_rows.get(name, {}), list[tuple[float, str]]()
-    for other_name, other in camera_rows.items():
-        if other_name == name or (other.get("rig") or {}).get("instant") != (rig or {}).get("instant"):  # fmt: skip
+    for other_name, partner in camera_rows.items():
+        if other_name == name or (partner.get("rig") or {}).get("instant") != (rig or {}).get("instant"):  # fmt: skip
             continue
-        a, b = (np.array(r["world_from_camera_opengl"], np.float64) for r in (row, other))
+        a, b = (np.array(r["world_from_camera_opengl"], np.float64) for r in (row, partner))
         step = a[:3, :3].T @ (b[:3, 3] - a[:3, 3])
         is_beside = np.abs(a[:3, :3] - b[:3, :3]).max() < _SAME and np.abs(step[1:]).max() < _SAME
-        if is_beside and other["intrinsics"] == row["intrinsics"]:
+        if is_beside and partner["intrinsics"] == row["intrinsics"]:
             beside.append((round(abs(float(step[0])), 9), other_name))
     return min(beside, key=lambda pair: pair[0])[1] if beside else ""
 

@@ -58,10 +58,10 @@ def check_reprojection(case: HouseCase) -> None:
     nearest = [_nearest(view.depth) for view in views]
     rng = np.random.default_rng(0)
     for a, first in enumerate(views):
-        others = np.array([b for b in range(len(views)) if b != a], np.int64)
-        if len(others) > _MAX_PARTNERS:
-            others = rng.choice(others, _MAX_PARTNERS, replace=False)
-        for b in others:
+        partners = np.array([b for b in range(len(views)) if b != a], np.int64)
+        if len(partners) > _MAX_PARTNERS:
+            partners = rng.choice(partners, _MAX_PARTNERS, replace=False)
+        for b in partners:
             n, wrong = _count_in_front(points[a], views[b].view, nearest[b])
             place = f"{first.view.place} in {views[b].view.place}"
             fault = f"{wrong} of {n} points lie before what is seen there"

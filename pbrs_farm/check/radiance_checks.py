@@ -274,7 +274,7 @@ def _slopes(light: NDArray[Any], surface: _Transformed) -> tuple[float, float, f
 def _correlation(light: NDArray[Any], surface: _Transformed) -> tuple[F64, float]:
     """(H, W) products of steps of light with those of the moved surface; sum of squares of the latter."""
     products = sum(
-        np.fft.rfft2(s) * other for s, other in zip(_steps(light), surface.steps, strict=True)
+        np.fft.rfft2(s) * step for s, step in zip(_steps(light), surface.steps, strict=True)
     )
     return np.asarray(np.fft.irfft2(products, light.shape)), surface.energy
 

@@ -142,23 +142,23 @@ def _check_group(film: _Film, frame: int, index: I64) -> None:
 def _check_frame(film: _Film, frame: int, index: I64, points: F64, face: I64) -> None:
     """The places of points (N, 3) in one frame, and whether they are visible there."""
     tracks, view, rays = film.tracks, film.views[frame], film.scenes(frame).rays
-    other = OtherView(view.k, view.world_from_camera, view.size, view.lens)
-    px, depth = other.pixels(points)
+    frame_view = OtherView(view.k, view.world_from_camera, view.size, view.lens)
+    px, depth = frame_view.pixels(points)
     stored, hidden = tracks["points"][index, frame].astype(np.float64), tracks["occluded"][index, frame]  # fmt: skip
     with np.errstate(invalid="ignore"):
         front = (depth > 1e-3) & np.isfinite(px).all(1)
         off = np.abs(stored - px).max(1) > place_slack_px(px, depth)
         off |= np.abs(tracks["depth_m"][index, frame] - depth) > _DEPTH * (1 + np.abs(depth))
-    margin, name = other.margin(px), view.folder.name
+    margin, name = frame_view.margin(px), view.folder.name
     film.tally.add("tracks", len(index))
     film.list_points(index[front & off], f"is elsewhere in {name}")
     inside = np.flatnonzero(front & (margin > 0))
     visible = np.zeros(len(index), bool)
-    visible[inside] = is_seen(points[inside], other, rays)
+    visible[inside] = is_seen(points[inside], frame_view, rays)
     wrong = np.flatnonzero(hidden == visible)
-    wrong = wrong[~_may_be_either(points[wrong], other, margin[wrong], rays)]
+    wrong = wrong[~_may_be_either(points[wrong], frame_view, margin[wrong], rays)]
     # A face seen edge-on may hide its own points.
-    towards = points[wrong] - other.eye
+    towards = points[wrong] - frame_view.eye
     towards /= np.linalg.norm(towards, axis=1, keepdims=True)
     slant = dot(rays.normal(face[wrong], towards), towards)
     wrong = wrong[np.abs(slant) > _EDGE_ON]

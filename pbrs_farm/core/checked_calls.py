@@ -42,10 +42,10 @@ class Where:
 
 def _are_numbers(value: Any, n: int) -> bool:
     try:
-        found = np.asarray(value, np.float64)
+        array = np.asarray(value, np.float64)
     except (TypeError, ValueError):
         return False
-    return found.shape == (n,) and bool(np.isfinite(found).all())
+    return array.shape == (n,) and bool(np.isfinite(array).all())
 
 
 def _is_size(value: Any) -> bool:
@@ -121,20 +121,20 @@ def checked_call(function: Callable[_P, _R]) -> Callable[_P, _R]:
 def _hints_of(function: Callable[..., Any]) -> dict[str, Any]:
     """The annotations of what a call names: not those of *args and **kwargs."""
     kinds = {p.name: p.kind for p in inspect.signature(function).parameters.values()}
-    found = typing.get_type_hints(function, include_extras=True)
+    hints = typing.get_type_hints(function, include_extras=True)
     named = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
-    return {name: hint for name, hint in found.items() if kinds.get(name) in named}
+    return {name: hint for name, hint in hints.items() if kinds.get(name) in named}
 
 
 def check_argument(call: str, name: str, value: Any, hint: Any) -> None:
     """Raise BadInput, naming the call and the argument, where a value does not fit its annotation."""
     if _fits(value, hint):
         return
-    given = [_GIVEN_BY[one.__name__] for one in _classes_of(hint) if one.__name__ in _GIVEN_BY]
+    offers = [_GIVEN_BY[cls.__name__] for cls in _classes_of(hint) if cls.__name__ in _GIVEN_BY]
     choices = get_args(hint) if get_origin(hint) is Literal else ()
     offer = hint_of_choice(str(value), [str(v) for v in choices]) if choices else ""
     text = f"expected {words_of(hint)}, got {_text_of(value)}"
-    raise BadInput(call, name, text, hint=offer or "; ".join(given[:1]))
+    raise BadInput(call, name, text, hint=offer or "; ".join(offers[:1]))
 
 
 def check_fields(record: Any) -> None:
@@ -167,10 +167,10 @@ def _fits(value: Any, hint: Any) -> bool:
     """Whether a value is of an annotation; NumPy's numbers are numbers, its arrays sequences."""
     origin, inner = get_origin(hint), get_args(hint)
     if origin is Annotated:
-        tests = (one for one in inner[1:] if isinstance(one, Where))
-        return _fits(value, inner[0]) and all(one.holds(value) for one in tests)
+        tests = (part for part in inner[1:] if isinstance(part, Where))
+        return _fits(value, inner[0]) and all(part.holds(value) for part in tests)
     if origin in (Union, types.UnionType):
-        return any(_fits(value, one) for one in inner)
+        return any(_fits(value, part) for part in inner)
     if origin is Literal:
         return value in inner
     if origin is tuple:
@@ -178,7 +178,7 @@ def _fits(value: Any, hint: Any) -> bool:
         return (
             _is_listed(value)
             and len(value) == len(parts)
-            and all(_fits(v, one) for v, one in zip(value, parts, strict=True))
+            and all(_fits(v, part) for v, part in zip(value, parts, strict=True))
         )
     if origin is not None and issubclass(origin, Iterable) and not issubclass(origin, Mapping):
         return _fits_many(value, origin, inner[0])
@@ -231,16 +231,16 @@ def words_of(hint: Any) -> str:
     """An annotation in words: "text or a path"."""
     origin, inner = get_origin(hint), get_args(hint)
     if origin is Annotated:
-        named = [one.words for one in inner[1:] if isinstance(one, Where)]
+        named = [part.words for part in inner[1:] if isinstance(part, Where)]
         return named[0] if named else words_of(inner[0])
     if origin in (Union, types.UnionType):
         # Who leaves an argument out gives None: it goes without saying.
-        said = [one for one in inner if one is not type(None)]
-        return " or ".join(dict.fromkeys(words_of(one) for one in said))
+        kinds = [part for part in inner if part is not type(None)]
+        return " or ".join(dict.fromkeys(words_of(part) for part in kinds))
     if origin is Literal:
-        return "one of " + ", ".join(str(one) for one in inner)
+        return "one of " + ", ".join(str(part) for part in inner)
     if origin is tuple and inner[1:] != (...,):
-        return f"({', '.join(words_of(one) for one in inner)})"
+        return f"({', '.join(words_of(part) for part in inner)})"
     if origin is not None and inner and issubclass(origin, Iterable):
         return f"a list, each {words_of(inner[0])}"
     name = getattr(hint, "__name__", str(hint))
@@ -252,7 +252,7 @@ def words_of(hint: Any) -> str:
 
 
 def _classes_of(hint: Any) -> list[type]:
-    inner = [one for part in get_args(hint) for one in _classes_of(part)]
+    inner = [cls for part in get_args(hint) for cls in _classes_of(part)]
     return [*inner, *([hint] if isinstance(hint, type) and not get_args(hint) else [])]
 
 

@@ -205,15 +205,15 @@ def _cut(corners: F64, axis: int, sign: float, place: float) -> F64:
     crossing = share[..., None] * along + start
 
     # With two corners kept two triangles are left, with one corner one.
-    (two,), (one,) = np.nonzero(total > 0), np.nonzero(total <= 0)
-    out, inner = side[two].argmin(1), side[one].argmax(1)
+    (two,), (single,) = np.nonzero(total > 0), np.nonzero(total <= 0)
+    out, inner = side[two].argmin(1), side[single].argmax(1)
     second, third = start[two, (out + 1) % 3], start[two, (out + 2) % 3]
     last = crossing[two, out]
     quads = (
         (second, third, crossing[two, (out + 2) % 3]),
         (crossing[two, (out + 2) % 3], last, second),
     )
-    ends = (start[one, inner], crossing[one, inner], crossing[one, (inner + 2) % 3])
+    ends = (start[single, inner], crossing[single, inner], crossing[single, (inner + 2) % 3])
     parts = [np.stack(part, axis=1) for part in (*quads, ends)]
     return np.concatenate([corners[is_kept], *parts])
 

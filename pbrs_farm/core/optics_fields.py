@@ -164,8 +164,8 @@ def fold_of(i: Intrinsics) -> str | None:
         return None
     # Look along the border: a fold moves inwards from there.
     side = np.linspace(0.0, 1.0, _BORDER_POINTS)
-    zero, one = np.zeros_like(side), np.ones_like(side)
-    x, y = np.concatenate([side, side, zero, one]), np.concatenate([zero, one, side, side])
+    zero, ones = np.zeros_like(side), np.ones_like(side)
+    x, y = np.concatenate([side, side, zero, ones]), np.concatenate([zero, ones, side, side])
     border = np.stack([x * i.width_px, y * i.height_px], axis=1)
     lost = ~i.directions(border).any(1)
     # Beyond a fisheye's image circle nothing is lost that the lens had.

@@ -66,10 +66,10 @@ class PinholeFaces:
         for k, picture in enumerate(pictures):
             on_face = self.number == k
             # Pixel centres lie at +0.5; a border repeats itself.
-            left = np.clip(self.x[on_face] - 0.5, 0, picture.shape[1] - 1.000001)
+            x0 = np.clip(self.x[on_face] - 0.5, 0, picture.shape[1] - 1.000001)
             top = np.clip(self.y[on_face] - 0.5, 0, picture.shape[0] - 1.000001)
-            column, row = left.astype(np.int64), top.astype(np.int64)
-            across, down = (left - column)[:, None], (top - row)[:, None]
+            column, row = x0.astype(np.int64), top.astype(np.int64)
+            across, down = (x0 - column)[:, None], (top - row)[:, None]
             upper = picture[row, column] * (1 - across) + picture[row, column + 1] * across
             lower = picture[row + 1, column] * (1 - across) + picture[row + 1, column + 1] * across
             out[on_face] = upper * (1 - down) + lower * down

@@ -71,7 +71,7 @@ def plugins(group: str) -> Mapping[str, Plugin]:
 @cache
 def installed_marks() -> tuple[str, ...]:
     """The marks of all installed plugins."""
-    return tuple(one.mark for group in GROUPS for one in plugins(group).values())
+    return tuple(plugin.mark for group in GROUPS for plugin in plugins(group).values())
 
 
 def _order(entry: EntryPoint) -> tuple[str, str]:
@@ -161,5 +161,5 @@ def plugin_homes(word: str) -> list[PluginHome]:
     for key, _, _value in options:
         if not key.isidentifier():
             raise BadInput(word, key, "is no option's name", hint=_HINT)
-    known = tuple((key, value) for key, _, value in options)
-    return [PluginHome(name, seed, known) for seed in range(low, high + 1)]
+    pairs = tuple((key, value) for key, _, value in options)
+    return [PluginHome(name, seed, pairs) for seed in range(low, high + 1)]

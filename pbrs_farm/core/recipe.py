@@ -208,8 +208,10 @@ def changed_recipe(
         fields[group] = dict(values)
     for group, value in changes.items():
         preset_value = fields.get(group)
-        both = isinstance(preset_value, dict) and isinstance(value, Mapping)
-        fields[group] = {**preset_value, **value} if both and preset_value is not None else value
+        is_merged = isinstance(preset_value, dict) and isinstance(value, Mapping)
+        fields[group] = (
+            {**preset_value, **value} if is_merged and preset_value is not None else value
+        )
     for path, text in overrides.items():
         _set(fields, path, text)
     return _validated(fields)

@@ -112,5 +112,5 @@ def _axis_means(array: NDArray[np.float64], axis: int, n: int) -> NDArray[np.flo
     edges = np.arange(n + 1) * (size / n)
     whole = np.minimum(edges.astype(np.intp), size - 1)
     part = (edges - whole).reshape(-1, *(1,) * (array.ndim - 1 - axis))
-    at = np.take(sums, whole, axis=axis) + part * np.take(array, whole, axis=axis)
-    return np.asarray(np.diff(at, axis=axis) * (n / size))
+    at_edges = np.take(sums, whole, axis=axis) + part * np.take(array, whole, axis=axis)
+    return np.asarray(np.diff(at_edges, axis=axis) * (n / size))

@@ -87,8 +87,8 @@ class PlotArea(SvgPicture):
         """A vertical line at value and its number, on the side where there is room."""
         self.line([(value, 0), (value, 1)], "limit")
         before = value > 0.85
-        at = (value + (-0.01 if before else 0.01), 1)
-        self.text(at, f"{value:g}", "end" if before else "start", 10)
+        place = (value + (-0.01 if before else 0.01), 1)
+        self.text(place, f"{value:g}", "end" if before else "start", 10)
 
 
 def distribution(scores: F64, kept: Bools, threshold: float, title: str) -> Markup:

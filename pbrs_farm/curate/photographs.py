@@ -110,8 +110,8 @@ def _pairs_of_folders(root: Path, inner: Path, rgb: Path, depth: Path) -> list[P
     pictures, depths = _photograph_files(rgb, _RGB_FILES), _photograph_files(depth, _DEPTH_FILES)
     # Pair the only files of two folders whatever they are called (SUN RGB-D).
     if len(pictures) == len(depths) == 1 and pictures.keys() != depths.keys():
-        (one,), (other,) = pictures.values(), depths.values()
-        return [PhotoFiles(inner.relative_to(root).as_posix(), one, other)]
+        (picture,), (depth_file,) = pictures.values(), depths.values()
+        return [PhotoFiles(inner.relative_to(root).as_posix(), picture, depth_file)]
     # Name the first file whose other half is missing.
     for name, path in (pictures | depths).items():
         if name not in pictures or name not in depths:
@@ -124,13 +124,13 @@ def _pairs_of_folders(root: Path, inner: Path, rgb: Path, depth: Path) -> list[P
 
 def _photograph_files(folder: Path, endings: tuple[str, ...]) -> dict[str, Path]:
     # Know pictures by their name without ending.
-    found: dict[str, Path] = {}
+    files: dict[str, Path] = {}
     for path in sorted(folder.iterdir()):
         if path.is_file() and path.suffix.lower() in endings:
-            if path.stem in found:
+            if path.stem in files:
                 raise BadInput(path, "", f"a second file of the name {path.stem}")
-            found[path.stem] = path
-    return found
+            files[path.stem] = path
+    return files
 
 
 def _pairs_by_suffix(root: Path, inner: Path) -> list[PhotoFiles]:
@@ -148,15 +148,15 @@ def _pairs_by_suffix(root: Path, inner: Path) -> list[PhotoFiles]:
         if path.suffix.lower() in (_DEPTH_FILES if kind == "depth" else _RGB_FILES):
             halves.setdefault(match[1], {})[kind] = path
     pairs = []
-    for name, found in halves.items():
-        if "rgb" not in found and name in plain:
-            found["rgb"] = plain[name]
-        if len(found) != 2:
-            (kind, path), *_ = found.items()
+    for name, halves_of_name in halves.items():
+        if "rgb" not in halves_of_name and name in plain:
+            halves_of_name["rgb"] = plain[name]
+        if len(halves_of_name) != 2:
+            (kind, path), *_ = halves_of_name.items()
             lacks = "rgb" if kind == "depth" else "depth"
             raise BadInput(path, "", f"only one half of a pair: no {lacks}")
         place = (inner.relative_to(root) / name).as_posix()
-        pairs.append(PhotoFiles(place, found["rgb"], found["depth"]))
+        pairs.append(PhotoFiles(place, halves_of_name["rgb"], halves_of_name["depth"]))
     return pairs
 
 
@@ -203,10 +203,10 @@ def stored_depth(path: Path) -> NDArray[Any]:
         layers = images.layers_from_exr(read_given(path), str(path))
         return layers.get("Z", next(iter(layers.values())))
     try:
-        found = np.load(io.BytesIO(read_given(path)), allow_pickle=False)
-        if not isinstance(found, np.ndarray):
+        depth = np.load(io.BytesIO(read_given(path)), allow_pickle=False)
+        if not isinstance(depth, np.ndarray):
             raise ValueError("an archive of arrays")
-        return found
+        return depth
     except (ValueError, EOFError):
         with naming_kind(path):
             raise BadInput(path, "", "cannot be read as a numpy array") from None

@@ -104,7 +104,7 @@ def _charts(
     table: Any, scored: Any, summary: SelectionSummary, fields: SelectionFields
 ) -> dict[str, Markup]:
     colour, depth = (scored[k].to_numpy() for k in ("colour_score", "depth_score"))
-    kept, limits = _is_kept(scored), (fields.min_colour, fields.min_depth)
+    is_kept, limits = _is_kept(scored), (fields.min_colour, fields.min_depth)
     # All curves count views of good quality, as a share of all views: as the card does.
     good = good_scores(table)
     # Curves: (label, CSS class, share of views kept at equal steps of the limit).
@@ -114,9 +114,9 @@ def _charts(
         ("depth alone", "depth", yield_curve(good[1], summary.views)),
     )
     return {
-        "colour": distribution(colour, kept, limits[0], "colour score"),
-        "depth": distribution(depth, kept, limits[1], "depth score"),
-        "joint": joint(colour, depth, kept, limits),
+        "colour": distribution(colour, is_kept, limits[0], "colour score"),
+        "depth": distribution(depth, is_kept, limits[1], "depth score"),
+        "joint": joint(colour, depth, is_kept, limits),
         "yields": yields(curves, min(limits), (0.70, PAPER_KEPT / PAPER_VIEWS)),
     }
 

@@ -60,8 +60,8 @@ def select(
     facts = {"reference": reference.digest, "score_mode": str(score_mode)}
     # Keep the scores that still hold; score the houses that have none.
     old = _kept_rows(store, run, facts, sources)
-    known = set(old["house"].unique().to_pylist())
-    todo = [h for h in sources if h not in known and houses[h]]
+    judged = set(old["house"].unique().to_pylist())
+    todo = [h for h in sources if h not in judged and houses[h]]
 
     def packs() -> Iterator[HistogramPack]:
         for done, house in enumerate(todo):
@@ -109,13 +109,13 @@ def _houses(store: Store, house: str = "") -> dict[str, dict[str, bool]]:
         found_keys: Iterable[str] = sha256_by_key(rows)
     else:
         found_keys = store.list(keys.house_key(house) if house else f"{keys.FOLDERS[0]}/")
-    found: dict[str, dict[str, bool]] = {}
+    houses: dict[str, dict[str, bool]] = {}
     for key in found_keys:
-        at = keys.parse_house_key(key)
-        if at is not None and at.view is not None and at.file in ("histogram.json", "view.json"):
-            views = found.setdefault(at.house, {})
-            views[at.view] = views.get(at.view, False) or at.file == "histogram.json"
-    return {house: dict(sorted(views.items())) for house, views in sorted(found.items())}
+        p = keys.parse_house_key(key)
+        if p is not None and p.view is not None and p.file in ("histogram.json", "view.json"):
+            views = houses.setdefault(p.house, {})
+            views[p.view] = views.get(p.view, False) or p.file == "histogram.json"
+    return {house: dict(sorted(views.items())) for house, views in sorted(houses.items())}
 
 
 def _source(store: Store, house: str, views: Mapping[str, bool], score_mode: Mode) -> str:

@@ -140,8 +140,8 @@ def with_types(judged: Any) -> Any:
     names = judged["room_type"].to_pylist()
     kinds = {name: named_kind(name or "") for name in set(names)}
     column = [kind.value if (kind := kinds[name]) else "" for name in names]
-    at = judged.schema.get_field_index("room_type")
-    return judged.set_column(at, "room_type", pa.array(column, pa.string()))
+    column_index = judged.schema.get_field_index("room_type")
+    return judged.set_column(column_index, "room_type", pa.array(column, pa.string()))
 
 
 def _tallies(judged: Any, column: str) -> tuple[KeptCount, ...]:

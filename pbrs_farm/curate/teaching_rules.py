@@ -68,8 +68,10 @@ def plane_share(view: ChosenView) -> float:
     offsets = (points * normals).sum(1)
     # The plane that most share, to about a plane's width; then all that lie on it.
     cells = np.concatenate([np.rint(normals / 0.1), np.rint(offsets / 0.1)[:, None]], axis=1)
-    _cells, own, counts = np.unique(cells, axis=0, return_inverse=True, return_counts=True)
-    largest = own.reshape(-1) == counts.argmax()
+    _cells, cell_of_point, counts = np.unique(
+        cells, axis=0, return_inverse=True, return_counts=True
+    )
+    largest = cell_of_point.reshape(-1) == counts.argmax()
     normal = normals[largest].mean(0)
     normal /= np.linalg.norm(normal)
     offset = float(np.median(points[largest] @ normal))
@@ -104,20 +106,20 @@ def twin_share(view: ChosenView, other: ChosenView) -> float:
     Of two pin-holes; 0 for other lenses and for eyes that are far apart. Not symmetric: a wide view
     may hold all of a narrow one.
     """
-    i, there = intrinsics_of(view.facts), intrinsics_of(other.facts)
+    i, theirs = intrinsics_of(view.facts), intrinsics_of(other.facts)
     near = np.linalg.norm(pose_opencv(view)[:3, 3] - pose_opencv(other)[:3, 3]) < _TWIN_M
-    if not (near and i.lens.is_pinhole and there.lens.is_pinhole):
+    if not (near and i.lens.is_pinhole and theirs.lens.is_pinhole):
         return 0.0
     points, _normals, _n = _grid(view)
     if not len(points):
         return 0.0
     matrix = np.linalg.inv(pose_opencv(other)) @ pose_opencv(view)
-    moved = there.pixels(points @ matrix[:3, :3].T + matrix[:3, 3])
-    here = i.pixels(points)
-    shift = (moved / [there.width_px, there.height_px]) - (here / [i.width_px, i.height_px])
+    moved = theirs.pixels(points @ matrix[:3, :3].T + matrix[:3, 3])
+    pixels = i.pixels(points)
+    shift = (moved / [theirs.width_px, theirs.height_px]) - (pixels / [i.width_px, i.height_px])
     with np.errstate(invalid="ignore"):
         same = np.linalg.norm(shift * [1, i.height_px / i.width_px], axis=1) < _TWIN_SHIFT
-        inside = ((moved >= 0) & (moved < [there.width_px, there.height_px])).all(1)
+        inside = ((moved >= 0) & (moved < [theirs.width_px, theirs.height_px])).all(1)
     return float((same & inside).mean())
 
 
@@ -128,8 +130,8 @@ def _grid(view: ChosenView) -> tuple[F64, F64, int]:
     step = max(1, int(np.sqrt(depth.size / _POINTS)))
     y, x = (g.ravel() for g in np.mgrid[: depth.shape[0] : step, : depth.shape[1] : step])
     n, z = len(x), depth[y, x] / 1000
-    seen = (z > 0) & (view.array("valid")[y, x] > 0)
-    y, x, z = y[seen], x[seen], z[seen]
+    has_surface = (z > 0) & (view.array("valid")[y, x] > 0)
+    y, x, z = y[has_surface], x[has_surface], z[has_surface]
     rays = intrinsics_of(view.facts).directions(np.stack([x + 0.5, y + 0.5], axis=1))
     normals = opengl_normals(view)[y, x].astype(np.float64) * [1, -1, -1]
     return rays * z[:, None], normals, n
@@ -155,16 +157,16 @@ def judged_by(entries: Sequence[ViewEntry], names: Sequence[str]) -> list[RuleVe
     for name in names:
         if name not in REASONS:
             raise BadInput("--by", name, "no such rule", hint=f"of {', '.join(REASONS)}")
-    found: dict[tuple[str, str], RuleVerdict] = {}
-    kept: dict[tuple[str, str], list[ChosenView]] = {}
+    verdicts: dict[tuple[str, str], RuleVerdict] = {}
+    shown: dict[tuple[str, str], list[ChosenView]] = {}
     for entry in sorted(entries, key=lambda e: (e.shot.eye != "", e.house.id, e.id)):
-        first = found.get((entry.house.id, entry.shot.first.id))
-        others = kept.setdefault((entry.house.id, entry.room_id), [])
+        first = verdicts.get((entry.house.id, entry.shot.first.id))
+        shown_of_room = shown.setdefault((entry.house.id, entry.room_id), [])
         numbers, reason = (
-            _judged(entry, names, others) if first is None else (first.numbers, first.reason)
+            _judged(entry, names, shown_of_room) if first is None else (first.numbers, first.reason)
         )
-        found[entry.house.id, entry.id] = RuleVerdict(entry.house.id, entry.id, reason, numbers)
-    return [found[at] for at in sorted(found)]
+        verdicts[entry.house.id, entry.id] = RuleVerdict(entry.house.id, entry.id, reason, numbers)
+    return [verdicts[place] for place in sorted(verdicts)]
 
 
 def write_verdicts(
@@ -181,8 +183,8 @@ def write_verdicts(
         for name, reason in REASONS.items()
         if name in by
     }
-    kept = len(verdicts) - sum(counts.values())
-    summary = {"run": run, "by": list(by), "views": len(verdicts), "kept": kept, "reasons": counts}
+    n = len(verdicts) - sum(counts.values())
+    summary = {"run": run, "by": list(by), "views": len(verdicts), "kept": n, "reasons": counts}
     store.put(keys.SELECTION, (json.dumps(summary, indent=1) + "\n").encode())
     return summary
 
@@ -197,7 +199,7 @@ def _judged(
             numbers[rule.name] = rule.measure(view)
             reason = reason or (rule.reason if numbers[rule.name] > rule.most else "")
     if _TWINS in names and not reason:
-        numbers[_TWINS] = max((_alike(view, other) for other in others), default=0.0)
+        numbers[_TWINS] = max((_alike(view, peer) for peer in others), default=0.0)
         reason = "twin" if numbers[_TWINS] > _TWIN_MOST else ""
     if not reason:
         others.append(view)

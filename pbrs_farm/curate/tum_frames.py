@@ -63,19 +63,21 @@ def frames_of(folder: Path) -> list[tuple[Path, Path]]:
     rgb_s, depth_s = (np.array([seconds for seconds, _ in each]) for each in (rgb, depth))
     nearest = np.abs(rgb_s[:, None] - depth_s[None]).argmin(1)
     back = np.abs(depth_s[:, None] - rgb_s[None]).argmin(1)
-    own = np.arange(len(rgb))
-    paired = (back[nearest] == own) & (np.abs(depth_s[nearest] - rgb_s) <= _APART_S)
+    indices = np.arange(len(rgb))
+    paired = (back[nearest] == indices) & (np.abs(depth_s[nearest] - rgb_s) <= _APART_S)
     if not paired.any():
         text = f"no picture within {_APART_S} s of one in {_RGB_LIST}"
         raise BadInput(folder / DEPTH_LIST, "", text)
-    at = own[paired]
-    at = at[np.argsort(rgb_s[at], kind="stable")]
-    return [(rgb[k][1], depth[nearest[k]][1]) for k in at[_apart(rgb_s[at], _poses(folder))]]
+    frames = indices[paired]
+    frames = frames[np.argsort(rgb_s[frames], kind="stable")]
+    return [
+        (rgb[k][1], depth[nearest[k]][1]) for k in frames[_apart(rgb_s[frames], _poses(folder))]
+    ]
 
 
 def _listed(path: Path) -> list[tuple[float, Path]]:
     """Seconds and file of each line that begins with a number."""
-    found = []
+    rows = []
     for number, line in enumerate(text_given(path).splitlines(), 1):
         words = line.split(maxsplit=1)
         seconds = _number(words[0]) if words else None
@@ -83,10 +85,10 @@ def _listed(path: Path) -> list[tuple[float, Path]]:
             continue
         file = path.parent / words[1].strip() if len(words) > 1 else None
         if file is None or not file.is_file():
-            what = f"no such file {words[1].strip()}" if file else "expected `seconds file`"
-            raise BadInput(path, f"line {number}", what)
-        found.append((seconds, file))
-    return found
+            problem = f"no such file {words[1].strip()}" if file else "expected `seconds file`"
+            raise BadInput(path, f"line {number}", problem)
+        rows.append((seconds, file))
+    return rows
 
 
 def _number(word: str) -> float | None:

@@ -57,11 +57,11 @@ class PaintedMaterials(Sequence[Material]):
     def __getitem__(self, number: int | slice) -> Material | Sequence[Material]:
         if isinstance(number, slice):
             return [self[k] for k in range(*number.indices(len(self)))]
-        made = self._all[number]
-        if not isinstance(made, Painting):
-            return made
+        entry = self._all[number]
+        if not isinstance(entry, Painting):
+            return entry
         # Equal materials added later get this index.
-        material = made.painted().material
+        material = entry.painted().material
         self._number.setdefault(material, number % len(self._all))
         return material
 

@@ -266,9 +266,9 @@ def _sparse_array(
     places, values = accessor_array(whole, 0)[:, 0], accessor_array(whole, 1)
     if places.dtype.kind != "u" or (len(places) and places.max() >= n):
         raise BadHouse(gltf.file, f"{place}.sparse", "replaces an element that does not exist")
-    found = accessor_array(whole, 2) if "bufferView" in base else np.zeros((n, width), dtype)
-    found[places] = values
-    return found
+    array = accessor_array(whole, 2) if "bufferView" in base else np.zeros((n, width), dtype)
+    array[places] = values
+    return array
 
 
 def _hashable(value: Any) -> Any:

@@ -51,9 +51,9 @@ def palette_of(rng: np.random.Generator, style: Style) -> Palette:
     """Six colours: mostly the home's, sometimes others; paper first."""
     paper = mix((0.96, 0.94, 0.9), style.palette[0], float(rng.uniform(0, 0.5)))
     if rng.random() < 0.7:
-        own = [style.accent, *style.textiles, *style.palette[2:]]
-        own = [own[int(k)] for k in rng.permutation(len(own))]
-        return (paper, *own[:5])
+        colours = [style.accent, *style.textiles, *style.palette[2:]]
+        colours = [colours[int(k)] for k in rng.permutation(len(colours))]
+        return (paper, *colours[:5])
     hues = (rng.random() + np.array([0, 0.08, 0.5, 0.55, 0.33])) % 1.0
     return (paper, *(_from_hue(float(h), float(rng.uniform(0.3, 0.8))) for h in hues))
 

@@ -40,10 +40,10 @@ def inks_of(rng: np.random.Generator, style: Style) -> Inks:
     if rng.random() < 0.25:
         wool: Rgb = (0.84, 0.8, 0.72)
         return (wool, (0.25, 0.22, 0.2), (0.55, 0.48, 0.4), (0.7, 0.65, 0.57), (0.4, 0.34, 0.28))
-    own = [*style.textiles, style.accent]
-    own = [own[int(k)] for k in rng.permutation(len(own))]
-    ground = mix(own[0], (0.85, 0.81, 0.74), float(rng.uniform(0, 0.6)))
-    return (ground, *own[1:4], shade(own[4 % len(own)], 0.7))
+    colours = [*style.textiles, style.accent]
+    colours = [colours[int(k)] for k in rng.permutation(len(colours))]
+    ground = mix(colours[0], (0.85, 0.81, 0.74), float(rng.uniform(0, 0.6)))
+    return (ground, *colours[1:4], shade(colours[4 % len(colours)], 0.7))
 
 
 def _coordinates(size: Size) -> tuple[F32, F32]:

@@ -81,5 +81,5 @@ def _decision_cell(text: str) -> str:
 
 def _rule(item: Mapping[str, Any]) -> str:
     tags = [str(t) for t in item.get("tags", ())]
-    found = next((t.removeprefix(CLASS_TAG) for t in tags if t.startswith(CLASS_TAG)), None)
-    return found or ("none" if "unmapped" in tags else "source")
+    tag = next((t.removeprefix(CLASS_TAG) for t in tags if t.startswith(CLASS_TAG)), None)
+    return tag or ("none" if "unmapped" in tags else "source")

@@ -51,8 +51,8 @@ def contact_sheet(
     if not everything:
         raise BadInput(folder, "houses/", "holds no view yet", hint="run `pbrs-farm run` first")
     views = spread_views(everything, max_views)
-    there = made or {}
-    rows = [(view, there.get(view.folder) or tiles_of(view, TILE_PX)) for view in views]
+    tiles_of_view = made or {}
+    rows = [(view, tiles_of_view.get(view.folder) or tiles_of(view, TILE_PX)) for view in views]
     # A damaged layer is there, too: its tile says so.
     rendered = {t.kind for _view, tiles in rows for t in tiles if t.missing != NOT_RENDERED}
     kinds = [kind for kind in TILES if kind in rendered]

@@ -135,9 +135,9 @@ def best_first(views: Iterable[ViewEntry]) -> list[ViewEntry]:
         houses.setdefault(view.house.id, {}).setdefault(view.room_id, []).append(view)
     ordered: list[ViewEntry] = []
     for rooms in houses.values():
-        for own in sorted(rooms.values(), key=lambda r: min(map(_rank, r))):
-            is_sequence = any("frame" in view.facts for view in own)
-            ordered += own if is_sequence else sorted(own, key=_rank)
+        for room_views in sorted(rooms.values(), key=lambda r: min(map(_rank, r))):
+            is_sequence = any("frame" in view.facts for view in room_views)
+            ordered += room_views if is_sequence else sorted(room_views, key=_rank)
     return ordered
 
 

@@ -24,10 +24,10 @@ def depth_range_m(depth_mm: NDArray[np.integer]) -> tuple[float, float]:
     depth_mm is an array of any shape, whole millimetres, 0 = unknown. The range is at least 1 mm,
     so that it can be divided by. Percentiles, so that one far window does not darken a room.
     """
-    known = depth_mm[depth_mm > 0]
-    if not known.size:
+    valid = depth_mm[depth_mm > 0]
+    if not valid.size:
         return 0.0, 1.0
-    low, high = np.percentile(known, (1, 99)) / 1000.0
+    low, high = np.percentile(valid, (1, 99)) / 1000.0
     return float(low), float(max(high, low + 1e-3))
 
 

@@ -44,14 +44,14 @@ def make_homes(
     processes. Yields what became of each home: written, there already, or `fault`, why it could not
     be made; one that fails does not stop the others.
     """
-    one = partial(_make, folder, programme)
+    make_one = partial(_make, folder, programme)
     # The page of plans is written even where a run is cut short.
     try:
         if n_jobs > 1:
             with ProcessPoolExecutor(n_jobs, get_context("spawn")) as pool:
-                yield from pool.map(one, homes)
+                yield from pool.map(make_one, homes)
         else:
-            yield from map(one, homes)
+            yield from map(make_one, homes)
     finally:
         _write_home_file(folder / PAGE, plans_page(folder).encode())
 

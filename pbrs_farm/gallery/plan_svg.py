@@ -38,8 +38,8 @@ def plan_svg(storeys: Sequence[Storey], title: str, stair: Stair | None = None) 
     points = [p for storey in storeys for wall in storey.plan.walls for p in wall.corners()]
     x0, z0 = (min(p[k] for p in points) - _MARGIN_M for k in (0, 1))
     x1, z1 = (max(p[k] for p in points) + _MARGIN_M for k in (0, 1))
-    apart = x1 - x0 - _MARGIN_M
-    x1 += apart * (len(storeys) - 1)
+    spacing = x1 - x0 - _MARGIN_M
+    x1 += spacing * (len(storeys) - 1)
     root = svg_file(
         viewBox=f"{x0:.2f} {z0:.2f} {x1 - x0:.2f} {z1 - z0:.2f}",
         width=round((x1 - x0) * _PX_PER_M),
@@ -49,7 +49,7 @@ def plan_svg(storeys: Sequence[Storey], title: str, stair: Stair | None = None) 
     element(root, "title", title)
     element(root, "rect", x=f"{x0:.2f}", y=f"{z0:.2f}", width="100%", height="100%", fill="#ffffff")
     for number, storey in enumerate(storeys):
-        group = element(root, "g", transform=f"translate({number * apart:.2f} 0)")
+        group = element(root, "g", transform=f"translate({number * spacing:.2f} 0)")
         _draw_storey(group, storey, stair)
     return svg_text(root)
 
@@ -167,10 +167,10 @@ def _draw_opening(root: Element, plan: Plan, opening: PlanOpening) -> None:
     if opening.kind is OpeningKind.PASSAGE:
         return
     # The leaf stands open into its room; an arc shows its way.
-    hinge, other = (start, end) if opening.hinge_at_start else (end, start)
+    hinge, edge = (start, end) if opening.hinge_at_start else (end, start)
     nx, nz = _into(plan, opening, wall)
     open_at = (hinge[0] + nx * opening.width, hinge[1] + nz * opening.width)
-    turn = (other[0] - hinge[0]) * nz - (other[1] - hinge[1]) * nx
+    turn = (edge[0] - hinge[0]) * nz - (edge[1] - hinge[1]) * nx
     element(
         root,
         "path",
@@ -179,7 +179,7 @@ def _draw_opening(root: Element, plan: Plan, opening: PlanOpening) -> None:
         stroke_width="0.025",
         d=f"M{hinge[0]:.3f},{hinge[1]:.3f} L{open_at[0]:.3f},{open_at[1]:.3f} "
         f"A{opening.width:g},{opening.width:g} 0 0 {0 if turn > 0 else 1} "
-        f"{other[0]:.3f},{other[1]:.3f}",
+        f"{edge[0]:.3f},{edge[1]:.3f}",
     )
 
 

@@ -71,12 +71,12 @@ def runs_of_one_font(text: str) -> Iterator[tuple[str, str]]:
             continue
         if follows and c != " ":
             continue
-        found = next((f for f in ("", *_installed()) if _has(f, c)), None)
-        found, c = (name, "?") if found is None else (found, c)
-        if found != name and part:
+        file = next((f for f in ("", *_installed()) if _has(f, c)), None)
+        file, c = (name, "?") if file is None else (file, c)
+        if file != name and part:
             yield name, part
             part = ""
-        name, part = found, part + c
+        name, part = file, part + c
     if part:
         yield name, part
 
@@ -114,12 +114,12 @@ def _installed() -> tuple[str, ...]:
     home = os.environ.get("XDG_DATA_HOME", str(Path.home() / ".local/share"))
     shared = os.environ.get("XDG_DATA_DIRS", "/usr/local/share:/usr/share").split(":")
     roots = [*(Path(s) / "fonts" for s in (home, *shared)), Path.home() / ".fonts"]
-    found: dict[str, str] = {}
+    paths: dict[str, str] = {}
     for root in roots:
         for folder, _folders, names in os.walk(root):
             for name in set(names).intersection(_FILES):
-                found.setdefault(name, str(Path(folder) / name))
-    return tuple(found[name] for name in _FILES if name in found and _opens(found[name]))
+                paths.setdefault(name, str(Path(folder) / name))
+    return tuple(paths[name] for name in _FILES if name in paths and _opens(paths[name]))
 
 
 def _opens(file: str) -> bool:

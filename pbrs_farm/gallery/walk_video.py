@@ -30,11 +30,13 @@ def sequences_of(views: Sequence[ViewEntry]) -> dict[str, list[ViewEntry]]:
     Frames are known by "frame" in their view.json, of a rig the first camera's count. Gaps are not filled: a
     sequence that is only partly rendered has the frames that are there.
     """
-    found: dict[str, list[ViewEntry]] = {}
+    frames: dict[str, list[ViewEntry]] = {}
     for view in views:
         if view.facts.get("frame") is not None and not view.shot.eye:
-            found.setdefault(view.house.id, []).append(view)
-    return {house: sorted(own, key=lambda v: int(v.facts["frame"])) for house, own in found.items()}
+            frames.setdefault(view.house.id, []).append(view)
+    return {
+        house: sorted(rows, key=lambda v: int(v.facts["frame"])) for house, rows in frames.items()
+    }
 
 
 def films_of(frames: Sequence[ViewEntry]) -> dict[str, bytes]:

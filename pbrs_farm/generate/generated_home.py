@@ -78,16 +78,16 @@ def furnish_storeys(
     """
     rng = np.random.default_rng(keys.seed("own plan", VERSION, seed, style, key))
     storeys = []
-    for plan, given in zip(plans, given_pieces, strict=True):
+    for plan, standing in zip(plans, given_pieces, strict=True):
         grounds = [Polygon(room.polygon).buffer(0.02) for room in plan.rooms]
-        taken = {piece.room for piece in given}
+        taken = {piece.room for piece in standing}
         drawn = [
             p
             for p in furnished(plan, catalogue, rng, style)
             if p.room not in taken and grounds[p.room].contains(Polygon(p.corners))
         ]
-        storeys.append(Storey(plan, (*given, *drawn)))
-    words = [repr(given) for given in given_pieces if given]
+        storeys.append(Storey(plan, (*standing, *drawn)))
+    words = [repr(standing) for standing in given_pieces if standing]
     digest = keys.digest("own plan", VERSION, seed, style, key, catalogue.digest, *words)
     contents = home_contents(storeys, catalogue, rng, name=name, origin=f"plan {digest}")
     return GeneratedHome(tuple(storeys), contents, f"plan {digest}")

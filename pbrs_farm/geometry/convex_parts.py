@@ -270,8 +270,8 @@ def _level_turn(triangles: F64) -> float:
     best = int(weight.argmax())
     same = degree == best
     off = (angle[same] - np.radians(best) + np.pi / 4) % (np.pi / 2) - np.pi / 4
-    found = np.radians(best) + float(np.average(off, weights=area[upright][same]))
-    return 0.0 if weight[0] >= _STRAIGHT * weight[best] else -found
+    turn = np.radians(best) + float(np.average(off, weights=area[upright][same]))
+    return 0.0 if weight[0] >= _STRAIGHT * weight[best] else -turn
 
 
 def _is_flat(points: F64) -> bool:
@@ -312,9 +312,9 @@ def convex_parts(triangles: F64, *, most: int = 24, threshold: float = 0.05) -> 
     vertices, faces = np.unique(points.round(7), axis=0, return_inverse=True)
     coacd.set_log_level("error")
     mesh = coacd.Mesh(vertices, faces.reshape(-1, 3).astype(np.int32))
-    found = coacd.run_coacd(mesh, threshold=threshold, max_convex_hull=most, seed=1)
+    result = coacd.run_coacd(mesh, threshold=threshold, max_convex_hull=most, seed=1)
     # CoACD works on a grown mesh, by a hundredth of its size: what rests on such parts hovers.
-    parts_within = (_within(np.asarray(part, np.float64), points) for part, _faces in found)
+    parts_within = (_within(np.asarray(part, np.float64), points) for part, _faces in result)
     hulls = (hull_of(part) for part in parts_within)
     parts = tuple(hull for hull in hulls if hull is not None)
     return parts or ((whole,) if whole is not None else (thickened(points),))

@@ -138,7 +138,7 @@ def rooms_by_walls(ground: Polygon, lines: Sequence[LineString]) -> list[Polygon
     grown = [
         r.buffer(HALF_M, join_style="mitre")
         .intersection(ground)
-        .difference(unary_union([other for other in rooms if other is not r]))
+        .difference(unary_union([neighbour for neighbour in rooms if neighbour is not r]))
         for r in rooms
     ]
     whole: list[Any] = [max(shapely.get_parts(r), key=lambda p: p.area) for r in grown]

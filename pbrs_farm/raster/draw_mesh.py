@@ -83,8 +83,8 @@ def move_item(mesh: DrawMesh, instance: int, item: Item) -> slice:
         [np.zeros((0, 8), np.float32), *(v for _m, v, _f in draws)]
     )
     boxes = [_box(v, f) for _material, v, f in draws if len(f)]
-    own = np.flatnonzero(mesh.draw_item == instance)
-    for k, (low, high) in zip(own, boxes, strict=True):
+    numbers = np.flatnonzero(mesh.draw_item == instance)
+    for k, (low, high) in zip(numbers, boxes, strict=True):
         mesh.draw_low[k], mesh.draw_high[k] = low, high
     return rows
 

@@ -105,11 +105,11 @@ class CutOutTracer:
         """(N,) distance and face of the first hits that are not holes; face: the first hits."""
         o, d = origins.astype(np.float64), directions.astype(np.float64)
         t, hole = pierced_holes(self._geometry, self._cut_outs, face, o, d)
-        found_t, found = t.astype(np.float32), face.copy()
+        found_t, number = t.astype(np.float32), face.copy()
         rays = np.flatnonzero(hole)
         if not len(rays):
-            return found_t, found
-        found_t[rays], found[rays] = _hits(
+            return found_t, number
+        found_t[rays], number[rays] = _hits(
             self._solid, origins[rays], directions[rays], reach[rays]
         )
 
@@ -130,9 +130,9 @@ class CutOutTracer:
             rays, sheet, begin = rays[is_hit], sheet[is_hit], begin[is_hit] + more[is_hit]
             exact, hole = pierced_holes(self._geometry, self._cut_outs, sheet, o[rays], d[rays])
             solid = ~hole
-            found_t[rays[solid]], found[rays[solid]] = exact[solid], sheet[solid]
+            found_t[rays[solid]], number[rays[solid]] = exact[solid], sheet[solid]
             rays, ray_t = rays[hole], begin[hole]
-        return found_t, found
+        return found_t, number
 
     def _step(self, points: F64, directions: F64) -> F64:
         """(N,) in lengths of the directions, by which a ray goes on behind a hole."""

@@ -73,7 +73,7 @@ def finishes_apart(run: Run) -> bool:
 def _resolved(run: Run, summary: Summary) -> list[SourceRef]:
     # Take each home once, even if several words name it; an unreadable home fails alone.
     seeds = run.dress_seeds or (run.recipe.dress.seed,)
-    sources = {s.house_id: s for given in run.sources for s in variants(given, seeds)}
+    sources = {s.house_id: s for run_source in run.sources for s in variants(run_source, seeds)}
     files = SourceFiles()
     for word in run.homes:
         note_step(word, "read")

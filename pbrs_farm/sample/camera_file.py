@@ -81,8 +81,8 @@ class GivenCamera(BaseModel):
             intrinsics = Intrinsics.from_hfov(width_px, height_px, self.hfov_rad)
         else:
             (fx, _skew, cx), (_zero, fy, cy), _last = self.K
-            own = Intrinsics(self.width_px, self.height_px, fx, fy, cx, cy)
-            intrinsics = own.resized(width_px, height_px)
+            stored = Intrinsics(self.width_px, self.height_px, fx, fy, cx, cy)
+            intrinsics = stored.resized(width_px, height_px)
         if self.world_from_camera is not None:
             return Camera(intrinsics, np.array(self.world_from_camera, np.float64))
         if self.world_from_camera_opencv is not None:

@@ -232,7 +232,7 @@ class PhotoChoice:
         if name not in self.looked_at:
             camera = scored.candidates.cameras(np.array([number]), self.lens)[0]
             self.looked_at[name] = camera, self.depth_of([camera])[0]
-        return any(self._is_alike(name, other) for other in self._taken)
+        return any(self._is_alike(name, taken) for taken in self._taken)
 
     def _is_alike(self, name: _Name, other: _Name) -> bool:
         # Every chosen view was compared before; later rounds repeat the same pairs.

@@ -40,15 +40,15 @@ def cameras_around(
     Each sees min_visible of the item it looks at. Raises BadInput where fewer are found.
     """
     rng = np.random.default_rng([seed, 4])
-    found: list[Camera] = []
+    cameras: list[Camera] = []
     for _ in range(n):
         camera = _one(house, items, distance_m, elevation_deg, min_visible, intrinsics, rng)
         if camera is None:
             names = shown(", ".join(dict.fromkeys(item.name for item in items)))
-            text = f"found {len(found)} of {n} cameras that see {min_visible:g} of {names}"
+            text = f"found {len(cameras)} of {n} cameras that see {min_visible:g} of {names}"
             raise BadInput(house.id, "cameras", text, hint="other distances, a lower min_visible")
-        found.append(camera)
-    return found
+        cameras.append(camera)
+    return cameras
 
 
 def _one(
@@ -103,9 +103,9 @@ def _visible(house: House, item: Item, camera: Camera) -> float:
     alone = int(coverage(item, small, _caster_of(house).cut_outs).sum())
     if alone < _LEAST_PX:
         return 0.0
-    number = next(k for k, other in enumerate(house.items, 1) if other is item)
-    seen = int((_caster_of(house).item_buffer(small) == number).sum())
-    return seen / alone
+    number = next(k for k, candidate in enumerate(house.items, 1) if candidate is item)
+    n_visible = int((_caster_of(house).item_buffer(small) == number).sum())
+    return n_visible / alone
 
 
 def _caster_of(house: House) -> Caster:

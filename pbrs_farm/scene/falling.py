@@ -169,8 +169,8 @@ def _check_begin(
         bodies = [int(world.geom_bodyid[g]) for g in (contact.geom1, contact.geom2)]
         who = [movers[b - 1].item.id for b in bodies if b > 0]
         # Static parts come first, in their order.
-        other = who[1] if len(who) > 1 else names[min(int(contact.geom1), int(contact.geom2))]
-        text = f"begins {-1000 * contact.dist:.0f} mm inside of {other}"
+        other_name = who[1] if len(who) > 1 else names[min(int(contact.geom1), int(contact.geom2))]
+        text = f"begins {-1000 * contact.dist:.0f} mm inside of {other_name}"
         raise BadInput(house.id, who[0], text, hint="place it where there is room for it")
 
 

@@ -298,8 +298,8 @@ class Home:
             5.0
         """
         fields = {"sky.sun_azimuth_deg": azimuth, "sky.sun_elevation_deg": elevation}
-        given = {name: value for name, value in fields.items() if value is not None}
-        return self.set(**{"sky.kind": "sunsky", **given})
+        changes = {name: value for name, value in fields.items() if value is not None}
+        return self.set(**{"sky.kind": "sunsky", **changes})
 
     @checked_call
     def sky(self, panorama: str | Path) -> Home:
@@ -340,7 +340,7 @@ class Home:
         """
         from pbrs_farm.scene.placing import free_pose, upright_at
 
-        if sum(given is not None for given in (on, pose, at)) != 1:
+        if sum(argument is not None for argument in (on, pose, at)) != 1:
             raise BadInput(self.id, model.id, "place it by one of on=, pose= and at=")
         if pose is not None:
             matrix = rigid_motion(pose, "place", "pose")
@@ -457,11 +457,11 @@ class Home:
             if fnmatchcase(joint.part, part)
         )
         if not joints:
-            known = sorted(
+            openable = sorted(
                 {joint.part for i in self.house.items if i.id in ids for joint in i.joints}
             )
-            text = f"no {part!r} of it opens" if known else "nothing of it opens"
-            raise BadInput(self.id, shown(sorted(ids)[0]), text, hint=", ".join(known[:5]))
+            text = f"no {part!r} of it opens" if openable else "nothing of it opens"
+            raise BadInput(self.id, shown(sorted(ids)[0]), text, hint=", ".join(openable[:5]))
         return joints
 
     def _opened(self, edit: OpenJoints | KeyJoints) -> Home:
@@ -626,17 +626,17 @@ class Home:
 
     def _ids(self, items: ItemLike) -> tuple[str, ...]:
         words = [items] if isinstance(items, str | Item | Mapping) else list(items)
-        found: dict[str, None] = {}
+        ids: dict[str, None] = {}
         for word in words:
             if isinstance(word, Item):
-                found[word.id] = None
+                ids[word.id] = None
             elif isinstance(word, Mapping) and "id" in word:
-                found[self.items[str(word["id"])].id] = None
+                ids[self.items[str(word["id"])].id] = None
             elif not isinstance(word, str):
                 raise BadInput("items", repr(word), "expected names of items, or items")
             else:
-                found |= dict.fromkeys(item.id for item in self.items.named(word))
-        return tuple(found)
+                ids |= dict.fromkeys(item.id for item in self.items.named(word))
+        return tuple(ids)
 
     def _supports_named(self, on: str | Item | Room | None) -> list[Item | Room]:
         if isinstance(on, Item | Room):
@@ -648,7 +648,7 @@ class Home:
         from pbrs_farm.scene.placing import furniture_of
 
         rooms = [self.rooms[room]] if room else list(self.house.rooms)
-        return [one for r in rooms for one in (*furniture_of(self.house, r), r)]
+        return [target for r in rooms for target in (*furniture_of(self.house, r), r)]
 
     # Looking and rendering.
 
@@ -675,7 +675,7 @@ class Home:
         (24, 32, 3)
         """
         small = []
-        for camera in (self.viewpoint(one).camera for one in cameras):
+        for camera in (self.viewpoint(place).camera for place in cameras):
             width, height = camera.intrinsics.width_px, camera.intrinsics.height_px
             scale = edge_px / max(width, height)
             size = max(1, round(scale * width)), max(1, round(scale * height))
@@ -694,15 +694,15 @@ class Home:
             >>> len(home.cameras("photo", n=2))
             2
         """
-        given = {"preset": preset, **fields} if preset is not None else fields
-        home = self.set(**{f"cameras.{name}": value for name, value in given.items()})
+        changes = {"preset": preset, **fields} if preset is not None else fields
+        home = self.set(**{f"cameras.{name}": value for name, value in changes.items()})
         data = self.renderer.sampled(self.source, home.recipe)
         views = views_from_json(data, "cameras.json")
         rows = [(view.id, view.room_id, view.score) for view in views.values()]
         chosen = plan.chosen_views(rows, n or 0, home.recipe)
         # They were scored in a small picture: give them the size of the final pictures.
         size = home.recipe.image.width_px, home.recipe.image.height_px
-        found = [
+        viewpoints = [
             Viewpoint(
                 replace(views[name], camera=views[name].camera.with_size(*size)),
                 home.recipe.cameras,
@@ -710,7 +710,7 @@ class Home:
             for name in chosen
         ]
         report = CameraReport.model_validate(json.loads(data)["report"])
-        return Viewpoints(found, report, self)
+        return Viewpoints(viewpoints, report, self)
 
     @checked_call
     def cameras_around(
@@ -737,13 +737,13 @@ class Home:
         """
         from pbrs_farm.scene.aiming import cameras_around
 
-        wanted = set(self._ids(items)) if items is not None else None
-        found = [
+        ids = set(self._ids(items)) if items is not None else None
+        viewpoints = [
             item
             for item in self.house.items
-            if (item.pose is not None if wanted is None else item.id in wanted)
+            if (item.pose is not None if ids is None else item.id in ids)
         ]
-        if not found:
+        if not viewpoints:
             raise BadInput(self.id, "cameras", "no model was placed", hint="name items to look at")
         if not distance_m[0] > 0:
             raise BadInput("cameras_around", "distance_m", "expected metres above 0")
@@ -753,7 +753,7 @@ class Home:
         cameras = self.renderer.call(
             lambda: cameras_around(
                 house,
-                found,
+                viewpoints,
                 n,
                 distance_m=distance_m,
                 elevation_deg=elevation_deg,
@@ -802,12 +802,12 @@ class Rooms(Table):
         """A room by id or name (a Room), else a row by number."""
         if not isinstance(at, str):
             return super().__getitem__(at)
-        found = [r for r in self._house.rooms if at in (r.id, r.name)]
-        found = found or [r for r in self._house.rooms if r.name.lower() == at.lower()]
-        if not found:
+        matches = [r for r in self._house.rooms if at in (r.id, r.name)]
+        matches = matches or [r for r in self._house.rooms if r.name.lower() == at.lower()]
+        if not matches:
             names = [name for r in self._house.rooms for name in (r.name, r.id)]
             raise BadInput(self._house.id, at, "no such room", hint=did_you_mean(at, names))
-        return found[0]
+        return matches[0]
 
     @checked_call
     def has(self, name: str) -> bool:
@@ -869,16 +869,16 @@ class Items(Table):
         """An item by id, by a name that one item alone has, or as "table 2"; else a row by number."""
         if not isinstance(at, str):
             return super().__getitem__(at)
-        found = [i for i in self._items if i.id == at] or self._same_name(at)
+        matches = [i for i in self._items if i.id == at] or self._same_name(at)
         stem, _, number = at.rpartition(" ")
-        if not found and number.isdecimal():
-            found = self._same_name(stem)[int(number) - 1 :][: int(number) > 0]
-        if not found:
+        if not matches and number.isdecimal():
+            matches = self._same_name(stem)[int(number) - 1 :][: int(number) > 0]
+        if not matches:
             raise self._unknown(at)
-        if len(found) > 1:
-            hint = f'"{at} 1", or an id: {", ".join(item.id for item in found[:5])}'
-            raise BadInput(self._house.id, at, f"{len(found)} items have this name", hint=hint)
-        return found[0]
+        if len(matches) > 1:
+            hint = f'"{at} 1", or an id: {", ".join(item.id for item in matches[:5])}'
+            raise BadInput(self._house.id, at, f"{len(matches)} items have this name", hint=hint)
+        return matches[0]
 
     def _same_name(self, name: str) -> list[Item]:
         return [item for item in self._items if item.name.lower() == name.lower()]
@@ -892,18 +892,20 @@ class Items(Table):
         """
         for key in (_ids, _words):
             # A name may contain characters of patterns: "chair [2]".
-            found = tuple(
+            matches = tuple(
                 i
                 for i in self._items
                 if any(w == pattern or fnmatchcase(w, pattern) for w in key(i))
             )
-            if found:
-                return found
+            if matches:
+                return matches
         low = pattern.lower()
-        found = tuple(i for i in self._items if any(fnmatchcase(w.lower(), low) for w in _words(i)))
-        if not found:
+        matches = tuple(
+            i for i in self._items if any(fnmatchcase(w.lower(), low) for w in _words(i))
+        )
+        if not matches:
             raise self._unknown(pattern)
-        return found
+        return matches
 
     @checked_call
     def near(self, name: str, within_m: Positive = 1.5) -> Items:
@@ -914,17 +916,17 @@ class Items(Table):
         """
         target = self.named(name)[0]
         low, high = target.bounds
-        found = []
+        nearby = []
         for item in self._items:
             a, b = item.bounds
             gap = float(np.linalg.norm(np.maximum(0, np.maximum(low - b, a - high))))
             if item.id != target.id and not item.kind.is_structure and gap <= within_m:
-                found.append((gap, item.id, item))
-        return Items(self._house, [item for _gap, _id, item in sorted(found, key=lambda f: f[:2])])
+                nearby.append((gap, item.id, item))
+        return Items(self._house, [item for _gap, _id, item in sorted(nearby, key=lambda f: f[:2])])
 
     def _unknown(self, name: str) -> BadInput:
-        known = dict.fromkeys(w for item in self._items for w in (*_ids(item), *_words(item)))
-        return BadInput(self._house.id, name, "no such item", hint=did_you_mean(name, known))
+        words = dict.fromkeys(w for item in self._items for w in (*_ids(item), *_words(item)))
+        return BadInput(self._house.id, name, "no such item", hint=did_you_mean(name, words))
 
 
 def _ids(item: Item) -> tuple[str, ...]:

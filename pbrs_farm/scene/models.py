@@ -131,7 +131,7 @@ def model(
     except OSError as error:
         raise BadInput(path, "", fault_of(error)) from None
     label = nyu40_of("", category) or nyu40_of("", path.stem) or OTHERPROP
-    known = ModelRef(
+    ref = ModelRef(
         path=str(path.resolve()),
         sha256=keys.sha256(data),
         companions=companions_digest(path.resolve()),
@@ -142,18 +142,18 @@ def model(
         credit=credit,
     )
     if size_m is not None:
-        known = known.model_copy(update={"scale": 1e-3})  # so that any unit is small enough to read
-        extent = float(np.ptp(model_shape(known, ReadFields()).bounds, axis=0).max())
-        known = known.model_copy(update={"scale": 1e-3 * size_m / extent})
-    found = Model(known, up)
+        ref = ref.model_copy(update={"scale": 1e-3})  # so that any unit is small enough to read
+        extent = float(np.ptp(model_shape(ref, ReadFields()).bounds, axis=0).max())
+        ref = ref.model_copy(update={"scale": 1e-3 * size_m / extent})
+    loaded = Model(ref, up)
     # Read it now: a bad file is an error here, not in a run.
-    if notes := found.notes:
+    if notes := loaded.notes:
         # One of each kind: a map that is not read must not hide a picture that is missing.
-        told = list({note.kind: note for note in reversed(notes)}.values())[::-1]
-        more = f"; and {len(notes) - len(told)} more: model.notes" if notes[len(told) :] else ""
-        text = "; ".join(f"{note.place}: {note.text} ({note.kind})" for note in told)
+        firsts = list({note.kind: note for note in reversed(notes)}.values())[::-1]
+        more = f"; and {len(notes) - len(firsts)} more: model.notes" if notes[len(firsts) :] else ""
+        text = "; ".join(f"{note.place}: {note.text} ({note.kind})" for note in firsts)
         warn_caller(f"{path.parent}/{text}{more}")
-    return found
+    return loaded
 
 
 @checked_call
@@ -167,15 +167,15 @@ def models(pattern: str | Path, **options: object) -> list[Model]:
     """
     text = str(pattern)
     if Path(text).is_dir():
-        found = sorted(p for p in Path(text).rglob("*") if p.suffix.lower() in SUFFIXES)
+        files = sorted(p for p in Path(text).rglob("*") if p.suffix.lower() in SUFFIXES)
     elif Path(text).is_file():
-        found = [Path(text)]  # of a name that may hold [ and *
+        files = [Path(text)]  # of a name that may hold [ and *
     else:
-        found = sorted(Path(p) for p in glob.glob(text, recursive=True))  # noqa: PTH207
-    if not found:
+        files = sorted(Path(p) for p in glob.glob(text, recursive=True))  # noqa: PTH207
+    if not files:
         raise BadInput(pattern, "", "no model found", hint=f"of {', '.join(SUFFIXES)}")
-    names = _names(found)
-    return [model(path, name=name, **options) for path, name in zip(found, names, strict=True)]  # type: ignore[arg-type]
+    names = _names(files)
+    return [model(path, name=name, **options) for path, name in zip(files, names, strict=True)]  # type: ignore[arg-type]
 
 
 def _names(paths: list[Path]) -> list[str]:
@@ -186,6 +186,6 @@ def _names(paths: list[Path]) -> list[str]:
         # Folders of scans call every file alike: then the folder tells them apart.
         alone = stems[keys.slug(path.stem)] == 1
         name = keys.slug(path.stem if alone else f"{path.parent.name} {path.stem}")
-        n = names.count(name) + sum(other.startswith(f"{name}-x") for other in names)
+        n = names.count(name) + sum(taken.startswith(f"{name}-x") for taken in names)
         names.append(f"{name}-x{n + 1}" if n else name)
     return names

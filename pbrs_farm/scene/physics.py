@@ -109,12 +109,14 @@ def _parts_of(model: Model) -> tuple[F64, ...]:
 
 def _static_solids(house: House, surfaces: Sequence[TargetTops], size_m: float) -> list[F64]:
     """Convex solids of the home around the surfaces, (V, 3) each."""
-    points = np.concatenate([_points_of(top.support) for one in surfaces for top in one.tops])
+    points = np.concatenate(
+        [_points_of(top.support) for surface in surfaces for top in surface.tops]
+    )
     reach = np.array([_REACH_M + size_m, 0.0, _REACH_M + size_m])
     low, high = points.min(0) - reach - [0, 2, 0], points.max(0) + reach + [0, 1, 0]
     exact: list[F64] = []
     solids: list[F64] = []
-    bearing = {id(one.target) for one in surfaces}
+    bearing = {id(surface.target) for surface in surfaces}
     for item in house.items:
         a, b = item.bounds
         if not ((a <= high) & (b >= low)).all():
@@ -172,12 +174,12 @@ def _lift(
     balls = [_ball(t.model, t.pose) for t in things if t not in waiting]
     for thing in waiting:
         radius, turn = _radius(thing.model), Rotation.random(random_state=rng).as_matrix()
-        found = _spot_above_any(thing.onto, surfaces, radius, balls, rng)
-        if found is None:
-            names = ", ".join(one.target.name or one.target.id for one in surfaces[:3])
+        spot = _spot_above_any(thing.onto, surfaces, radius, balls, rng)
+        if spot is None:
+            names = ", ".join(surface.target.name or surface.target.id for surface in surfaces[:3])
             text = f"has no room above it for {thing.model.id}"
             raise BadInput(house.id, names, text, hint="fewer or smaller things, more supports")
-        thing.onto, centre = found
+        thing.onto, centre = spot
         thing.pose = np.eye(4)
         thing.pose[:3, :3] = turn
         thing.pose[:3, 3] = centre - turn @ _middle(thing.model)
@@ -192,17 +194,17 @@ def _spot_above_any(
     rng: np.random.Generator,
 ) -> tuple[TargetTops, F64] | None:
     """A target and a place (3,) above it for a ball: where it was dropped before, else by free area."""
-    areas = np.array([one.area_m2 for one in surfaces])
-    left = list(range(len(surfaces)))
-    while left:
-        at = int(rng.choice(left, p=areas[left] / areas[left].sum()))
-        one = onto or surfaces[at]
-        centre = _spot_above(one.tops, radius, balls, rng)
+    areas = np.array([surface.area_m2 for surface in surfaces])
+    remaining = list(range(len(surfaces)))
+    while remaining:
+        index = int(rng.choice(remaining, p=areas[remaining] / areas[remaining].sum()))
+        surface = onto or surfaces[index]
+        centre = _spot_above(surface.tops, radius, balls, rng)
         if centre is not None:
-            return one, centre
+            return surface, centre
         # Skip this target for this ball only.
         if onto is None:
-            left.remove(at)
+            remaining.remove(index)
         onto = None
     return None
 
@@ -223,9 +225,9 @@ def _spot_above(
         row, column = cells[int(rng.integers(len(cells)))] + rng.random(2)
         x, z = top.grid.plan_of(column, row)
         spot = np.array([x, top.support.height, z])
-        below = [(at, r) for at, r in balls if np.hypot(*(at - spot)[[0, 2]]) < r + radius]
+        below = [(place, r) for place, r in balls if np.hypot(*(place - spot)[[0, 2]]) < r + radius]
         height = max(
-            at[1] + r + radius + _APART_M for at, r in [*below, (spot, _DROP_M - _APART_M)]
+            place[1] + r + radius + _APART_M for place, r in [*below, (spot, _DROP_M - _APART_M)]
         )
         centre = np.array([x, height, z])
         is_lower = best is None or height < best[1]

@@ -90,18 +90,18 @@ def render(
         >>> frame.colour.shape, frame.layer("albedo").shape
         ((48, 64, 3), (48, 64, 3))
     """
-    given = [cameras] if isinstance(cameras, Camera | Viewpoint) else list(cameras)
-    found = [home.viewpoint(camera) for camera in given]
-    if not found:
+    requested = [cameras] if isinstance(cameras, Camera | Viewpoint) else list(cameras)
+    viewpoints = [home.viewpoint(camera) for camera in requested]
+    if not viewpoints:
         raise BadInput(home.id, "cameras", "give at least one")
-    for one in found:
-        if one.room == OUTSIDE:
-            x, y, z = one.camera.eye
+    for viewpoint in viewpoints:
+        if viewpoint.room == OUTSIDE:
+            x, y, z = viewpoint.camera.eye
             warn_caller(f"{home.id}: the camera at ({x:.2f}, {y:.2f}, {z:.2f}) is in no room")
-    recipe = _recipe_of_view(home, found, size)
+    recipe = _recipe_of_view(home, viewpoints, size)
     want = _wanted(modes, layers)
-    with _progress_of(home, found, observe, progress) as tell:
-        frames = home.renderer.frames(home.source, recipe, found, want, tell)
+    with _progress_of(home, viewpoints, observe, progress) as tell:
+        frames = home.renderer.frames(home.source, recipe, viewpoints, want, tell)
     return frames[0] if isinstance(cameras, Camera | Viewpoint) else frames
 
 
@@ -138,13 +138,13 @@ def film(
         ['frame_00000', 'frame_00001']
     """
     n = max(1, round(fps * seconds))
-    given = [cameras] * n if isinstance(cameras, Camera | Viewpoint) else list(cameras)
-    if len(given) != n:
-        text = f"{fps:g} frames a second for {seconds:g} s are {n} frames, not {len(given)}"
+    per_frame = [cameras] * n if isinstance(cameras, Camera | Viewpoint) else list(cameras)
+    if len(per_frame) != n:
+        text = f"{fps:g} frames a second for {seconds:g} s are {n} frames, not {len(per_frame)}"
         raise BadInput(home.id, "cameras", text)
     if rig is not None:
         home = home.set(rig=_rig_of(rig))
-    frames = film_viewpoints([home.viewpoint(camera) for camera in given], fps, from_s)
+    frames = film_viewpoints([home.viewpoint(camera) for camera in per_frame], fps, from_s)
     recipe = _recipe_of_view(home, frames, size)
     frames = rig_viewpoints(frames, recipe.rig_in_use)
     with _progress_of(home, frames, observe, progress) as tell:
@@ -153,8 +153,10 @@ def film(
 
 
 def _rig_of(rig: str | Path | Mapping[str, Any]) -> dict[str, Any]:
-    found = rig_from_table(rig, "rig") if isinstance(rig, Mapping) else rig_from_toml(Path(rig))
-    return found.model_dump(exclude_unset=True)
+    rig_fields = (
+        rig_from_table(rig, "rig") if isinstance(rig, Mapping) else rig_from_toml(Path(rig))
+    )
+    return rig_fields.model_dump(exclude_unset=True)
 
 
 @contextmanager
@@ -168,7 +170,7 @@ def _progress_of(
     if not progress:
         yield observe or (lambda _view: None)
         return
-    ids = [one.id for one in viewpoints]
+    ids = [viewpoint.id for viewpoint in viewpoints]
     began_s = time.monotonic()
     with progress_reporter(1, as_json=False) as report:
 
@@ -189,30 +191,31 @@ def _progress_of(
 
 def _words(given: Words, name: str) -> tuple[str, ...]:
     """Names as a tuple, of one or of several."""
-    found: tuple[str, ...] = as_words(given)
-    for word in found:
+    names: tuple[str, ...] = as_words(given)
+    for word in names:
         check_argument("render", name, word, str)
-    return found
+    return names
 
 
 def _wanted(modes: Words, layers: Words) -> Wanted:
     # An empty list asks for labels alone, where the command line takes it for all modes.
-    asked = tuple(name for name in _words(layers, "layers") if name not in _ALWAYS)
-    return wanted_of(Wanted(modes=_words(modes, "modes"), layers=asked))
+    label_layers = tuple(name for name in _words(layers, "layers") if name not in _ALWAYS)
+    return wanted_of(Wanted(modes=_words(modes, "modes"), layers=label_layers))
 
 
 def _recipe_of_view(
     home: Home, viewpoints: Sequence[Viewpoint], size: tuple[int, int] | None
 ) -> Recipe:
     """The home's recipe with the size of the pictures and where their cameras come from."""
-    fields = {id(one.chosen_by): one.chosen_by for one in viewpoints}
+    fields = {id(viewpoint.chosen_by): viewpoint.chosen_by for viewpoint in viewpoints}
     if len({f.model_dump_json() if f else "" for f in fields.values()}) > 1:
         raise BadInput(
             home.id, "cameras", "were chosen in different ways", hint="render them apart"
         )
     chosen_by = viewpoints[0].chosen_by
     sizes = {
-        (one.camera.intrinsics.width_px, one.camera.intrinsics.height_px) for one in viewpoints
+        (viewpoint.camera.intrinsics.width_px, viewpoint.camera.intrinsics.height_px)
+        for viewpoint in viewpoints
     }
     settings: dict[str, object] = {}
     if chosen_by is None:
@@ -256,21 +259,21 @@ def render_homes(
         >>> len(pf.render_homes([small], out="homes", views=1, modes=["opengl_dl"]))
         1
     """
-    every = [homes] if isinstance(homes, Home) else list(homes)
-    for home in every:
+    all_homes = [homes] if isinstance(homes, Home) else list(homes)
+    for home in all_homes:
         check_argument("render_homes", "homes", home, Home)
-    if not every:
+    if not all_homes:
         raise BadInput("render_homes", "homes", "give at least one")
-    made_with = [_recipe_of_home(home, recipe) for home in every]
-    for home, other in zip(every, made_with, strict=True):
-        if other.digest() != made_with[0].digest():
+    made_with = [_recipe_of_home(home, recipe) for home in all_homes]
+    for home, home_recipe in zip(all_homes, made_with, strict=True):
+        if home_recipe.digest() != made_with[0].digest():
             text = "another recipe than the first home's: one place holds one recipe"
             raise BadInput(home.id, "recipe", text)
     run = Run(
         homes=(),
         store_url=str(out),
         recipe=made_with[0],
-        sources=[home.source for home in every],
+        sources=[home.source for home in all_homes],
         want=_wanted_of_words(modes, layers, views, options),
         n_jobs=jobs,
     )
@@ -282,7 +285,7 @@ def render_homes(
 
     with ExitStack() as stack:
         if progress:
-            heard.append(stack.enter_context(progress_reporter(len(every), as_json=False)))
+            heard.append(stack.enter_context(progress_reporter(len(all_homes), as_json=False)))
         summary = run_local(run, tell)
     _warn_of(summary)
     return open_views(out)
@@ -293,9 +296,9 @@ def _wanted_of_words(
 ) -> Wanted:
     for name in options.keys() - Wanted.model_fields.keys():
         raise TypeError(f"render_homes() got an unexpected keyword argument {name!r}")
-    asked = _words(modes, "modes") or ALL_MODES
-    own = _words(layers, "layers")
-    return wanted_of(Wanted(modes=asked, layers=own, n_views=views or 0, **options))
+    mode_names = _words(modes, "modes") or ALL_MODES
+    layer_names = _words(layers, "layers")
+    return wanted_of(Wanted(modes=mode_names, layers=layer_names, n_views=views or 0, **options))
 
 
 def _recipe_of_home(home: Home, recipe: str | Path | Recipe | None) -> Recipe:
@@ -305,9 +308,9 @@ def _recipe_of_home(home: Home, recipe: str | Path | Recipe | None) -> Recipe:
 
 
 def _warn_of(summary: Summary) -> None:
-    for what, message, command in summary.failures:
+    for subject, message, command in summary.failures:
         again = f"; again by: {command}" if command else ""
-        warn_caller(f"{what}: {message}{again}")
+        warn_caller(f"{subject}: {message}{again}")
     for step, why in summary.lacking.items():
         warn_caller(f"{step} left out: {why}")
     for house, why in summary.without_views:

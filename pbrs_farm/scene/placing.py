@@ -69,7 +69,7 @@ def free_pose(house: House, model: Model, targets: Sequence[Target], seed: int) 
         if pose is not None:
             return pose
     text, hint = f"has no free place for {model.id}", "a smaller thing, or another place"
-    if not any(one.tops for one in surfaces):
+    if not any(surface.tops for surface in surfaces):
         text, hint = f"has no level top, so no free place for {model.id}", _NO_LEVEL
     raise BadInput(house.id, _names_of(targets), text, hint=hint)
 
@@ -86,19 +86,19 @@ def scattered_poses(
     """
     rng = np.random.default_rng([seed, 2])
     surfaces = level_tops_of(house, targets)
-    areas = np.array([one.area_m2 for one in surfaces])
+    areas = np.array([surface.area_m2 for surface in surfaces])
     placed: list[tuple[Model, F64]] = []
     untried = {k: list(range(len(surfaces))) for k in range(len(models))}
     while len(placed) < n and untried:
         which = list(untried)[int(rng.integers(len(untried)))]
         choices = untried[which]
-        at = int(rng.choice(choices, p=areas[choices] / areas[choices].sum()))
-        pose = _stand_on_tops(models[which], surfaces[at].tops, rng)
+        index = int(rng.choice(choices, p=areas[choices] / areas[choices].sum()))
+        pose = _stand_on_tops(models[which], surfaces[index].tops, rng)
         if pose is not None:
             placed.append((models[which], pose))
             continue
         # Skip this target for this model only; smaller models may still fit.
-        choices.remove(at)
+        choices.remove(index)
         if not choices:
             del untried[which]
     if len(placed) < n:
@@ -116,7 +116,7 @@ def floating_poses(
     all else. Equal seeds give equal poses. Raises BadInput where fewer than n fit.
     """
     rng = np.random.default_rng([seed, 3])
-    rooms = [one for one in targets if isinstance(one, Room) and not is_outdoors(one)]
+    rooms = [target for target in targets if isinstance(target, Room) and not is_outdoors(target)]
     volumes = np.array(
         [
             shapely.Polygon(room.polygon).area * max(room.ceiling_y - room.floor_y, 0)
@@ -161,11 +161,11 @@ def level_tops_of(
     For calls that cannot go on without a place. border_m as of tops_of. The message names the
     targets.
     """
-    found = [one for one in tops_of(house, targets, border_m) if one.tops]
-    if not found:
+    with_tops = [target for target in tops_of(house, targets, border_m) if target.tops]
+    if not with_tops:
         text = f"no support has a level surface: {_names_of(targets)}"
         raise BadInput(house.id, "scatter", text, hint=_NO_LEVEL)
-    return found
+    return with_tops
 
 
 def tops_of(
@@ -180,7 +180,7 @@ def tops_of(
     scene = SceneTriangles(house.items)
     rooms = {room.id: room for room in house.rooms}
     border = {} if border_m is None else {"border_m": border_m}
-    found = []
+    all_tops = []
     for target in targets:
         if isinstance(target, Room):
             floor = floor_support(scene, target, **border)
@@ -189,8 +189,8 @@ def tops_of(
             index = next(k for k, item in enumerate(house.items) if item is target)
             room = rooms.get(target.room_id or "") or _space_around(target)
             supports = supports_of_item(scene, index, room, **border)
-        found.append(TargetTops(target, tuple(Worktop(s) for s in _within_sight(supports))))
-    return found
+        all_tops.append(TargetTops(target, tuple(Worktop(s) for s in _within_sight(supports))))
+    return all_tops
 
 
 def upright_at(model: Model, foot: F64, yaw_rad: float) -> F64:

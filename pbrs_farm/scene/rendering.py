@@ -70,15 +70,15 @@ class Renderer:
         """
         key = cache_key(source, recipe)
         with self._lock:
-            made = self._finished.get(key)
-        if made is None:
-            made = self.call(lambda: self._house(source, recipe))
+            finished = self._finished.get(key)
+        if finished is None:
+            finished = self.call(lambda: self._house(source, recipe))
         with self._lock:
-            self._finished[key] = made
+            self._finished[key] = finished
             self._finished.move_to_end(key)
             while len(self._finished) > _N_HOMES:
                 self._finished.popitem(last=False)
-        return made
+        return finished
 
     def sampled(self, source: SourceRef, recipe: Recipe) -> bytes:
         """cameras.json of the step `cameras`.
@@ -236,20 +236,20 @@ class Renderer:
         # In a store of its own: another call may ask for other files of the same view.
         taken = MemoryStore()
         taken.put(keys.RECIPE, json_bytes(recipe))
-        own = replace(work, store=taken)
+        inner = replace(work, store=taken)
         for key in work.store.list(keys.house_key(source.house_id)):
-            at = keys.parse_house_key(key)
-            if at is not None and at.view is None:
+            place = keys.parse_house_key(key)
+            if place is not None and place.view is None:
                 taken.put(key, work.store.get(key))
-        for one in viewpoints:
+        for viewpoint in viewpoints:
             steps = plan.view_steps(want)
             pictures = [step for step in steps if step not in ("truth", "view")]
-            _copy_steps(work.store, taken, source.house_id, one.id, pictures)
+            _copy_steps(work.store, taken, source.house_id, viewpoint.id, pictures)
             for step in steps:
-                self._run(step, replace(own, view_id=one.id))
-            _copy_steps(taken, work.store, source.house_id, one.id, pictures)
-            observe(one.id)
-        refs = tuple(ViewRef(source.house_id, one.id) for one in viewpoints)
+                self._run(step, replace(inner, view_id=viewpoint.id))
+            _copy_steps(taken, work.store, source.house_id, viewpoint.id, pictures)
+            observe(viewpoint.id)
+        refs = tuple(ViewRef(source.house_id, viewpoint.id) for viewpoint in viewpoints)
         return Views(StoredRoot(taken), refs, {})
 
     def _run(self, step: str, work: Work) -> None:
@@ -261,17 +261,17 @@ class Renderer:
         """Write cameras.json of cameras from Python, those of former calls among them."""
         key = keys.house_key(work.house_id, "cameras.json")
         views = {}
-        given = {one.id: one.view for one in viewpoints}
+        new_views = {viewpoint.id: viewpoint.view for viewpoint in viewpoints}
         if work.store.head(key) is not None:
-            held = views_from_json(work.store.get(key), key)
-            views = {name: view for name, view in held.items() if view.origin == "given"}
-            views = _without_other_film(work, views, given)
-        views |= given
-        found = [views[name] for name in sorted(views)]
+            stored = views_from_json(work.store.get(key), key)
+            views = {name: view for name, view in stored.items() if view.origin == "given"}
+            views = _without_other_film(work, views, new_views)
+        views |= new_views
+        all_views = [views[name] for name in sorted(views)]
         # Its digest says where they come from, not which they are: a view's own id does.
         work.store.delete(keys.marker_key(work.house_id, "cameras"))
-        facts = {"views": [[v.id, v.room_id, v.score] for v in found]}
-        data = cameras_json(found, {"source": "given", "n_views": len(found)})
+        facts = {"views": [[v.id, v.room_id, v.score] for v in all_views]}
+        data = cameras_json(all_views, {"source": "given", "n_views": len(all_views)})
         run_unless_done("cameras", work, lambda _work: StepOutput({"cameras.json": data}, facts))
         self._cached(work).forget_views()
 

@@ -59,17 +59,17 @@ def thing(name: str, *, seed: Whole = 0, style: str = "", **parameters: object) 
         >>> round(bed.size_m[0], 3)
         1.6
     """
-    own = _own_name(name)
+    item_name = _own_name(name)
     taste = style_for(np.random.default_rng(keys.seed("thing", "style", seed)), style)
-    rng = np.random.default_rng(keys.seed("thing", own, seed))
-    if own in THINGS:
+    rng = np.random.default_rng(keys.seed("thing", item_name, seed))
+    if item_name in THINGS:
         if parameters:
             raise BadInput(
                 "thing", name, f"has no parameter {next(iter(parameters))!r}", hint="of seed, style"
             )
-        piece, shape = THINGS[own].make(rng, taste)
+        piece, shape = THINGS[item_name].make(rng, taste)
     else:
-        family = families()[own]
+        family = families()[item_name]
         shared = family.shared(rng, taste)
         size = _size(family, name, family.size(rng, taste, *shared), parameters, shared)
         chosen = {key: value for key, value in parameters.items() if key not in _SIZES}
@@ -94,13 +94,13 @@ def thing(name: str, *, seed: Whole = 0, style: str = "", **parameters: object) 
 
 def _own_name(name: str) -> str:
     """The family or item with a name or everyday word; BadInput if no name matches."""
-    own = name if name in families() else _WORDS.get(name, name)
+    kind = name if name in families() else _WORDS.get(name, name)
     called = {family.called: key for key, family in reversed([*families().items()])}
-    own = own if own in families() or own in THINGS else called.get(own, own)
-    if own not in families() and own not in THINGS:
+    kind = kind if kind in families() or kind in THINGS else called.get(kind, kind)
+    if kind not in families() and kind not in THINGS:
         names = {*families(), *THINGS, *_WORDS, *called}
         raise BadInput("thing", name, "no such thing is generated", hint=did_you_mean(name, names))
-    return own
+    return kind
 
 
 def _size(

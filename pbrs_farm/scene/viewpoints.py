@@ -102,13 +102,13 @@ class Viewpoints(Sequence[Viewpoint]):
         """
         rows: list[dict[str, Any]] = [
             {
-                "id": one.id,
-                "room": one.room,
-                "eye": [round(float(v), 2) for v in one.camera.eye],
-                "score": one.view.score,
-                "objects": len(one.view.objects),
+                "id": viewpoint.id,
+                "room": viewpoint.room,
+                "eye": [round(float(v), 2) for v in viewpoint.camera.eye],
+                "score": viewpoint.view.score,
+                "objects": len(viewpoint.view.objects),
             }
-            for one in self
+            for viewpoint in self
         ]
         return Table(("id", "room", "eye", "score", "objects"), rows)
 
@@ -123,14 +123,14 @@ class Viewpoints(Sequence[Viewpoint]):
         try:
             pictures = self.home.sketches(some, _SKETCH_PX)
             cells = "".join(
-                figure_html(_caption(one), rgb, _SKETCH_PX)
-                for one, rgb in zip(some, pictures, strict=True)
+                figure_html(_caption(viewpoint), rgb, _SKETCH_PX)
+                for viewpoint, rgb in zip(some, pictures, strict=True)
             )
         except PbrsError as error:
             # A machine that cannot draw them shows where they are.
             cells = f"<p>{html.escape(str(error))}</p>"
-        left = len(self) - len(some)
-        more = f"<p>... and {left} more</p>" if left else ""
+        n_more = len(self) - len(some)
+        more = f"<p>... and {n_more} more</p>" if n_more else ""
         return f"<div>{self.home.plan(self)}<br>{cells}{more}</div>"
 
 
@@ -156,7 +156,7 @@ def film_viewpoints(
     return [
         Viewpoint(
             replace(
-                one.view,
+                viewpoint.view,
                 id=Shot.of_frame(k).id,
                 origin="given",
                 score=0.0,
@@ -166,11 +166,11 @@ def film_viewpoints(
                 rig=None,
             )
         )
-        for k, one in enumerate(cameras)
+        for k, viewpoint in enumerate(cameras)
     ]
 
 
 def rig_viewpoints(frames: Sequence[Viewpoint], rig: RigFields | None) -> list[Viewpoint]:
     """Each viewpoint as the cameras of a rig take it; as they are without one."""
-    views = add_rig_views([one.view for one in frames], rig)
+    views = add_rig_views([frame.view for frame in frames], rig)
     return [Viewpoint(with_lens(view, LensFields(), rig)) for view in views]

@@ -45,12 +45,12 @@ def balance_classes(shares: F32, n_views: int) -> Bools:
     heap = [(-float(gain), row) for row, gain in enumerate(gains)]
     heapq.heapify(heap)
     # Keep of each view the classes it has, and their shares.
-    held = [(np.nonzero(s)[0], s[s != 0].astype(np.float64)) for s in shares]
+    sparse = [(np.nonzero(s)[0], s[s != 0].astype(np.float64)) for s in shares]
     for _ in range(min(n_views, len(shares))):
         # Compute the top view's gain anew; take it if no other bound is above.
         while True:
             _bound, row = heapq.heappop(heap)
-            classes, share = held[row]
+            classes, share = sparse[row]
             gain = float(np.log1p(share / total[classes]).sum())
             if not heap or (-gain, row) <= heap[0]:
                 break

@@ -101,8 +101,8 @@ def reference_from_histograms(
     Raises BadInput for an empty set, for a single image, and for an image without known depth.
     """
     if len(ids) < 2:
-        what = "holds no image" if not ids else "holds a single image"
-        raise BadInput(source[0], "", f"{what}; a reference needs two at least")
+        problem = "holds no image" if not ids else "holds a single image"
+        raise BadInput(source[0], "", f"{problem}; a reference needs two at least")
     colour = np.stack([h.colour for h in histograms]).astype(np.uint32)
     depth = np.stack([h.depth for h in histograms]).astype(np.uint32)
     # Reject a photograph without depth: it would resemble nothing.
@@ -161,9 +161,9 @@ def reference_from_bytes(data: bytes, name: str) -> Reference:
         raise BadInput(name, "", "not a reference file, or damaged", hint=hint) from None
     # Check that the tables have a row a photograph and the bins of the settings.
     n = len(facts.ids)
-    wanted = (n, facts.settings.colour_bins**3), (n, facts.settings.depth_bins)
-    if n == 0 or (colour.shape, depth.shape) != wanted:
-        raise BadInput(name, "", f"expected histograms {wanted}, got {colour.shape}, {depth.shape}")
+    shapes = (n, facts.settings.colour_bins**3), (n, facts.settings.depth_bins)
+    if n == 0 or (colour.shape, depth.shape) != shapes:
+        raise BadInput(name, "", f"expected histograms {shapes}, got {colour.shape}, {depth.shape}")
     return Reference(facts, colour, depth)
 
 

@@ -102,16 +102,16 @@ class Scorer:
         the root. Nothing comes of no packs.
         """
         # Gather packs until they fill a batch.
-        held: list[HistogramPack] = []
+        batch: list[HistogramPack] = []
         n = 0  # their views
         for pack in packs:
-            held.append(pack)
+            batch.append(pack)
             n += len(pack.views)
             if n >= batch_views:
-                yield self.score(held)
-                held, n = [], 0
-        if held:
-            yield self.score(held)
+                yield self.score(batch)
+                batch, n = [], 0
+        if batch:
+            yield self.score(batch)
 
     def _best(
         self, counts: Sequence[NDArray[np.generic]], references: F32, packs: Sequence[HistogramPack]

@@ -46,17 +46,17 @@ def verdicts(scores: Any, fields: SelectionFields) -> Any:
     # Judge each view by itself: a column per reason.
     rejections = _rejections(scores, fields)
     table = np.stack(list(rejections.values()), axis=1)
-    kept = np.asarray(~table.any(axis=1), np.bool_)
+    is_kept = np.asarray(~table.any(axis=1), np.bool_)
     # Judge those that are left against each other.
-    beyond = _beyond_cap(scores, kept, fields.per_room_cap)
-    kept &= ~beyond
-    surplus = _surplus(scores, kept, fields)
-    kept &= ~surplus
+    beyond = _beyond_cap(scores, is_kept, fields.per_room_cap)
+    is_kept &= ~beyond
+    surplus = _surplus(scores, is_kept, fields)
+    is_kept &= ~surplus
     table = np.column_stack([table, beyond, surplus])
     # Name the first reason and all of them.
-    first = np.where(kept, len(REASONS), table.argmax(axis=1))
+    first = np.where(is_kept, len(REASONS), table.argmax(axis=1))
     names = np.array([*REASONS, ""], object)
-    added = {"kept": pa.array(kept), "reason": pa.array(names[first], pa.string())}
+    added = {"kept": pa.array(is_kept), "reason": pa.array(names[first], pa.string())}
     added["reasons"] = pa.array(_reasons_joined(table), pa.string())
     for name, column in added.items():
         scores = scores.append_column(name, column)
@@ -92,9 +92,11 @@ def _black(scores: Any, brightness: F64, fields: SelectionFields) -> Bools:
     if fields.black_modes == "scored":
         return black
     # Of the other modes only their names are stored, with each view.
-    found = [set(modes.split()) for modes in scores["black"].to_pylist()]
-    wanted = _LIGHT_MODES if fields.black_modes == "light" else set(Mode)
-    return np.asarray(black | np.array([bool(modes & wanted) for modes in found], bool), bool)
+    black_modes = [set(modes.split()) for modes in scores["black"].to_pylist()]
+    light_modes = _LIGHT_MODES if fields.black_modes == "light" else set(Mode)
+    return np.asarray(
+        black | np.array([bool(modes & light_modes) for modes in black_modes], bool), bool
+    )
 
 
 def _floats(scores: Any, name: str) -> F64:

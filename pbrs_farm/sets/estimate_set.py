@@ -106,7 +106,7 @@ class SetEstimate(Record):
         )
         of = prices()[cloud]
         return tuple(
-            _bill_line(what, amount, of.get(name), per) for what, amount, name, per in amounts
+            _bill_line(item, amount, of.get(name), per) for item, amount, name, per in amounts
         )
 
 
@@ -156,9 +156,9 @@ def _on_cloud(
     name: str, of: Mapping[PriceName, Price], whole: RunCost, n_bytes: float
 ) -> CloudCost:
     def usd(*amounts: tuple[PriceName, float]) -> float | None:
-        if any(what not in of for what, _amount in amounts):
+        if any(name not in of for name, _amount in amounts):
             return None
-        return round(sum(of[what].usd * amount for what, amount in amounts), 2)
+        return round(sum(of[name].usd * amount for name, amount in amounts), 2)
 
     cpu, gpu, beside = (s / _HOUR_S for s in (whole.cpu_s, whole.gpu_s, whole.cpu_beside_gpu_s))
     return CloudCost(

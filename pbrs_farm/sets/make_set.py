@@ -80,14 +80,14 @@ def claim_folder(out: Path, data_set: DataSet) -> None:
         return
     if out.exists() and not out.is_dir():
         raise BadInput(out, "", "is no folder")
-    others = [path.name for path in sorted(out.iterdir())] if out.is_dir() else []
+    files = [path.name for path in sorted(out.iterdir())] if out.is_dir() else []
     ours = (_PARTS, data_set.file)
-    others = [name for name in others if name not in ours and not name.startswith(".")]
-    sets = [name for name in others if name.endswith(".toml")]
+    files = [name for name in files if name not in ours and not name.startswith(".")]
+    sets = [name for name in files if name.endswith(".toml")]
     if sets:
         raise BadInput(out, sets[0], "is another set's file", hint="name a new folder")
-    if others:
-        raise BadInput(out, others[0], "is no part of this set", hint="name a new folder")
+    if files:
+        raise BadInput(out, files[0], "is no part of this set", hint="name a new folder")
     FolderStore(out).put(data_set.file, data_set.data)
 
 
@@ -129,20 +129,22 @@ def finish_set(
     export and pack.
     """
     steps = _Steps(out, tell)
-    made = [_judged_part(data_set, part, out, planned[part.name], steps) for part in data_set.parts]
-    by_name = {of.part.name: of for of in made}
+    parts = [
+        _judged_part(data_set, part, out, planned[part.name], steps) for part in data_set.parts
+    ]
+    by_name = {of.part.name: of for of in parts}
     for form in data_set.forms:
         for name in form.parts:
             _write_form(data_set, form, by_name[name], out, steps)
     texts = {
-        _INDEX: _index_text(data_set, made),
-        _CARD: card_text(data_set, [(of.part, of.root, of.kept, of.reasons) for of in made]),
+        _INDEX: _index_text(data_set, parts),
+        _CARD: card_text(data_set, [(of.part, of.root, of.kept, of.reasons) for of in parts]),
     }
     for file, text in texts.items():
         steps.sums[file] = keys.sha256(text.encode())
         steps.write(file, text.encode())
     steps.sums[data_set.file] = keys.sha256(data_set.data)
-    for of in made:
+    for of in parts:
         steps.sums |= _root_sums(of, out)
     # in the order of names, to compare two lists line by line
     lines = (f"{digest}  {name}\n" for name, digest in sorted(steps.sums.items()))
@@ -168,9 +170,9 @@ class _Steps:
         files: its files, below the set's folder.
         """
         key = f"done/{name}.json"
-        held = json.loads(get_or_none(self.store, key) or b"{}")
-        sums = held.get("files", {})
-        is_done = held.get("digest") == digest and all((self.out / f).is_file() for f in sums)
+        marker = json.loads(get_or_none(self.store, key) or b"{}")
+        sums = marker.get("files", {})
+        is_done = marker.get("digest") == digest and all((self.out / f).is_file() for f in sums)
         if not is_done:
             make()
             sums = {file: digest_of_regular(self.out / file) for file in sorted(files())}
@@ -196,10 +198,10 @@ def _judged_part(
     files = [keys.SELECTION, keys.selection_key(data_set.name, "jsonl")]
 
     def judge() -> None:
-        wanted = {(house, view) for house, views in planned.items() for view in views}
-        entries = [e for e in views_of(root) if (e.house.id, e.id) in wanted]
-        found = judged_by(entries, part.rules)
-        write_verdicts(FolderStore(root), data_set.name, part.rules, found)
+        chosen = {(house, view) for house, views in planned.items() for view in views}
+        entries = [e for e in views_of(root) if (e.house.id, e.id) in chosen]
+        verdicts = judged_by(entries, part.rules)
+        write_verdicts(FolderStore(root), data_set.name, part.rules, verdicts)
 
     digest = keys.digest("select", part.rules, _manifest_digest(root), pbrs_farm.__version__)
     below = root.relative_to(out).as_posix()

@@ -49,17 +49,17 @@ def _table(columns: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
 
 
 def _split_rows(data_set: DataSet, made: Sequence[MadeViews]) -> Iterator[tuple[object, ...]]:
-    for part, _root, kept, _reasons in made:
+    for part, _root, verdicts, _reasons in made:
         of: dict[str, list[RuleVerdict]] = {}
-        for verdict in kept:
+        for verdict in verdicts:
             shares = data_set.shares
             split = split_of_house(verdict.house, shares) if shares else "all"
             of.setdefault(split, []).append(verdict)
         for split in (*SPLITS, "all"):
-            if own := of.get(split):
-                houses = {verdict.house for verdict in own}
+            if split_rows := of.get(split):
+                houses = {verdict.house for verdict in split_rows}
                 homes = {home_of(house) for house in houses}
-                yield part.name, split, len(homes), len(houses), len(own)
+                yield part.name, split, len(homes), len(houses), len(split_rows)
 
 
 def _split_text(data_set: DataSet) -> str:

@@ -338,8 +338,8 @@ class LaidOutStore:
 
     def _member(self, place: str, pack: Pack, name: str) -> bytes | None:
         """A member's bytes; None if another pack has replaced it."""
-        if (held := pack.held(name)) is not None:
-            return held
+        if (packed := pack.held(name)) is not None:
+            return packed
         _step, start, n_bytes = pack.rows[name]
         try:
             data = self.inner.get_range(place, start - TAR_BLOCK, TAR_BLOCK + n_bytes)
@@ -493,7 +493,7 @@ def _digest(marker: bytes) -> object:
 
 
 def _others(group: str, step: str) -> Iterable[str]:
-    return (other for other in GROUPS.get(group, ()) if other not in (step, group))
+    return (name for name in GROUPS.get(group, ()) if name not in (step, group))
 
 
 def _house_key(key: str) -> keys.HouseKey:

@@ -51,20 +51,20 @@ def pack_bytes(steps: Mapping[str, Mapping[str, bytes]]) -> bytes:
     is done. Bytes depend on the members alone (no times, no owners): equal steps give equal packs.
     An ordinary `tar` opens it.
     """
-    found = [
+    files = [
         (name, step, data) for step, members in steps.items() for name, data in members.items()
     ]
-    found.sort(key=lambda row: (not row[0].startswith("done/"), len(row[2]), row[0]))
+    files.sort(key=lambda row: (not row[0].startswith("done/"), len(row[2]), row[0]))
     # Places count from the index's end, so that its length does not depend on them.
     rows, offset = [], 0
-    for name, step, data in found:
+    for name, step, data in files:
         offset += TAR_BLOCK
         rows.append([name, step, offset, len(data)])
         offset += _padded(len(data))
     index = json.dumps({"format": FORMAT, "members": rows}, separators=(",", ":")).encode()
     out = io.BytesIO()
     with tarfile.open(fileobj=out, mode="w", format=tarfile.USTAR_FORMAT) as tar:
-        for name, data in [(_INDEX, index), *((name, data) for name, _step, data in found)]:
+        for name, data in [(_INDEX, index), *((name, data) for name, _step, data in files)]:
             entry = tarfile.TarInfo(name)
             entry.size = len(data)
             tar.addfile(entry, io.BytesIO(data))

@@ -38,16 +38,16 @@ def add_diffuse_images(result: LightResult, sums: SampleSums, spp: int) -> Light
     that have a layer.
     """
     assert sums.diffuse_albedo is not None
-    found = {ALBEDO: sums.diffuse_albedo}
+    totals = {ALBEDO: sums.diffuse_albedo}
     for group, name in IMAGE_OF_GROUP.items():
-        found[name] = getattr(sums, f"diffuse_{group.value}")
+        totals[name] = getattr(sums, f"diffuse_{group.value}")
     for number in result.lamps:
         assert sums.diffuse_lamps is not None
-        found[f"diffuse_{layer_name(number)}"] = sums.diffuse_lamps[:, number - 1]
+        totals[f"diffuse_{layer_name(number)}"] = sums.diffuse_lamps[:, number - 1]
     shape = result.outdoor.shape
     images = {
         name: np.ascontiguousarray((total / np.float32(spp)).reshape(shape))
-        for name, total in found.items()
+        for name, total in totals.items()
     }
     return replace(result, diffuse=images)
 

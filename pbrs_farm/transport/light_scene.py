@@ -193,12 +193,12 @@ class LightScene:
         """
         # Emitters and their weights are those of the pilot's view; it is kept for the next one.
         view_pilot = pilot or Pilot(camera, seed, self._time_s)
-        kept = checkpoint or NoCheckpoint()
+        saved = checkpoint or NoCheckpoint()
         move = self._mover(camera, shutter_s)
         now_s = self._time_s
         try:
             result = self._render(
-                camera, room_id, fields, seed, kept, view_pilot, anchors, splits_diffuse, move
+                camera, room_id, fields, seed, saved, view_pilot, anchors, splits_diffuse, move
             )
         finally:
             self.move_to(now_s)

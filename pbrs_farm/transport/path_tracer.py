@@ -419,7 +419,7 @@ def _trace(
     )
     l_out, l_in = mi.Color3f(0), mi.Color3f(0)  # light of the path under way
     s = mi.UInt32(first)  # its sample
-    seen = mi.Bool(False)  # whether it has met a rough surface
+    is_past_rough = mi.Bool(False)  # whether it has met a rough surface
     fresh = mi.Bool(True)  # whether it has yet to start
     active = s < last
     x0, y0 = mi.Float(pixel_width[0] % pixel_width[1]), mi.Float(pixel_width[0] // pixel_width[1])
@@ -433,10 +433,10 @@ def _trace(
     while active:
         # Start the next sample where the last path has ended.
         sampler = SobolSampler(key, s)
-        at = film_position(sampler.get_2d(mi.UInt32(0)), context.fields.is_tent)
-        path = dr.select(fresh, camera_path(camera, corner, at, sampler), path)
+        sample = film_position(sampler.get_2d(mi.UInt32(0)), context.fields.is_tent)
+        path = dr.select(fresh, camera_path(camera, corner, sample, sampler), path)
         l_out, l_in = dr.select(fresh, mi.Color3f(0), l_out), dr.select(fresh, mi.Color3f(0), l_in)
-        seen = seen & ~fresh
+        is_past_rough = is_past_rough & ~fresh
         pane.start(fresh)
         if dr.hint(context.splits_white, mode="scalar"):
             diffuse.start(fresh)
@@ -451,9 +451,9 @@ def _trace(
             _add_by_lamp(beside.diffuse_lamps, result, brought, active)
         _count_techniques(beside.counts, context, result, active)
         _count_arrivals(beside, context, result, active)
-        first_rough = result.is_rough & ~seen
-        sums.add_guides(result, seen, first_rough, pane.share)
-        seen = seen | first_rough
+        first_rough = result.is_rough & ~is_past_rough
+        sums.add_guides(result, is_past_rough, first_rough, pane.share)
+        is_past_rough = is_past_rough | first_rough
 
         # Where the path ends, follow what glass has mirrored; close the sample where it has not.
         done = active & ~alive
@@ -462,7 +462,7 @@ def _trace(
             turns = done & pane.waits
             path = dr.select(turns, pane.path(path), path)
             pane.turn(turns)
-            seen, done = seen & ~turns, done & ~turns
+            is_past_rough, done = is_past_rough & ~turns, done & ~turns
             if dr.hint(context.splits_white, mode="scalar"):
                 diffuse.end(turns)
         if dr.hint(context.splits_white, mode="scalar"):

@@ -172,8 +172,8 @@ def _plus(total: SampleSums | None, sums: SampleSums) -> SampleSums:
 
 def _kept_sums(checkpoint: RenderCheckpoint, part: str) -> tuple[SampleSums | None, int]:
     """(sums, samples per pixel) of a part as they were kept."""
-    kept = checkpoint.kept(part)
-    return (sums_from_arrays(kept), int(kept[_SPP])) if kept else (None, 0)
+    arrays = checkpoint.kept(part)
+    return (sums_from_arrays(arrays), int(arrays[_SPP])) if arrays else (None, 0)
 
 
 def _state_of(total: SampleSums, spp: int) -> Callable[[], Arrays]:

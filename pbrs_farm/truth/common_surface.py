@@ -63,11 +63,11 @@ def shared_surface(views: Sequence[View], first_hit: FirstHit) -> F64:
         t, face = first_hit(np.broadcast_to(origin, flat.shape), flat)
         hit = face >= 0
         points, faces = origin + t[hit, None].astype(np.float64) * flat[hit], face[hit]
-        for b, other in enumerate(small):
+        for b, partner in enumerate(small):
             if a != b and len(points):
-                px, z = project_points(points, other)
-                inside = inside_picture(px, z, other)
-                visible = reaches(points[inside], faces[inside], other, first_hit)
+                px, z = project_points(points, partner)
+                inside = inside_picture(px, z, partner)
+                visible = reaches(points[inside], faces[inside], partner, first_hit)
                 shares[a, b] = visible.sum() / len(points)
     return shares
 

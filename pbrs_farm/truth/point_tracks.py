@@ -111,6 +111,6 @@ def _taken(points: F64, faces: I32, motions: tuple[I64, F64]) -> F64:
     number_of_face, matrices = motions
     number, moved = number_of_face[faces], points.copy()
     for k in range(1, len(matrices)):
-        own = number == k
-        moved[own] = transform_points(matrices[k], points[own])
+        is_moved = number == k
+        moved[is_moved] = transform_points(matrices[k], points[is_moved])
     return moved

@@ -87,9 +87,9 @@ class Farm:
         For a server that took the token from a request and asks for its user. Ledger, store and
         registry are shared with this object; neither one's rights change the other's.
         """
-        other = copy.copy(self)
-        other.rights = Rights(self.users, self.config.token, user, place)
-        return other
+        farm = copy.copy(self)
+        farm.rights = Rights(self.users, self.config.token, user, place)
+        return farm
 
     @cached_property
     def store(self) -> Store:
@@ -145,10 +145,10 @@ class Farm:
         }
         # Workers that name no store, and a farm without workers, prove nothing.
         if theirs and known_store_id(self.store) not in theirs:
-            held = ", ".join(sorted(set(theirs.values()))[:3])
+            urls = ", ".join(sorted(set(theirs.values()))[:3])
             hint = "--store URL, or PBRS_STORE; or start workers on this store"
             raise BadInput(
-                self.store.url, "", f"no worker has this store, they have {held}", hint=hint
+                self.store.url, "", f"no worker has this store, they have {urls}", hint=hint
             )
 
     def check_plugins(self, marks: Collection[str]) -> list[str]:
@@ -229,12 +229,12 @@ class Farm:
         By time of entry in the ledger. If the ledger is empty but the store is not, the error suggests
         recover.
         """
-        known = self.ledger.known_jobs()
-        if not known:
+        jobs = self.ledger.known_jobs()
+        if not jobs:
             lost = self.lost_jobs()
             hint = f"`pbrs-farm recover {lost[-1]}`" if lost else "`pbrs-farm submit HOME`"
             raise BadInput("farm", "", "no job in the ledger", hint=hint)
-        return known[-1]
+        return jobs[-1]
 
     def lost_jobs(self) -> list[str]:
         """Jobs that the store knows and an empty ledger does not; [] where it holds any job.
@@ -318,8 +318,8 @@ class Farm:
         from workers.job import houses_from_lines
 
         entries = houses_from_lines(self.store.get(job_key(check_job_id(job), "houses.jsonl")))
-        asked = (e.house_id for e in entries if e.house_id not in besides)
-        return set(self.ledger.finished(job, asked))
+        candidates = (e.house_id for e in entries if e.house_id not in besides)
+        return set(self.ledger.finished(job, candidates))
 
     def logs(self, job: str, text: str, attempt: int | None = None) -> str:
         """The stored log of a task's attempt (the last one by default); BadInput if there is none.
@@ -330,16 +330,16 @@ class Farm:
         task = task_from_text(text)
         # One object an attempt, in the folder of the task's unit.
         folder = log_key(job, str(task), 0).rpartition("/")[0] + "/"
-        found = attempts_from_log_keys(job, str(task), self.store.list(folder))
+        logs = attempts_from_log_keys(job, str(task), self.store.list(folder))
         # Take the last attempt unless one is named.
-        chosen = attempt if attempt is not None else max(found, default=0)
-        if chosen not in found:
+        chosen = attempt if attempt is not None else max(logs, default=0)
+        if chosen not in logs:
             self.check_task(job, task)
             hint = "logs are kept of failed attempts and of tasks that run for a minute"
-            if found:
-                hint = f"of attempts {', '.join(map(str, sorted(found)))}"
+            if logs:
+                hint = f"of attempts {', '.join(map(str, sorted(logs)))}"
             raise BadInput(text, "", "no log stored", hint=hint)
-        return self.store.get(found[chosen]).decode("utf-8", "replace")
+        return self.store.get(logs[chosen]).decode("utf-8", "replace")
 
     def check_task(self, job: str, task: TaskId) -> None:
         """Raises BadInput, saying which part is unknown, where the job has no such task."""
@@ -437,8 +437,8 @@ class Farm:
         What is not given stays. Tasks that run already are not stopped by a lower one. BadInput
         when neither is given, for a job that the ledger has not, and for another user's.
         """
-        given = {"max_slots": max_slots, "budget_h": budget_h}
-        chosen = {name: n for name, n in given.items() if n is not None}
+        limits = {"max_slots": max_slots, "budget_h": budget_h}
+        chosen = {name: n for name, n in limits.items() if n is not None}
         if not chosen:
             raise BadInput("limit", "", "nothing to change", hint="--max-slots N, --budget HOURS")
         for name, number in chosen.items():
@@ -510,9 +510,9 @@ class Farm:
         from workers.job import houses_from_lines
 
         data = self.store.get(job_key(check_job_id(job), "houses.jsonl"))
-        known = [entry.house_id for entry in houses_from_lines(data)]
-        if house not in known:
-            raise BadInput(house, "", "the job has no such house", hint=did_you_mean(house, known))
+        houses = [entry.house_id for entry in houses_from_lines(data)]
+        if house not in houses:
+            raise BadInput(house, "", "the job has no such house", hint=did_you_mean(house, houses))
         return [{"task": house, "state": "its house is not admitted yet"}]
 
 

@@ -64,17 +64,17 @@ def garbage(farm: Farm, keep_s: float, now_s: float) -> list[Garbage]:
     working = {
         house for job, s in states.items() if s in _LIVE for house in _houses_of_job(store, job)
     }
-    found: list[tuple[Kind, Iterable[str]]] = [
+    groups: list[tuple[Kind, Iterable[str]]] = [
         ("cancelled jobs", cancelled),
         ("logs", logs),
         ("named by no manifest", _unnamed(store, working)),
     ]
     # An object counts once, under the first kind that has it.
-    seen: set[str] = set()
+    taken: set[str] = set()
     kinds = []
-    for kind, candidates in found:
-        old = {k: n for k in candidates if k not in seen and (n := is_old(k)) is not None}
-        seen |= old.keys()
+    for kind, candidates in groups:
+        old = {k: n for k in candidates if k not in taken and (n := is_old(k)) is not None}
+        taken |= old.keys()
         kinds.append(Garbage(kind, tuple(sorted(old)), sum(old.values())))
     return kinds
 
@@ -137,8 +137,8 @@ def _houses_of_job(store: Store, job: str) -> list[str]:
 def _unnamed(store: Store, working: set[str]) -> Iterator[str]:
     """Objects of houses that no job works on and their own manifest does not name."""
     for root in keys.FOLDERS:
-        found = (key for key in store.list(f"{root}/") if key.count("/") >= 2)
-        for house, group in groupby(sorted(found), key=lambda key: key.split("/")[1]):
+        objects = (key for key in store.list(f"{root}/") if key.count("/") >= 2)
+        for house, group in groupby(sorted(objects), key=lambda key: key.split("/")[1]):
             if house in working:
                 continue
             manifest = get_or_none(store, keys.house_key(house, keys.MANIFEST))

@@ -42,10 +42,10 @@ class Rights:
             raise BadInput(
                 "PBRS_TOKEN", "", "this farm has users: a token says who asks", hint=hint
             )
-        found = self._users.named_by(self._token.reveal())
-        if found is None:
+        user = self._users.named_by(self._token.reveal())
+        if user is None:
             raise BadInput("PBRS_TOKEN", "", "is no user's token")
-        return found
+        return user
 
     def check_owner(self, job: str, owner: str) -> None:
         """Raises BadInput where the job is another user's; an admin may steer all.

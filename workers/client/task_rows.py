@@ -33,19 +33,20 @@ def explain_tasks(
     states = ledger.unit_states(view.job_id, house)
     batches = ledger.batches(view.job_id, house)
     # The house's hash holds other fields beside its units.
-    units = {u: at for u, at in states.items() if u == WHOLE or u.isdigit() or u[:1] == "s"}
-    units = {u: at for u, at in units.items() if ":" in at}
-    wanted = rest.partition("/")[0]
+    units = {u: state for u, state in states.items() if u == WHOLE or u.isdigit() or u[:1] == "s"}
+    units = {u: state for u, state in units.items() if ":" in state}
+    unit = rest.partition("/")[0]
     # A view names the batch that holds it.
-    if states and wanted and wanted not in units:
-        holding = [str(k) for k, views in enumerate(batches) if wanted in views]
+    if states and unit and unit not in units:
+        holding = [str(k) for k, views in enumerate(batches) if unit in views]
         if not holding:
             raise BadInput(text, "", "the job has no such task or view")
         units = {holding[0]: units[holding[0]]}
-    elif wanted:
-        units = {u: at for u, at in units.items() if u == wanted}
+    elif unit:
+        units = {u: state for u, state in units.items() if u == unit}
     rows = [
-        _row_of_task(ledger, view.job_id, house, u, at, batches) for u, at in sorted(units.items())
+        _row_of_task(ledger, view.job_id, house, u, state, batches)
+        for u, state in sorted(units.items())
     ]
     for row in rows:
         if "worker" in row:
@@ -92,12 +93,12 @@ def _facts_of_holder(
     # Light on a GPU has another lease time.
     gpu = stage == LIGHT and view.uses_gpu
     left_s = ledger.lease_left_s(view.job_id, row["task"], LIGHT_GPU if gpu else stage)
-    seen = {w.name: w.age_s for w in registry.workers()}
-    found: dict[str, Any] = {} if left_s is None else {"lease_s": round(max(0.0, left_s), 1)}
-    age_s = seen.get(row["worker"])
+    ages = {w.name: w.age_s for w in registry.workers()}
+    facts: dict[str, Any] = {} if left_s is None else {"lease_s": round(max(0.0, left_s), 1)}
+    age_s = ages.get(row["worker"])
     if age_s is None or age_s > ALIVE_S:
-        found["silent_s"] = None if age_s is None else round(age_s, 1)
-    return found
+        facts["silent_s"] = None if age_s is None else round(age_s, 1)
+    return facts
 
 
 def _obstacle(registry: Registry, view: JobView, task: str) -> str:

@@ -132,8 +132,8 @@ def workers_text(rows: Sequence[Mapping[str, Any]]) -> str:
 
 def memory_text(row: Mapping[str, Any]) -> str:
     """ "3.2 of 15.6 GB" that a worker's processes hold of its machine; "-" when not known."""
-    held, has = (float(row.get(name) or 0) / 1024 for name in ("memory_mb", "machine_mb"))
-    return f"{held:.1f} of {has:.1f} GB" if held else "-"
+    used, has = (float(row.get(name) or 0) / 1024 for name in ("memory_mb", "machine_mb"))
+    return f"{used:.1f} of {has:.1f} GB" if used else "-"
 
 
 def jobs_text(rows: Sequence[Mapping[str, Any]]) -> str:

@@ -76,17 +76,17 @@ class Dispatcher:
         """
         windows = self._windows(views)
         room = {pool: _free_in_window(views, pool, n) for pool, n in windows.items()}
-        given = self._turns.split(room, views, windows=windows, share_of=self._share_of)
+        quotas = self._turns.split(room, views, windows=windows, share_of=self._share_of)
         ceilings = _Ceilings(views, self.users)
         spare = {
-            pool: max(0, n - sum(of_job[pool] for of_job in given.values()))
+            pool: max(0, n - sum(of_job[pool] for of_job in quotas.values()))
             for pool, n in room.items()
         }
         # Send each job its quota. Fewer tasks may be available: a ready task may be waiting for its
         # next
         # attempt. So the rest of one job's quota goes to the next, and finally to any job with
         # more.
-        n_sent, with_more = self._send_round(views, given, spare, ceilings)
+        n_sent, with_more = self._send_round(views, quotas, spare, ceilings)
         if any(spare.values()):
             n_sent += self._send_round(with_more, {}, spare, ceilings)[0]
         return n_sent
@@ -126,8 +126,8 @@ class Dispatcher:
         """
         n_sent, with_more = 0, []
         for view in views:
-            own = given.get(view.job_id, {})
-            most = {pool: n + own.get(pool, 0) for pool, n in spare.items()}
+            quota = given.get(view.job_id, {})
+            most = {pool: n + quota.get(pool, 0) for pool, n in spare.items()}
             sent = self._send_job(view, ceilings.limit(most, view))
             n_sent += sent.total()
             ceilings.count(view, sent.total())
@@ -235,10 +235,10 @@ def _free_in_window(views: Sequence[JobView], pool: str, window: int) -> int:
 
 
 def _by_stage(tasks: Iterable[str]) -> dict[str, list[TaskId]]:
-    found: dict[str, list[TaskId]] = {}
+    by_stage: dict[str, list[TaskId]] = {}
     for task in map(task_from_text, tasks):
-        found.setdefault(task.stage, []).append(task)
-    return found
+        by_stage.setdefault(task.stage, []).append(task)
+    return by_stage
 
 
 def _groups(tasks: Sequence[TaskId], most: int) -> Iterator[list[TaskId]]:

@@ -52,45 +52,45 @@ class FarmAlerts:
         posted once when it begins, and once when it ends.
         """
         now = self._clock()
-        found: dict[str, str] = {}
+        alerts: dict[str, str] = {}
         for view in views:
-            found |= self._of_job(view, now)
+            alerts |= self._of_job(view, now)
         for worker in workers:
             if worker.state == "dead" and worker.age_s < _LOST_S:
                 since = f"silent for {worker.age_s:.0f} s; its tasks go to others"
-                found[f"lost worker {worker.name}"] = since
+                alerts[f"lost worker {worker.name}"] = since
         self._trouble_at = None if not breaker else self._trouble_at or now
         if self._trouble_at is not None and now - self._trouble_at >= _STORE_S:
-            found["store"] = breaker
+            alerts["store"] = breaker
         # A missing job ends its alerts too.
         self._jobs = {v.job_id: self._jobs[v.job_id] for v in views}
-        for name in found.keys() - self._posted.keys():
-            self._post_alert(name, "begins", found[name])
-        for name in self._posted.keys() - found.keys():
+        for name in alerts.keys() - self._posted.keys():
+            self._post_alert(name, "begins", alerts[name])
+        for name in self._posted.keys() - alerts.keys():
             self._post_alert(name, "over", self._posted[name])
 
     def _of_job(self, view: JobView, now: float) -> dict[str, str]:
         done = sum(n for name, n in view.counts.items() if name.startswith("done:"))
         failed = sum(n for name, n in view.counts.items() if name.startswith("failures:"))
-        seen = self._jobs.setdefault(view.job_id, _Seen(deque([(now, failed, done)]), now))
-        found = {}
+        history = self._jobs.setdefault(view.job_id, _Seen(deque([(now, failed, done)]), now))
+        alerts = {}
         # Attempts that ended within the window.
-        while len(seen.ended) > 1 and seen.ended[0][0] < now - _WINDOW_S:
-            seen.ended.popleft()
-        n_failed, n_done = failed - seen.ended[0][1], done - seen.ended[0][2]
+        while len(history.ended) > 1 and history.ended[0][0] < now - _WINDOW_S:
+            history.ended.popleft()
+        n_failed, n_done = failed - history.ended[0][1], done - history.ended[0][2]
         n_ended = n_failed + n_done
         if n_ended >= _LEAST_ATTEMPTS and n_failed > _MOST_FAILED * n_ended:
-            said = f"{n_failed:.0f} of {n_ended:.0f} attempts of the last minutes failed"
-            found[f"failures of job {view.job_id}"] = said
+            text = f"{n_failed:.0f} of {n_ended:.0f} attempts of the last minutes failed"
+            alerts[f"failures of job {view.job_id}"] = text
         # Tasks wait, the job runs, and nothing ends.
         waiting = sum(n for name, n in view.counts.items() if name[-2:] in (":w", ":q"))
-        if view.state != "running" or not waiting or done + failed != sum(seen.ended[-1][1:]):
-            seen.moved_at = now
-        elif now - seen.moved_at >= _STUCK_S:
-            said = f"{waiting:.0f} tasks wait and none has ended for {(now - seen.moved_at) / 60:.0f} minutes"
-            found[f"stuck job {view.job_id}"] = said
-        seen.ended.append((now, failed, done))
-        return found
+        if view.state != "running" or not waiting or done + failed != sum(history.ended[-1][1:]):
+            history.moved_at = now
+        elif now - history.moved_at >= _STUCK_S:
+            text = f"{waiting:.0f} tasks wait and none has ended for {(now - history.moved_at) / 60:.0f} minutes"
+            alerts[f"stuck job {view.job_id}"] = text
+        history.ended.append((now, failed, done))
+        return alerts
 
     def _post_alert(self, name: str, state: str, said: str) -> None:
         text = f"pbrs_farm: {name} {'is over' if state == 'over' else f'- {said}'}"

@@ -202,7 +202,7 @@ class Coordinator:
 
     def _block_jobs(self, views: list[JobView]) -> list[JobView]:
         """The jobs with the queues where they are blocked now; writes what changed to the ledger."""
-        blocks, found, now = find_blocked_jobs(views, self._users, self._spent_h), [], self._clock()
+        blocks, jobs, now = find_blocked_jobs(views, self._users, self._spent_h), [], self._clock()
         # Block only after a second over share; urgent jobs and spent slot-hours take effect
         # immediately.
         self._over_since = {job: self._over_since.get(job, now) for job in blocks}
@@ -216,8 +216,8 @@ class Coordinator:
                 self._ledger.set_blocked(view.job_id, queues, why)
                 changed = {"blocked": ",".join(queues), "blocked_why": why}
                 view = replace(view, fields={**view.fields, **changed})
-            found.append(view)
-        return found
+            jobs.append(view)
+        return jobs
 
     def _is_due(self, what: str, every_s: float) -> bool:
         now = self._clock()

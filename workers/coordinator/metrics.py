@@ -97,21 +97,21 @@ class FarmCollector:
     def _progress(self, views: list[JobView]) -> Iterator[Metric]:
         """Views an hour and time left, as `status` shows them."""
         slots = self._registry.slots()
-        held = GaugeMetricFamily(
+        blocked = GaugeMetricFamily(
             "pbrs_job_held_back", "1 while its user's slot-hours are spent", labels=["job"]
         )
         rate = GaugeMetricFamily("pbrs_views_per_hour", "views finished an hour", labels=["job"])
-        left = GaugeMetricFamily("pbrs_eta_seconds", "time a job will take yet", labels=["job"])
+        eta = GaugeMetricFamily("pbrs_eta_seconds", "time a job will take yet", labels=["job"])
         paused = GaugeMetricFamily("pbrs_job_paused", "1 while a job is paused", labels=["job"])
         for view in views:
             rate.add_metric([view.job_id], views_per_hour(view))
             # A job ends with the slowest of its stages.
             etas = [s.eta_s for s in stage_views(view, slots) if s.eta_s is not None]
             if etas:
-                left.add_metric([view.job_id], max(etas))
+                eta.add_metric([view.job_id], max(etas))
             paused.add_metric([view.job_id], view.state == "paused")
-            held.add_metric([view.job_id], view.blocked_queues == (EVERYWHERE,))
-        yield from (rate, left, paused, held)
+            blocked.add_metric([view.job_id], view.blocked_queues == (EVERYWHERE,))
+        yield from (rate, eta, paused, blocked)
 
     def _users(self, views: list[JobView]) -> Iterator[Metric]:
         """A row per user: current share of the farm."""

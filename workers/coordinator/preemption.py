@@ -19,11 +19,11 @@ def choose_victims(
     slots of workers on the urgent tasks' queue count. Urgent jobs' tasks and merges are never chosen.
     holds_of: the holds of a job. [] while no urgent task waits.
     """
-    wanted = {
+    lacking = {
         pool: sum(n_slots(v, pool, "QUEUED") for v in views if v.is_urgent and v.state == "running")
         for pool in WORK_POOLS
     }
-    if not any(wanted.values()):
+    if not any(lacking.values()):
         return []
     by_slot: dict[str, list[Hold]] = defaultdict(list)  # token -> what the slot holds
     for view in views:
@@ -31,19 +31,19 @@ def choose_victims(
             by_slot[hold.token].append(hold)
     living = [w for w in workers if w.state == "alive"]
     free = {w.name: int(w.fields.get("slots", 0)) for w in living}
-    for held in by_slot.values():
-        if held[0].worker in free:
-            free[held[0].worker] -= 1
+    for slot in by_slot.values():
+        if slot[0].worker in free:
+            free[slot[0].worker] -= 1
     of_job = {view.job_id: view for view in views}
 
-    def rank(held: list[Hold]) -> tuple[int, float]:
-        return -of_job[held[0].job].priority, -max(hold.since for hold in held)
+    def rank(slot: list[Hold]) -> tuple[int, float]:
+        return -of_job[slot[0].job].priority, -max(hold.since for hold in slot)
 
     may_end = sorted((h for h in by_slot.values() if _may_end(h[0], of_job)), key=rank)
     ending = [h for h in may_end if any(hold.is_preempted for hold in h)]
     rest = [h for h in may_end if h not in ending]
     chosen: list[Hold] = []
-    for pool, n in wanted.items():
+    for pool, n in lacking.items():
         takers = {w.name for w in living if pool in w.fields.get("queues", "").split(",")}
         # Use free slots first,
         for name in takers:
@@ -51,12 +51,12 @@ def choose_victims(
             free[name] -= n_here
             n -= n_here
         # then slots that end already, then others.
-        for held in _first_of_workers(ending, takers, n):
-            ending.remove(held)
+        for slot in _first_of_workers(ending, takers, n):
+            ending.remove(slot)
             n -= 1
-        for held in _first_of_workers(rest, takers, n):
-            rest.remove(held)
-            chosen += held
+        for slot in _first_of_workers(rest, takers, n):
+            rest.remove(slot)
+            chosen += slot
     return chosen
 
 
@@ -69,4 +69,4 @@ def _may_end(hold: Hold, of_job: Mapping[str, JobView]) -> bool:
 
 def _first_of_workers(slots: Sequence[list[Hold]], workers: set[str], n: int) -> list[list[Hold]]:
     """The first n slots of these workers."""
-    return [held for held in slots if held[0].worker in workers][:n]
+    return [slot for slot in slots if slot[0].worker in workers][:n]

@@ -94,18 +94,18 @@ def _stage_view(view: JobView, stage: str, n_slots: int) -> StageView:
     done, failed = int(c.get(f"done:{stage}", 0)), int(c.get(f"{stage}:f", 0))
     running, queued = int(c.get(f"{stage}:r", 0)), int(c.get(f"{stage}:q", 0))
     total = expected_total(view, stage)
-    left = max(0, total - done - failed)
+    n_left = max(0, total - done - failed)
     counts = durations(view, stage)
     p50, p90 = quantile_s(counts, 0.5), quantile_s(counts, 0.9)
     rate = view.rates.get(stage, 0.0)
-    is_over = left == 0 and (total > 0 or view.state == "done")
-    eta = 0.0 if is_over else _eta_s(left, rate, p50, n_slots)
+    is_over = n_left == 0 and (total > 0 or view.state == "done")
+    eta = 0.0 if is_over else _eta_s(n_left, rate, p50, n_slots)
     return StageView(
         stage=stage,
         done=done,
         running=running,
         queued=queued,
-        waiting=max(0, left - running - queued),
+        waiting=max(0, n_left - running - queued),
         failed=failed,
         total=total,
         per_s=rate,
@@ -176,10 +176,10 @@ def quantile_s(counts: Mapping[int, float], share: float) -> float:
 
     counts: of `durations`. The upper edge of the bin, so up to twice too much. share: in (0, 1].
     """
-    wanted = share * sum(counts.values())
-    seen = 0.0
+    target = share * sum(counts.values())
+    n_ended = 0.0
     for power in sorted(counts):
-        seen += counts[power]
-        if seen >= wanted and seen > 0:
+        n_ended += counts[power]
+        if n_ended >= target and n_ended > 0:
             return float(2.0**power)
     return 0.0

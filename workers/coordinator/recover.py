@@ -85,8 +85,10 @@ def done_steps(store: Store, houses: Sequence[str]) -> dict[str, frozenset[str]]
     """
     if isinstance(store, LaidOutStore):
         with ThreadPoolExecutor(_THREADS) as pool:
-            found = zip(houses, pool.map(partial(_names_of_house, store), houses), strict=True)
-            return {house: names for house, names in found if names}
+            names_of_houses = zip(
+                houses, pool.map(partial(_names_of_house, store), houses), strict=True
+            )
+            return {house: names for house, names in names_of_houses if names}
     return _names_of_markers(store.list(f"{keys.FOLDERS[0]}/"))
 
 
@@ -98,7 +100,9 @@ def _names_of_house(store: LaidOutStore, house: str) -> frozenset[str]:
         rows = [json.loads(line) for line in (data or b"").splitlines()]
         placed = [(row["step"], keys.parse_house_key(row["key"])) for row in rows]
         if placed:
-            return frozenset(keys.marker_name(step, at.view) for step, at in placed if at)
+            return frozenset(
+                keys.marker_name(step, parsed.view) for step, parsed in placed if parsed
+            )
     return _names_of_markers(store.list(keys.house_key(house, "done/"))).get(house, frozenset())
 
 
@@ -106,9 +110,9 @@ def _names_of_markers(found: Iterable[str]) -> dict[str, frozenset[str]]:
     # Keys look like houses/<id>/done/<step>[.<view>].json
     names: dict[str, list[str]] = {}
     for key in found:
-        at = keys.parse_house_key(key)
-        if at is not None and at.step:
-            names.setdefault(at.house, []).append(keys.marker_name(at.step, at.view))
+        parsed = keys.parse_house_key(key)
+        if parsed is not None and parsed.step:
+            names.setdefault(parsed.house, []).append(keys.marker_name(parsed.step, parsed.view))
     return {house: frozenset(steps) for house, steps in names.items()}
 
 

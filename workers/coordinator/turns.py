@@ -69,12 +69,12 @@ class Loads:
         users would take turns at every task.
         """
         return [
-            other
-            for other in waiting
-            if self.load(other) < self.load(user)
+            rival
+            for rival in waiting
+            if self.load(rival) < self.load(user)
             and (
-                not self.held[other]
-                or (self.held[other] + 1) / self.share_of(other)
+                not self.held[rival]
+                or (self.held[rival] + 1) / self.share_of(rival)
                 <= (self.held[user] - 1) / self.share_of(user)
             )
         ]
@@ -104,34 +104,34 @@ def find_blocked_jobs(
     # Count slots by user, and note where somebody waits.
     urgent: dict[str, str] = {}  # pool -> the urgent job that waits there
     waiting: dict[str, set[str]] = defaultdict(set)  # user -> pools where he waits
-    held: Counter[str] = Counter()  # user -> slots
+    slots: Counter[str] = Counter()  # user -> slots
     for view in running:
         for pool in WORK_POOLS:
-            held[view.user] += n_slots(view, pool, "RUNNING")
+            slots[view.user] += n_slots(view, pool, "RUNNING")
             if n_slots(view, pool, "QUEUED"):
                 waiting[view.user].add(pool)
                 if view.is_urgent:
                     urgent[pool] = view.job_id
-    loads = Loads(held, lambda name: users.get(name, _NOBODY).share)
+    loads = Loads(slots, lambda name: users.get(name, _NOBODY).share)
 
     # A worker's queue is named as the pool is.
-    found: dict[str, Block] = {}
+    blocks: dict[str, Block] = {}
     for view in running:
         user, spent = users.get(view.user, _NOBODY), spent_h.get(view.user, 0.0)
         before = loads.find_users_before(view.user, waiting)
         if user.slot_hours and spent >= user.slot_hours:
-            said = f"{user.name} has used {round(spent, 2):g} of {user.slot_hours:g} slot-hours"
+            text = f"{user.name} has used {round(spent, 2):g} of {user.slot_hours:g} slot-hours"
             more = f"of {SPENT_DAYS} days; `pbrs-farm users limit` raises it"
-            found[view.job_id] = Block((EVERYWHERE,), f"{said} {more}")
+            blocks[view.job_id] = Block((EVERYWHERE,), f"{text} {more}")
         elif urgent and not view.is_urgent:
             jobs = " and ".join(sorted(set(urgent.values())))
-            found[view.job_id] = Block(tuple(sorted(urgent)), f"job {jobs} is urgent")
+            blocks[view.job_id] = Block(tuple(sorted(urgent)), f"job {jobs} is urgent")
         elif before and not view.is_urgent:
             pools = set().union(*(waiting[name] for name in before))
             names = ", ".join(sorted(name or "jobs without a user" for name in before))
             why = f"it is the turn of {names}"
-            found[view.job_id] = Block(tuple(sorted(pools)), why, at_once=False)
-    return found
+            blocks[view.job_id] = Block(tuple(sorted(pools)), why, at_once=False)
+    return blocks
 
 
 class _JobsInTurn:
@@ -161,10 +161,10 @@ class _JobsInTurn:
 
     def take(self, user: str) -> str:
         """The user's job whose task is next."""
-        at, order, job = heapq.heappop(self._of_user[user])
+        place, order, job = heapq.heappop(self._of_user[user])
         self._left[job] -= 1
         if self._left[job]:
-            heapq.heappush(self._of_user[user], (at + self._strides[job], order, job))
+            heapq.heappush(self._of_user[user], (place + self._strides[job], order, job))
         return job
 
 
@@ -194,12 +194,12 @@ class MessageTurns:
         fill all of it and each user his share of it even where no room is left, so who comes late need
         not wait until the others' tasks have ended. share_of: a user's share.
         """
-        given = {view.job_id: dict.fromkeys(room, 0) for view in views}
+        quotas = {view.job_id: dict.fromkeys(room, 0) for view in views}
         for pool, n_free in room.items():
             window = (windows or {}).get(pool, 0)
             for job in self._take_turns(pool, n_free, views, window, share_of):
-                given[job][pool] += 1
-        return given
+                quotas[job][pool] += 1
+        return quotas
 
     def charge(self, pool: str, job: str, n_sent: int) -> None:
         """Count sent tasks of a job.
@@ -236,8 +236,8 @@ class MessageTurns:
         # Then, without room, every user up to his share of the window.
         n_shares = sum(share_of(user) for user in loads.held if user != _URGENT)
         for user in users:
-            own = max(1, int(window * share_of(user) / n_shares)) if window else 0
-            while jobs.has(user) and loads.held[user] < own:
+            quota = max(1, int(window * share_of(user) / n_shares)) if window else 0
+            while jobs.has(user) and loads.held[user] < quota:
                 loads.held[user] += 1
                 yield jobs.take(user)
 
@@ -246,12 +246,12 @@ class MessageTurns:
         ranks = {p: rank for rank, p in enumerate(sorted({v.priority for v in wanting}))}
         strides = {v.job_id: _TASKS_PER_RANK ** min(ranks[v.priority], _MOST_RANK) for v in wanting}
         before = self._passes.get(pool, {})
-        known = {v.job_id: before[v.job_id] for v in wanting if v.job_id in before}
+        passes = {v.job_id: before[v.job_id] for v in wanting if v.job_id in before}
         # A new job begins one stride behind the others, and none is further behind than that:
         # neither a pause nor a lower priority of earlier is held against a job.
-        least = min(known.values(), default=0.0)
+        least = min(passes.values(), default=0.0)
         self._passes[pool] = {
-            job: min(known.get(job, least + stride), least + stride)
+            job: min(passes.get(job, least + stride), least + stride)
             for job, stride in strides.items()
         }
         self._strides[pool] = strides
@@ -263,9 +263,9 @@ def _user_of(view: JobView) -> str:
 
 def _count_in_flight(views: Sequence[JobView], pool: str) -> Counter[str]:
     """User -> tasks in a pool that are queued or running; 0 for users with only ready tasks."""
-    found: Counter[str] = Counter()
+    n_of_user: Counter[str] = Counter()
     for view in views:
         n = n_queued_or_running(view, pool)
         if is_in_pool(view, pool) and (n or n_ready(view, pool)):
-            found[_user_of(view)] += n
-    return found
+            n_of_user[_user_of(view)] += n
+    return n_of_user

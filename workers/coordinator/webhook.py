@@ -123,8 +123,8 @@ def watch_jobs(
 
     def look() -> None:
         try:
-            known = ledger.known_jobs()[-_NEWEST:]
-            views = [v for job in known if (v := ledger.view(job)) is not None]
+            jobs = ledger.known_jobs()[-_NEWEST:]
+            views = [v for job in jobs if (v := ledger.view(job)) is not None]
             webhook.look(views)
             look_at(views)
         except LedgerUnavailable as error:

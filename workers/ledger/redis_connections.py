@@ -51,8 +51,8 @@ class RefusedForNow(redis.ConnectionError):
 
 def passing_prefix(error: Exception) -> str:
     """The prefix by which an answer of Redis says that it refuses for now, "" for every other error."""
-    found = _PREFIX.search(_answer(error))
-    return found[1] if found else ""
+    match = _PREFIX.search(_answer(error))
+    return match[1] if match else ""
 
 
 def _answer(error: Exception) -> str:

@@ -194,10 +194,10 @@ class RedisLedger:
             for chunk in _in_chunks(houses):
                 pipe = self.client.pipeline(transaction=False)
                 for house in chunk:
-                    units = [x for u, at in house.units.items() for x in (u, *at)]
-                    what = "done" if house.done else "loaded"
+                    units = [x for u, unit_state in house.units.items() for x in (u, *unit_state)]
+                    state = "done" if house.done else "loaded"
                     batches = text_from_batches(house.batches)
-                    args = [house.index, house.house_id, what, batches, *units]
+                    args = [house.index, house.house_id, state, batches, *units]
                     script(keys=keys, args=args, client=pipe)
                 n_new += sum(pipe.execute())
         return n_new
@@ -505,8 +505,8 @@ class RedisLedger:
         One read of all claims of the job: as many as there are slots, at most a few more.
         """
         with self.errors():
-            found = self.client.hgetall(f"{self._p(job)}claims")
-        return [hold_from_text(job, task, text) for task, text in found.items()]
+            claims = self.client.hgetall(f"{self._p(job)}claims")
+        return [hold_from_text(job, task, text) for task, text in claims.items()]
 
     def claims(self, job: str) -> dict[str, tuple[str, float]]:
         """Task that runs now -> its worker, and since when by Redis' clock."""

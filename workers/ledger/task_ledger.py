@@ -96,8 +96,8 @@ def fault_from_json(text: str) -> Fault:
 
     So a fault that a later version wrote can be read by an older one.
     """
-    known = {f.name for f in fields(Fault)}
-    return Fault(**{name: value for name, value in json.loads(text).items() if name in known})
+    names = {f.name for f in fields(Fault)}
+    return Fault(**{name: value for name, value in json.loads(text).items() if name in names})
 
 
 @dataclass(frozen=True, slots=True)

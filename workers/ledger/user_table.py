@@ -52,11 +52,11 @@ class UserTable:
 
         None for an unknown token. Only digests of tokens are stored and compared.
         """
-        digest, found = token_digest(token), None
+        digest, match = token_digest(token), None
         for user in self.all().values():
             if hmac.compare_digest(user.token_sha256, digest):
-                found = user
-        return found
+                match = user
+        return match
 
     def save(self, users: Mapping[str, User], store: Store) -> None:
         """Replace the farm's users: in the store first, then in Redis.
@@ -105,11 +105,11 @@ class UserTable:
                 pipe.hgetall(key)
             pipe.expire(keys[0], (SPENT_DAYS + 1) * _DAY_S)  # so that no day is kept for ever
             days: list[dict[str, str]] = pipe.execute()[:-1]
-        found: dict[str, float] = {}
+        seconds_of_user: dict[str, float] = {}
         for day in days:
             for name, seconds in day.items():
-                found[name] = found.get(name, 0.0) + float(seconds) / 3600
-        return found
+                seconds_of_user[name] = seconds_of_user.get(name, 0.0) + float(seconds) / 3600
+        return seconds_of_user
 
     def note(self, row: Mapping[str, str]) -> None:
         """Keep a line of who changed what.
@@ -131,8 +131,8 @@ class UserTable:
 
 def user_from_row(row: Mapping[str, Any]) -> User:
     """The user that a row of JSON describes; fields it does not know are left out."""
-    known = {f.name for f in fields(User)}
-    return User(**{name: value for name, value in row.items() if name in known})
+    names = {f.name for f in fields(User)}
+    return User(**{name: value for name, value in row.items() if name in names})
 
 
 def new_user(name: str, **limits: Any) -> tuple[User, str]:

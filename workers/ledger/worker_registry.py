@@ -136,15 +136,15 @@ class Registry:
             now = self._ledger.now()
             # Forget who is gone, then read everybody in one round trip.
             client.zremrangebyscore(f"{self._g}workers", "-inf", now - _GONE_S)
-            seen = client.zrange(f"{self._g}workers", 0, -1, withscores=True)
+            rows = client.zrange(f"{self._g}workers", 0, -1, withscores=True)
             pipe = client.pipeline(transaction=False)
-            for name, _seen_at in seen:
+            for name, _seen_at in rows:
                 pipe.hgetall(f"{self._g}worker:{name}")
             fields = pipe.execute()
         return sorted(
             (
                 WorkerView(name, now - seen_at, row)
-                for (name, seen_at), row in zip(seen, fields, strict=True)
+                for (name, seen_at), row in zip(rows, fields, strict=True)
             ),
             key=lambda worker: worker.name,
         )

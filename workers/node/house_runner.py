@@ -141,15 +141,15 @@ class HouseRunner:
             source = self._source(request.source, Path(folder))
             is_dressed = uses_catalogue(source, spec.recipe)
             fill_cache(self._store, with_furniture=is_dressed or has_own_furniture(source))
-            here = spec
+            sized = spec
             if is_dressed:
                 # Look for the furniture before the house is read: another worker may have it.
                 recipe = local_catalogue(self._store, spec.recipe)
                 fetch_catalogue(recipe.dress)
-                here = spec.model_copy(update={"recipe": recipe})
+                sized = spec.model_copy(update={"recipe": recipe})
             for step in steps_before_views(spec, request.house):
-                at = here if step == "house" else spec
-                self._step(store, request, at, on_step, step, source=source)
+                step_spec = sized if step == "house" else spec
+                self._step(store, request, step_spec, on_step, step, source=source)
         return Result(batches=self._batches(spec, request.house))
 
     def _pack_histograms(self, store: Store, house: str, spec: JobSpec, on_step: OnText) -> None:

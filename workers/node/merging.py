@@ -53,19 +53,21 @@ def merge_job(store: Store, spec: JobSpec, on_step: OnText) -> None:
     reported as missing. Holds a shard's rows in memory, and the root's former manifest if there is one.
     """
     houses = house_ids(store, spec)
-    own = set(houses)
+    job_houses = set(houses)
     missing: list[str] = []
     dressed: list[dict[str, str]] = []
     n_objects = 0
     # Merge two streams sorted by house, holding only a shard's rows.
     with TemporaryFile() as file:
-        for house, part in _merge_by_house(store, own, _new_rows(store, spec, houses, on_step)):
+        for house, part in _merge_by_house(
+            store, job_houses, _new_rows(store, spec, houses, on_step)
+        ):
             if part is None:
                 missing.append(house)
             else:
                 file.write(part)
                 dressed += dressing_rows(part)
-                n_objects += part.count(b"\n") if house in own else 0  # a row an object
+                n_objects += part.count(b"\n") if house in job_houses else 0  # a row an object
         _put_file(store, keys.MANIFEST, file)
     write_attribution_of(store, dressed)
     # List missing parts and permanent failures.
@@ -108,9 +110,9 @@ def _new_rows(
         members = houses[first : first + size]
         # A house finished after the merge of its shard has a separate manifest.
         merged = get_or_none(store, shard_key(spec.job_id, first // size))
-        found = dict(lines_by_house(merged)) if merged is not None else {}
+        part_of_house = dict(lines_by_house(merged)) if merged is not None else {}
         for house in members:
-            yield house, found.get(house) or _manifest_of(store, house)
+            yield house, part_of_house.get(house) or _manifest_of(store, house)
 
 
 def _manifest_of(store: Store, house: str) -> bytes | None:

@@ -149,8 +149,8 @@ class Slot:
                 job, task_from_text(name), claim, waits=k == 0 and len(refused) == len(claims)
             )
         while claims := {name: c for name, c in claims.items() if c.verdict == "run"}:
-            held = [_Claimed(job, task_from_text(name), claim) for name, claim in claims.items()]
-            claims = self._run_claimed(held, recipe)
+            claimed = [_Claimed(job, task_from_text(name), claim) for name, claim in claims.items()]
+            claims = self._run_claimed(claimed, recipe)
 
     def _run_claimed(self, held: list[_Claimed], recipe: str) -> dict[str, Claim]:
         """Run tasks to their ends, one after another; those to go on with."""
@@ -198,10 +198,10 @@ class Slot:
 
     def _hand_back(self, held: Sequence[_Claimed]) -> None:
         """Return claimed tasks that were not started, uncounted."""
-        for one in held:
+        for item in held:
             fault = Fault("preempted", "preempted: not begun", "not begun", self._config.worker)
             give = partial(
-                self._ledger.fail, one.job, str(one.task), one.claim.token, fault, delay_s=0.0
+                self._ledger.fail, item.job, str(item.task), item.claim.token, fault, delay_s=0.0
             )
             self._retry(give)
 
@@ -232,7 +232,7 @@ class Slot:
         if self._clock() < self._heartbeat_at:
             return None
         self._heartbeat_at = self._clock() + self._config.heartbeat_s
-        tasks = [str(held.task), *(str(one.task) for one in waiting), *self._ended]
+        tasks = [str(held.task), *(str(waiter.task) for waiter in waiting), *self._ended]
         try:
             answer = self._ledger.heartbeat(held.job, tasks, held.claim.token)
         except LedgerUnavailable as error:

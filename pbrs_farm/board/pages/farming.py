@@ -135,35 +135,35 @@ def confirm(request: Request) -> Response:
     Every button leads here first, so that links change nothing.
     """
     live_farm(request)
-    what, of = request.query_params.get("what", ""), request.query_params.get("of", "")[:200]
-    text = (_OF_JOBS | _OF_WORKERS).get(what)
+    action, of = request.query_params.get("what", ""), request.query_params.get("of", "")[:200]
+    text = (_OF_JOBS | _OF_WORKERS).get(action)
     to = request.query_params.get("to", "")[:40]
-    if text is None or not of or (what == "priority") != bool(to):
+    if text is None or not of or (action == "priority") != bool(to):
         raise HTTPException(404, "There is no such action.")
-    back = f"/farm/jobs/{of}" if what in _OF_JOBS and of.isalnum() else "/farm"
-    return page(request, "confirm.html", what=what, of=of, to=to, text=text, back=back)
+    back = f"/farm/jobs/{of}" if action in _OF_JOBS and of.isalnum() else "/farm"
+    return page(request, "confirm.html", what=action, of=of, to=to, text=text, back=back)
 
 
 async def steer(request: Request) -> Response:
     """POST /farm/do: do an action and write an audit line; 409 if the farm refuses."""
     farm, board = live_farm(request), board_of(request)
     form = await form_of(request)
-    what, of, to = form.get("what", ""), form.get("of", "")[:200], form.get("to", "")[:40]
-    if what not in _OF_JOBS | _OF_WORKERS or not of:
+    action, of, to = form.get("what", ""), form.get("of", "")[:200], form.get("to", "")[:40]
+    if action not in _OF_JOBS | _OF_WORKERS or not of:
         raise HTTPException(404, "There is no such action.")
     address = request.client.host if request.client else ""
     user = request.scope.get("user", "")
-    note = partial(board.audit.note, address=address, user=user, what=what, of=of)
+    note = partial(board.audit.note, address=address, user=user, what=action, of=of)
     try:
         answer = await anyio.to_thread.run_sync(
-            lambda: _do(farm.acting_as(user, address), what, of, to)
+            lambda: _do(farm.acting_as(user, address), action, of, to)
         )
     except PbrsError as error:
         note(answer=f"refused: {error}")
         return page(request, "message.html", 409, text=str(error))
     note(answer=answer)
     farm.forget()
-    return RedirectResponse(f"/farm/jobs/{of}" if what in _OF_JOBS else "/farm", 303)
+    return RedirectResponse(f"/farm/jobs/{of}" if action in _OF_JOBS else "/farm", 303)
 
 
 def _do(farm: Farm, what: str, of: str, to: str) -> str:

@@ -63,10 +63,10 @@ class Plumb:
         spare = _SPARE * (high - low) * [1, 0, 1]
         self._low, self._high = (np.ascontiguousarray(b.T) for b in (low - spare, high + spare))
         # Enter each triangle into cells of a size that suits it.
-        left, self._grids = np.arange(len(self._corners)), list[_Grid]()
+        remaining, self._grids = np.arange(len(self._corners)), list[_Grid]()
         for cell_m in _CELLS_M:
-            grid, left = _grid_of_triangles(
-                self._corners, left, cell_m, is_last=cell_m == _CELLS_M[-1]
+            grid, remaining = _grid_of_triangles(
+                self._corners, remaining, cell_m, is_last=cell_m == _CELLS_M[-1]
             )
             self._grids.append(grid)
 

@@ -190,8 +190,8 @@ def _front(scenery: Scenery, thing: str, rng: np.random.Generator, front: Front,
     _about_windows(
         scenery, thing, front, facade, left[is_glass], low[is_glass], right[is_glass], high[is_glass]
     )
-    found = left, low, right, high, has_balcony
-    return _Holes(*(v[is_glass] for v in found))
+    corners = left, low, right, high, has_balcony
+    return _Holes(*(v[is_glass] for v in corners))
 
 
 def _add_wall(scenery: Scenery, thing: str, look: SceneryMaterial, front: Front, s0: F64, y0: F64,

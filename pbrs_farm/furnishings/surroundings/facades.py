@@ -167,9 +167,9 @@ def _laid(
     mortar: Rgb,
 ) -> F32:
     """The picture as stones laid in running bond with mortar between."""
-    at = np.arange(_PX) + 0.5
-    row = (at * n_rows / _PX).astype(int)
-    shifted = at[None] * n_columns / _PX + 0.5 * (row % 2)[:, None]
+    middles = np.arange(_PX) + 0.5
+    row = (middles * n_rows / _PX).astype(int)
+    shifted = middles[None] * n_columns / _PX + 0.5 * (row % 2)[:, None]
     column = shifted.astype(int) % n_columns
     laid = (
         picture
@@ -179,7 +179,7 @@ def _laid(
     )
     warm = rng.normal(0, 0.25 * spread, (n_rows, n_columns))[row[:, None], column]
     laid *= 1 + np.stack([warm, 0 * warm, -warm], -1)
-    in_row, in_column = at * n_rows / _PX % 1 * _PX / n_rows, shifted % 1 * _PX / n_columns
+    in_row, in_column = middles * n_rows / _PX % 1 * _PX / n_rows, shifted % 1 * _PX / n_columns
     gap = (in_row < joint)[:, None] | (in_column < joint)
     laid[gap] = np.array(mortar) * rng.normal(1, 0.08, (int(gap.sum()), 1))
     return np.asarray(np.clip(laid, 0, 0.85), np.float32)
@@ -188,14 +188,16 @@ def _laid(
 def tiles(rng: np.random.Generator, rgb: Rgb) -> F32:
     """(192, 192, 3) linear: rows of roof tiles, each throws a shadow on the next."""
     n, rows, columns = 192, 8, 9
-    at = np.arange(n) + 0.5
-    row = (at * rows / n).astype(int)
-    shifted = at[None] * columns / n + 0.5 * (row % 2)[:, None]
-    own = rng.normal(1, 0.16, (rows, columns))[row[:, None], shifted.astype(int) % columns]
-    along, across = (at * rows / n % 1)[:, None], shifted % 1
+    middles = np.arange(n) + 0.5
+    row = (middles * rows / n).astype(int)
+    shifted = middles[None] * columns / n + 0.5 * (row % 2)[:, None]
+    shades = rng.normal(1, 0.16, (rows, columns))[row[:, None], shifted.astype(int) % columns]
+    along, across = (middles * rows / n % 1)[:, None], shifted % 1
     shade = (0.75 + 0.3 * np.sin(np.pi * across)) * np.where(along > 0.86, 0.4, 1.05 - 0.2 * along)
     grain = 1 + 0.08 * noise(rng, (n, n), slope=0.8)
-    return np.asarray(np.clip((own * shade * grain)[..., None] * np.array(rgb), 0, 0.8), np.float32)
+    return np.asarray(
+        np.clip((shades * shade * grain)[..., None] * np.array(rgb), 0, 0.8), np.float32
+    )
 
 
 def slats(rng: np.random.Generator, rgb: Rgb) -> F32:
@@ -214,9 +216,9 @@ def _windows(rng: np.random.Generator, bars: tuple[str, ...], frame: Rgb) -> F32
     sheet = np.empty((ROWS * high, COLUMNS * wide, 3), np.float32)
     for row in range(ROWS):
         for column in range(COLUMNS):
-            own = sheet[row * high : (row + 1) * high, column * wide : (column + 1) * wide]
-            _draw_behind(rng, own)
-            _draw_bars(own, kind, frame)
+            tile = sheet[row * high : (row + 1) * high, column * wide : (column + 1) * wide]
+            _draw_behind(rng, tile)
+            _draw_bars(tile, kind, frame)
     return sheet
 
 
@@ -250,8 +252,8 @@ def _draw_behind(rng: np.random.Generator, own: F32) -> None:
         own[drawn] = (lines * np.ones((1, wide)))[drawn][:, None] * cloth * 0.8
     if rng.random() < 0.3:  # something green on the sill
         for _ in range(int(rng.integers(3, 8))):
-            at = rng.uniform(0.1, 0.9), 1 - rng.uniform(0.05, 0.2)
-            leaf = ((x - at[0]) / 0.09) ** 2 + ((y - at[1]) / 0.09) ** 2 < 1
+            spot = rng.uniform(0.1, 0.9), 1 - rng.uniform(0.05, 0.2)
+            leaf = ((x - spot[0]) / 0.09) ** 2 + ((y - spot[1]) / 0.09) ** 2 < 1
             own[leaf] = np.array([0.02, 0.045, 0.015]) * rng.uniform(0.7, 1.8)
 
 
@@ -298,16 +300,16 @@ def _door(rng: np.random.Generator) -> F32:
             (0.30, 0.30, 0.28),
         )[int(rng.integers(0, 5))]
     )
-    own = np.broadcast_to(rgb, (160, 80, 3)).astype(np.float32)
-    own[:30] = np.array(_GLASS) * 1.4
-    own[:4], own[28:34], own[:, :4], own[:, -4:] = rgb, rgb, 0.7 * rgb, 0.7 * rgb
+    door = np.broadcast_to(rgb, (160, 80, 3)).astype(np.float32)
+    door[:30] = np.array(_GLASS) * 1.4
+    door[:4], door[28:34], door[:, :4], door[:, -4:] = rgb, rgb, 0.7 * rgb, 0.7 * rgb
     for a, b in ((42, 88), (96, 148)):
         for c, d in ((11, 36), (44, 69)):
-            own[a:b, c:d] *= 0.75
-            own[a : a + 2, c:d], own[a:b, c : c + 2] = 0.45 * rgb, 0.45 * rgb
-            own[b - 2 : b, c:d] = 1.35 * rgb
-    own[90:95, 66:72] = (0.35, 0.30, 0.18)
-    return np.clip(own, 0, 0.8)
+            door[a:b, c:d] *= 0.75
+            door[a : a + 2, c:d], door[a:b, c : c + 2] = 0.45 * rgb, 0.45 * rgb
+            door[b - 2 : b, c:d] = 1.35 * rgb
+    door[90:95, 66:72] = (0.35, 0.30, 0.18)
+    return np.clip(door, 0, 0.8)
 
 
 def lit_rooms(rng: np.random.Generator) -> F32:

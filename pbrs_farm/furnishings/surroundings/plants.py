@@ -54,19 +54,21 @@ class Leaves(NamedTuple):
 
 def leaves_of(rng: np.random.Generator, number: int) -> Leaves:
     """The looks of one of SPECIES."""
-    own = SPECIES[number]
-    spray = _spray(rng, own)
-    r, g, b = own.dark
+    species = SPECIES[number]
+    spray = _spray(rng, species)
+    r, g, b = species.dark
     dark = (0.3 * r, 0.3 * g, 0.3 * b)
     return Leaves(
-        own,
-        SceneryMaterial(f"{own.name} leaves", picture=spray),
-        SceneryMaterial(f"{own.name} leaves in shade", rgb=(_SHADE,) * 3, picture=spray),
+        species,
+        SceneryMaterial(f"{species.name} leaves", picture=spray),
+        SceneryMaterial(f"{species.name} leaves in shade", rgb=(_SHADE,) * 3, picture=spray),
         SceneryMaterial(
-            f"{own.name} dark", picture=mottled(rng, dark, own.dark, size=64), size_m=(0.7, 0.7)
+            f"{species.name} dark",
+            picture=mottled(rng, dark, species.dark, size=64),
+            size_m=(0.7, 0.7),
         ),
         SceneryMaterial(
-            f"{own.name} bark", picture=mottled(rng, *own.bark, size=64), size_m=(0.5, 0.5)
+            f"{species.name} bark", picture=mottled(rng, *species.bark, size=64), size_m=(0.5, 0.5)
         ),
     )
 
@@ -79,22 +81,22 @@ def _spray(rng: np.random.Generator, own: Species) -> F32:
     for _ in range(own.n_leaves):
         # Leaves fill a round spray and hang outwards from its middle.
         turn, away = rng.uniform(0, 2 * np.pi), 0.42 * _PX * np.sqrt(rng.random())
-        at = _PX / 2 + away * np.array([np.cos(turn), np.sin(turn)])
+        tip = _PX / 2 + away * np.array([np.cos(turn), np.sin(turn)])
         angle = turn + rng.normal(0, 0.6)
         size = rng.uniform(0.75, 1.2)
-        low = np.maximum((at - 0.6 * long_ * size).astype(int), 0)
-        high = np.minimum((at + 0.6 * long_ * size).astype(int) + 2, _PX)
+        low = np.maximum((tip - 0.6 * long_ * size).astype(int), 0)
+        high = np.minimum((tip + 0.6 * long_ * size).astype(int) + 2, _PX)
         x, y = np.arange(low[0], high[0]) + 0.5, np.arange(low[1], high[1])[:, None] + 0.5
-        u = ((x - at[0]) * np.cos(angle) + (y - at[1]) * np.sin(angle)) / (0.5 * long_ * size)
-        v = (-(x - at[0]) * np.sin(angle) + (y - at[1]) * np.cos(angle)) / (0.5 * wide * size)
+        u = ((x - tip[0]) * np.cos(angle) + (y - tip[1]) * np.sin(angle)) / (0.5 * long_ * size)
+        v = (-(x - tip[0]) * np.sin(angle) + (y - tip[1]) * np.cos(angle)) / (0.5 * wide * size)
         # Pointed at both ends, a light vein along the middle, one half in shade.
         inside = np.abs(v) < 1 - u * u
         share = rng.uniform(0.15, 1.0)
         rgb = np.array(own.dark) * (1 - share) + np.array(own.light) * share
         shade = np.where(v > 0, 1.0, 0.78) * np.where(np.abs(v) < 0.13, 1.25, 1.0) * (1 - 0.15 * u)
-        here = picture[low[1] : high[1], low[0] : high[0]]
-        here[inside, :3] = shade[inside][:, None] * rgb
-        here[inside, 3] = 1.0
+        patch = picture[low[1] : high[1], low[0] : high[0]]
+        patch[inside, :3] = shade[inside][:, None] * rgb
+        patch[inside, 3] = 1.0
     return picture
 
 
@@ -106,19 +108,19 @@ def tree_line(rng: np.random.Generator) -> F32:
     edge = 0.12 * noise(rng, (1, wide), slope=1.0)[0]
     # Far ones first; lower ones cover them.
     for top in np.sort(rng.uniform(2, 55, 110)):
-        own = SPECIES[int(rng.choice(len(SPECIES) - 2))]
-        half, at = int(rng.uniform(14, 34)), int(rng.integers(0, wide))
-        columns = np.arange(at - half, at + half + 1)
-        u = (columns - at) / half
+        species = SPECIES[int(rng.choice(len(SPECIES) - 2))]
+        half, column = int(rng.uniform(14, 34)), int(rng.integers(0, wide))
+        columns = np.arange(column - half, column + half + 1)
+        u = (columns - column) / half
         columns = columns % wide
         v = (np.arange(int(top), high)[:, None] + 0.5 - top) / (high - top)
         inside = np.abs(u) < np.sqrt(np.clip(2.2 * v, 0, 1)) * (1 + edge[columns])
         light = np.clip(1.0 - 0.9 * v - 0.3 * u, 0.15, 1.2) * grain[int(top) :, columns]
         tone = np.clip(0.25 + 0.5 * light, 0, 1)[..., None]
-        rgb = np.array(own.dark) * (1 - tone) + np.array(own.light) * tone
-        here = picture[int(top) :, columns]
-        here[inside, :3], here[inside, 3] = rgb[inside], 1.0
-        picture[int(top) :, columns] = here
+        rgb = np.array(species.dark) * (1 - tone) + np.array(species.light) * tone
+        patch = picture[int(top) :, columns]
+        patch[inside, :3], patch[inside, 3] = rgb[inside], 1.0
+        picture[int(top) :, columns] = patch
     picture[-12:, :, 3] = 1.0
     picture[..., :3] = np.where(picture[..., 3:] > 0, picture[..., :3], 0.03)
     return picture
@@ -135,10 +137,10 @@ def tree(
     n: int = 340,
 ) -> None:
     """A tree on foot (3,): a trunk, branches, and n sprays of leaves about them, of a fir in a cone."""
-    own = leaves.species
-    crown_low = own.crown_from * height * rng.uniform(0.9, 1.1)
-    radius = own.radius * rng.uniform(0.88, 1.12) * height
-    if own.name == "fir":
+    species = leaves.species
+    crown_low = species.crown_from * height * rng.uniform(0.9, 1.1)
+    radius = species.radius * rng.uniform(0.88, 1.12) * height
+    if species.name == "fir":
         _limb(scenery, thing, leaves.bark, foot, foot + _up(0.92 * height), 0.02 * height)
         share = rng.random(n) ** 1.7
         away = radius * (1 - share) * np.sqrt(rng.uniform(0.4, 1, n))

@@ -172,18 +172,18 @@ def _texture(name: str, picture: F32) -> Texture:
 def _surface_of_quads(
     look: SceneryMaterial, rows: list[tuple[F64, F64 | None]], material: int
 ) -> Surface:
-    made = quads_surface(look.name, np.concatenate([q for q, _ in rows]), material)
-    assert made.uvs is not None
-    own = made.uvs.reshape(-1, 4, 2) / np.array(look.size_m, np.float32)
+    surface = quads_surface(look.name, np.concatenate([q for q, _ in rows]), material)
+    assert surface.uvs is not None
+    uv = surface.uvs.reshape(-1, 4, 2) / np.array(look.size_m, np.float32)
     start = 0
     for quads, uvs in rows:
         if uvs is not None:
-            own[start : start + len(quads)] = uvs
+            uv[start : start + len(quads)] = uvs
         start += len(quads)
     # A quad of three corners has one triangle without an area.
-    faces = made.faces[faces_with_area(triangle_corners(made.positions, made.faces), 1e-6)]
+    faces = surface.faces[faces_with_area(triangle_corners(surface.positions, surface.faces), 1e-6)]
     return Surface(
-        made.name, made.positions, faces, material, own.reshape(-1, 2).astype(np.float32)
+        surface.name, surface.positions, faces, material, uv.reshape(-1, 2).astype(np.float32)
     )
 
 
@@ -206,9 +206,9 @@ def paved(rng: np.random.Generator, rgb: Rgb, n: int) -> F32:
     step = 192 // n
     for row in range(n):
         for column in range(n):
-            own = picture[row * step : (row + 1) * step, column * step : (column + 1) * step]
-            own *= rng.uniform(0.88, 1.08)
-            own[:2], own[:, :2] = 0.55 * own[:2], 0.55 * own[:, :2]
+            slab = picture[row * step : (row + 1) * step, column * step : (column + 1) * step]
+            slab *= rng.uniform(0.88, 1.08)
+            slab[:2], slab[:, :2] = 0.55 * slab[:2], 0.55 * slab[:, :2]
     return np.clip(picture, 0, 1)
 
 

@@ -121,8 +121,8 @@ def with_surroundings(home: House, kind: str, seed: int) -> House:
     sides = _sides(footprint, ground_y)
     kinds = _kinds(rng, kind, is_flat=n_below > 0)
     _lay_ground(place, footprint, sides, kinds, ground_y)
-    for number, (side, what) in enumerate(zip(sides, kinds, strict=True)):
-        _STRIPS[what](place, side, number)
+    for number, (side, strip) in enumerate(zip(sides, kinds, strict=True)):
+        _STRIPS[strip](place, side, number)
     _far_ring(place, footprint, ground_y, kinds)
     place.scenery.keep_off(footprint, LEAST_M)
     if n_below > 0:
@@ -162,12 +162,12 @@ def _level_of_ground(
 def _sides(footprint: BaseGeometry, ground_y: float) -> list[_Side]:
     x0, z0, x1, z1 = footprint.bounds
     cx, cz, hx, hz = (x0 + x1) / 2, (z0 + z1) / 2, (x1 - x0) / 2, (z1 - z0) / 2
-    found = []
+    sides = []
     for ox, oz, half in ((0, 1, hx), (1, 0, hz), (0, -1, hx), (-1, 0, hz)):
         out = np.array([ox, 0.0, oz])
         middle = np.array([cx + ox * hx, ground_y, cz + oz * hz])
-        found.append(_Side(middle, out, np.array([oz, 0.0, -ox], np.float64), half))
-    return found
+        sides.append(_Side(middle, out, np.array([oz, 0.0, -ox], np.float64), half))
+    return sides
 
 
 def _kinds(rng: np.random.Generator, kind: str, *, is_flat: bool) -> list[str]:
@@ -223,9 +223,9 @@ def _lay_ground(
             zones.append((name, _strip_of_side(side, 0.0, 13.0, side.half + 12.0), 0.0))
     # The first zone is on top: each takes the area that is still free.
     for name, area, above in zones:
-        own = free.intersection(area)
+        ground = free.intersection(area)
         free = free.difference(area)
-        place.scenery.lay("ground", place.ground[name], own, y + above)
+        place.scenery.lay("ground", place.ground[name], ground, y + above)
     place.scenery.lay("ground", place.ground["lawn"], free, y)
 
 
@@ -237,8 +237,8 @@ def _street(place: _Place, side: _Side, number: int) -> None:
     for s in np.arange(-side.half - 14, side.half + 14, 5.2):
         if rng.random() < 0.55:
             far = rng.random() < 0.6
-            at = _ROAD[1] - 0.25 if far else _ROAD[0] + 1.9
-            car(scenery, f"cars_{number}", rng, side.front(s + rng.uniform(0, 0.5), at))
+            distance = _ROAD[1] - 0.25 if far else _ROAD[0] + 1.9
+            car(scenery, f"cars_{number}", rng, side.front(s + rng.uniform(0, 0.5), distance))
     for k, s in enumerate(np.arange(-side.half - 12, side.half + 12, rng.uniform(8, 11))):
         if k % 2 == 0:
             lamp_post(scenery, f"lamps_{number}", Front(side.at(s, _ROAD[1] + 0.6), side.along,
@@ -292,10 +292,10 @@ def _garden(place: _Place, side: _Side, number: int) -> None:
     _trees(place, side, number, 4, (5.0, depth + 6.0), half)
     s = -half - 4.0
     while s < half:
-        own = place.cottages[int(rng.integers(0, len(place.cottages)))]
+        cottage = place.cottages[int(rng.integers(0, len(place.cottages)))]
         away = depth + rng.uniform(7.0, 13.0)
         if rng.random() < 0.75:
-            house(scenery, f"houses_{number}", rng, side.front(s, away), own, place.rooms)
+            house(scenery, f"houses_{number}", rng, side.front(s, away), cottage, place.rooms)
         s += rng.uniform(15.0, 20.0)
     _trees(place, side, number, 8, (depth + 5.0, depth + 22.0), half + 12)
 
@@ -324,12 +324,12 @@ def _row_of_blocks(place: _Place, side: _Side, number: int, away: float, *, exte
     while s < extent:
         k = int(rng.integers(0, len(place.facades)))
         k = (k + 1) % len(place.facades) if k == before else k
-        before, own = k, place.facades[k]
+        before, facade = k, place.facades[k]
         n_bays = int(rng.integers(3, 7)) if is_town else int(rng.integers(7, 11))
         n_storeys = int(np.clip(least + rng.integers(-1, 3), 2, 11))
-        width = n_bays * own.bay_m
+        width = n_bays * facade.bay_m
         set_back = 0.0 if is_town else rng.uniform(0, 6)
-        block(place.scenery, f"buildings_{number}", rng, side.front(s, away + set_back), own,
+        block(place.scenery, f"buildings_{number}", rng, side.front(s, away + set_back), facade,
             place.rooms, n_bays, n_storeys, depth_m=10.0,
             has_balconies=balconies or rng.random() < 0.25)
         s += width + (0.0 if is_town else rng.uniform(3, 9))
@@ -342,8 +342,8 @@ def _trees(
     for _ in range(n):
         kind = int(rng.choice(_GARDEN_TREES, p=_SHARES))
         foot = side.at(rng.uniform(-1, 1) * half, rng.uniform(*away))
-        own, n_sprays = place.leaves[kind], 360 if away[0] < 8.0 else 200
-        tree(place.scenery, f"trees_{number}", rng, foot, rng.uniform(4.5, 10.0), own, n=n_sprays)
+        leaves, n_sprays = place.leaves[kind], 360 if away[0] < 8.0 else 200
+        tree(place.scenery, f"trees_{number}", rng, foot, rng.uniform(4.5, 10.0), leaves, n=n_sprays)
 
 
 def _far_ring(place: _Place, footprint: BaseGeometry, ground_y: float, kinds: list[str]) -> None:
@@ -384,9 +384,9 @@ def _railings(place: _Place, windows: list[Opening], rooms: tuple[Room, ...]) ->
     for opening in windows:
         quad = np.asarray(opening.quad, np.float64)
         low, high = float(quad[:, 1].min()), float(quad[:, 1].max())
-        here = [a for r, a in areas if r.floor_y - 0.3 < low < r.ceiling_y]
+        floors = [a for r, a in areas if r.floor_y - 0.3 < low < r.ceiling_y]
         floor = [r.floor_y for r, a in areas if r.floor_y - 0.3 < low < r.ceiling_y]
-        if not here or low > min(floor) + _FRENCH_SILL_M or high - low < _FRENCH_HEIGHT_M:
+        if not floors or low > min(floor) + _FRENCH_SILL_M or high - low < _FRENCH_HEIGHT_M:
             continue
         normal = np.array([opening.normal[0], 0.0, opening.normal[2]])
         length = float(np.linalg.norm(normal))
@@ -395,7 +395,7 @@ def _railings(place: _Place, windows: list[Opening], rooms: tuple[Room, ...]) ->
         middle, normal = quad.mean(0), normal / length
         outside = [sign for sign in (1.0,
             -1.0) if not any(a.contains(shapely.Point((middle + sign * 0.7 * normal)[[0,
-            2]])) for a in here)]
+            2]])) for a in floors)]
         if len(outside) != 1:
             continue
         out = outside[0] * normal

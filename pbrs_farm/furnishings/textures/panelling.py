@@ -37,14 +37,16 @@ def board_maps(
     """Painted boards with grooves between them: matchboard where upright, else like a ship's side."""
     along = size_m[0] if upright else size_m[1]
     n = int(rng.choice([9, 11, 13] if upright else [7, 8, 10]))
-    at = (np.arange(shape[1] if upright else shape[0]) + 0.5) * (along / shape[1 if upright else 0])
-    board = np.floor(at * n / along).astype(int)
-    edge = np.minimum(at % (along / n), along / n - at % (along / n)).astype(np.float32)
+    across = (np.arange(shape[1] if upright else shape[0]) + 0.5) * (
+        along / shape[1 if upright else 0]
+    )
+    board = np.floor(across * n / along).astype(int)
+    edge = np.minimum(across % (along / n), along / n - across % (along / n)).astype(np.float32)
     groove = smoothstep(_GROOVE_M, 0.0005, edge)
     if not upright:
         # The upper board laps over the lower one and shades it.
         groove = np.maximum(
-            groove, 0.25 * smoothstep(0.02, 0.0, (at % (along / n)).astype(np.float32))
+            groove, 0.25 * smoothstep(0.02, 0.0, (across % (along / n)).astype(np.float32))
         )
     light = 1.0 + np.clip(rng.normal(0, 0.008, n), -0.02, 0.02).astype(np.float32)[board]
     groove, light = (np.broadcast_to(v if upright else v[:, None], shape) for v in (groove, light))

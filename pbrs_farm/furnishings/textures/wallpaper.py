@@ -197,11 +197,11 @@ def _leaves(rng: np.random.Generator, shape: Shape2) -> list[F32]:
     fills, veins = np.zeros(shape, np.float32), np.zeros(shape, np.float32)
     length = float(rng.uniform(0.10, 0.135))
     # Set sprigs on a staggered grid, each a bent stem with leaves to both sides.
-    for k, at in enumerate(
+    for k, spot in enumerate(
         ((0.18, 0.03), (0.52, 0.22), (0.84, 0.42), (0.20, 0.53), (0.52, 0.72), (0.84, 0.92))
     ):
         angle = np.pi / 2 + float(rng.uniform(-0.45, 0.45)) + (0.25 if k % 2 else -0.25)
-        curve, point = float(rng.uniform(-0.7, 0.7)) / 8, np.array(at)
+        curve, point = float(rng.uniform(-0.7, 0.7)) / 8, np.array(spot)
         for step in range(8):
             _stamp_motif(veins, (point[0], point[1]), angle, 0.065, _stem(0.062, 0.0022))
             size = length * (1.0 - 0.09 * step)
@@ -230,8 +230,8 @@ def _damask(rng: np.random.Generator, shape: Shape2) -> list[F32]:
     petals = int(rng.choice([5, 7]))
     lift = float(rng.uniform(0.8, 1.1))
     # Repeat a palmette, mirrored about its axis, at the nodes and centres of the repeat.
-    for at in ((0.25, 0.02), (0.75, 0.52)):
-        mx, my = _axes_about(x, y, at, 0.0)
+    for spot in ((0.25, 0.02), (0.75, 0.52)):
+        mx, my = _axes_about(x, y, spot, 0.0)
         mx = np.abs(mx)
         for k in range(petals):
             angle = np.pi / 2 - k * lift * 1.5 / petals

@@ -189,7 +189,7 @@ class Maker(Shapes):
         """Material of the solids added inside, unless they name another."""
         outer, self._parts = self._parts, []
         yield
-        outer += [(solid, material if given is None else given) for solid, given in self._parts]
+        outer += [(solid, material if inner is None else inner) for solid, inner in self._parts]
         self._parts = outer
 
     @contextmanager
@@ -199,8 +199,8 @@ class Maker(Shapes):
         outer_joints, self._joints = self._joints, []
         yield
         inner, self._parts = self._parts, outer
-        for solid, given in inner:
-            self.add(solid, of=given, at=at, turn=turn)
+        for solid, own_material in inner:
+            self.add(solid, of=own_material, at=at, turn=turn)
         matrix = np.eye(4)
         matrix[:3, :3] = np.eye(3) if turn is None else turn
         matrix[:3, 3] = at or (0.0, 0.0, 0.0)
@@ -230,7 +230,7 @@ class Maker(Shapes):
         inner, self._parts = self._parts, outer
         self._counted[name] += 1
         part = f"{name} {self._counted[name]}"
-        self._parts += [(replace(solid, part=part), given) for solid, given in inner]
+        self._parts += [(replace(solid, part=part), own_material) for solid, own_material in inner]
         self._joints.append(Joint(part, kind, at, axis, upper))
 
     def joints(self) -> tuple[Joint, ...]:

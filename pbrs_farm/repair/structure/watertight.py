@@ -57,7 +57,7 @@ def repaired_structure(house: House, thickness_m: float) -> Structure:
     """
     # Read walls, floors and ceilings; give stairwells without a room the covers they lack.
     table, rooms = TagTable(), plan.union(plan.polygon_of_room(r.polygon) for r in house.rooms)
-    uprights, left = walls_from_house(house, table, rooms, thickness_m)
+    uprights, unchanged = walls_from_house(house, table, rooms, thickness_m)
     walls = [w for w in uprights if not w.is_board]
     horizontal = floors_and_ceilings_from_house(house, table)
     wells = stairwells_of_house(house, walls, horizontal.planar, _covers(horizontal))
@@ -89,7 +89,7 @@ def repaired_structure(house: House, thickness_m: float) -> Structure:
             "n_stairwells_closed": len(wells.surfaces),
             "n_openings": len(house.openings),
             "n_openings_cut": len(plugs),
-            "left_as_is": _left_as_is(house, {**left, **horizontal.left}, idle),
+            "left_as_is": _left_as_is(house, {**unchanged, **horizontal.left}, idle),
             "areas": areas,
             "walls_lost": lost_walls(areas),
         }

@@ -87,9 +87,9 @@ def _walk_space(
     xx, zz = grid.middles
     room = np.full(grid.shape, _NO_ROOM, np.int32)
     floor_y = np.full(grid.shape, np.nan)
-    for k, one in sorted(rooms, key=lambda pair: -shapely.area(room_shape(pair[1]))):
-        inside = shapely.contains_xy(room_shape(one), xx, zz)
-        room[inside], floor_y[inside] = k, one.floor_y
+    for k, home_room in sorted(rooms, key=lambda pair: -shapely.area(room_shape(pair[1]))):
+        inside = shapely.contains_xy(room_shape(home_room), xx, zz)
+        room[inside], floor_y[inside] = k, home_room.floor_y
     # Carry the floors through the holes of doors, whose walls belong to no room.
     doors = [o for o in openings if _is_door(o)]
     strips = np.zeros(grid.shape, bool)

@@ -81,5 +81,5 @@ def rows_and_columns(x: Tensor) -> Tensor:
     batch, _, height, width = x.shape
     rows = torch.linspace(-1, 1, height, dtype=x.dtype, device=x.device)
     columns = torch.linspace(-1, 1, width, dtype=x.dtype, device=x.device)
-    both = torch.stack(torch.meshgrid(rows, columns, indexing="ij"))
-    return both.expand(batch, 2, height, width)
+    positions = torch.stack(torch.meshgrid(rows, columns, indexing="ij"))
+    return positions.expand(batch, 2, height, width)

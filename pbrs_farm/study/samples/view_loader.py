@@ -88,16 +88,16 @@ class ViewLoader:
         self._epoch, self._n_batches = epoch + 1, 0
 
     def _rest_of_epoch(self) -> Any:
-        dataset, made = self._dataset, self._made
-        batch_size = made["batch_size"]
+        dataset, fields = self._dataset, self._made
+        batch_size = fields["batch_size"]
         source = dataset.shards if isinstance(dataset, ShardedViews) else dataset.views.source
-        options = options_of_workers(made["workers"], [source.url])
+        options = options_of_workers(fields["workers"], [source.url])
         if isinstance(dataset, ShardedViews):
             dataset.start_at(self._epoch, self._n_batches, batch_size)
             return DataLoader(dataset, batch_size=batch_size, drop_last=True, **options)
         dataset.epoch = self._epoch
-        parts = {"part": self._rank, "n_parts": made["world"]}
-        order = view_order(len(dataset), seed=made["seed"], epoch=self._epoch, **parts).tolist()
+        parts = {"part": self._rank, "n_parts": fields["world"]}
+        order = view_order(len(dataset), seed=fields["seed"], epoch=self._epoch, **parts).tolist()
         starts = range(self._n_batches * batch_size, len(self) * batch_size, batch_size)
         batches = [order[k : k + batch_size] for k in starts]
         return DataLoader(dataset, batch_sampler=batches, **options)

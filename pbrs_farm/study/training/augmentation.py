@@ -105,11 +105,11 @@ def rotate_cameras(batch: Batch, task: StudyTask, angles: Tensor, hfov_deg: floa
 def _rotations(angles: Tensor) -> Tensor:
     """(B, 3, 3) from the axes of the old camera (x right, y down) to those of the rotated one."""
     cos, sin = torch.cos(angles), torch.sin(angles)
-    one, zero = torch.ones_like(cos[:, 0]), torch.zeros_like(cos[:, 0])
+    ones, zero = torch.ones_like(cos[:, 0]), torch.zeros_like(cos[:, 0])
     # Pitch up moves z to y.
-    pitch = [one, zero, zero, zero, cos[:, 0], sin[:, 0], zero, -sin[:, 0], cos[:, 0]]
+    pitch = [ones, zero, zero, zero, cos[:, 0], sin[:, 0], zero, -sin[:, 0], cos[:, 0]]
     # A clockwise roll rotates the picture anticlockwise.
-    roll = [cos[:, 1], sin[:, 1], zero, -sin[:, 1], cos[:, 1], zero, zero, zero, one]
+    roll = [cos[:, 1], sin[:, 1], zero, -sin[:, 1], cos[:, 1], zero, zero, zero, ones]
     pitched, rolled = (torch.stack(rows, 1).view(-1, 3, 3) for rows in (pitch, roll))
     return rolled @ pitched
 

@@ -85,9 +85,9 @@ class ArrivalRates:
         """Count shadow rays from p, atomically; is_cast, arrives: Bool of each lane."""
         place = self.grid.voxel(p) * N_KINDS + kind
         # Add in place: a copy for each thread would put the number of voxels into the kernel.
-        one, mode = mi.UInt32(1), dr.ReduceMode.Direct
-        dr.scatter_add(counts.cast, one, place, is_cast, mode=mode)
-        dr.scatter_add(counts.arrived, one, place, is_cast & arrives, mode=mode)
+        unit, mode = mi.UInt32(1), dr.ReduceMode.Direct
+        dr.scatter_add(counts.cast, unit, place, is_cast, mode=mode)
+        dr.scatter_add(counts.arrived, unit, place, is_cast & arrives, mode=mode)
 
 
 def arrival_rates(counts: NDArray[np.uint32], grid: VoxelGrid) -> F64:
@@ -100,12 +100,12 @@ def arrival_rates(counts: NDArray[np.uint32], grid: VoxelGrid) -> F64:
     # Of a kind that no ray was of nothing is known.
     rates = np.full(counts.shape[1:], 0.5)
     kinds = np.flatnonzero(counts[0].any(0))
-    own = counts[..., kinds]
-    near_cast, near_arrived = (grid.with_neighbours(rows) for rows in own)
-    cast, arrived = own.astype(np.float64)
+    own_counts = counts[..., kinds]
+    near_cast, near_arrived = (grid.with_neighbours(rows) for rows in own_counts)
+    cast, arrived = own_counts.astype(np.float64)
     everywhere = (arrived.sum(0) + 0.5) / (cast.sum(0) + 1)
     near = (near_arrived + PRIOR_VERTICES * everywhere) / (near_cast + PRIOR_VERTICES)
-    here = (arrived + PRIOR_VERTICES * near) / (cast + PRIOR_VERTICES)
+    rate = (arrived + PRIOR_VERTICES * near) / (cast + PRIOR_VERTICES)
     # Round, so that the last bits of a quotient never change a picture.
-    rates[:, kinds] = np.round(np.maximum(here, _MIN_RATE), 6)
+    rates[:, kinds] = np.round(np.maximum(rate, _MIN_RATE), 6)
     return rates

@@ -139,9 +139,9 @@ class DeviceScene:
         geometric = np.setdiff1d(
             np.arange(FACE_FLOATS), (FRONT_PDF, BACK_PDF, TARGET_EMITTER)
         ).astype(np.uint32)
-        at = faces.astype(np.uint32)[:, None] * np.uint32(FACE_FLOATS) + geometric
+        index = faces.astype(np.uint32)[:, None] * np.uint32(FACE_FLOATS) + geometric
         values = device_array(mi.Float, np.ascontiguousarray(rows[:, geometric]).ravel())
-        dr.scatter(self._rows, values, device_array(mi.UInt32, at.ravel()))
+        dr.scatter(self._rows, values, device_array(mi.UInt32, index.ravel()))
         dr.eval(self._rows)
 
     def intersect(self, o: Any, d: Any, active: Any) -> SurfaceInteraction:
@@ -181,11 +181,11 @@ class DeviceScene:
             # Look a little before it, too, for faces in one plane, but not behind where the ray began.
             step = _ray_step(p) / dr.maximum(cos, LEAST_COS)
             near = _ray(p - 0.5 * step * d, d, 2.5 * step)
-            found = self._opaque.ray_intersect_preliminary(near, False, is_glass)
-            touches = is_glass & found.is_valid()
-            below = dr.gather(mi.UInt32, self._opaque_faces, found.prim_index, touches)
+            behind = self._opaque.ray_intersect_preliminary(near, False, is_glass)
+            touches = is_glass & behind.is_valid()
+            below = dr.gather(mi.UInt32, self._opaque_faces, behind.prim_index, touches)
             face = dr.select(touches, below, face)
-            bary = dr.select(touches, mi.Point2f(found.prim_uv), bary)
+            bary = dr.select(touches, mi.Point2f(behind.prim_uv), bary)
         return face, bary
 
     @dr.syntax
@@ -194,15 +194,15 @@ class DeviceScene:
 
         For rays that need one answer: paths continue behind holes themselves.
         """
-        here = mi.Point3f(o)
+        start = mi.Point3f(o)
         if dr.hint(self._has_holes, mode="scalar"):
             looks, n = mi.Bool(active), mi.UInt32(0)
             while looks:
-                si = self.intersect(here, d, looks)
+                si = self.intersect(start, d, looks)
                 looks &= si.valid & si.is_cutout & (n < MAX_SHEETS)
-                here = dr.select(looks, offset_ray_origin(si.p, -si.ng), here)
+                start = dr.select(looks, offset_ray_origin(si.p, -si.ng), start)
                 n += 1
-        return self.intersect(here, d, active)
+        return self.intersect(start, d, active)
 
     def transmittance(self, o: Any, d: Any, distance: Any, active: Any) -> Any:
         """Color3f of light let through between o and o + distance d: 0 behind opaque faces.
@@ -220,42 +220,42 @@ class DeviceScene:
 
     @dr.syntax
     def _through_transparent(self, o: Any, d: Any, distance: Any, clear: Any) -> Any:
-        left = dr.select(clear, mi.Color3f(1), 0)
-        here = mi.Point3f(o)
+        share = dr.select(clear, mi.Color3f(1), 0)
+        start = mi.Point3f(o)
         reach, way = mi.Float(distance), mi.Vector3f(d)
         end, is_finite = o + distance * d, distance < dr.inf
         go_on = mi.Bool(clear)
         n = mi.UInt32(0)
         while go_on:
             # Find the next transparent surface.
-            found = self._transparent.ray_intersect_preliminary(
-                _ray(here, way, reach), False, go_on
+            sheet = self._transparent.ray_intersect_preliminary(
+                _ray(start, way, reach), False, go_on
             )
-            met = go_on & found.is_valid()
-            face = dr.gather(mi.UInt32, self._transparent_faces, found.prim_index, met)
-            si = self._interaction(face, found.prim_uv, way, met)
+            is_hit = go_on & sheet.is_valid()
+            face = dr.gather(mi.UInt32, self._transparent_faces, sheet.prim_index, is_hit)
+            si = self._interaction(face, sheet.prim_uv, way, is_hit)
             # Let through what glass does not reflect, all at a cut-out.
             cos = dr.dot(si.n, way)
             clear_share = 1 - thin_glass_reflectance(cos)
             through = thin_glass_transmittance(si.bsdf.tau, cos) * clear_share
             through = dr.select(si.bsdf.kind == GLASS, through, 0)
             through = dr.select(si.is_cutout, mi.Color3f(1), through)
-            left = dr.select(met, left * through, left)
+            share = dr.select(is_hit, share * through, share)
             # Go on behind it.
             beyond = offset_ray_origin(si.p, -si.ng)
-            reach = dr.select(met, reach - dr.dot(beyond - here, way), reach)
-            here = dr.select(met, beyond, here)
+            reach = dr.select(is_hit, reach - dr.dot(beyond - start, way), reach)
+            start = dr.select(is_hit, beyond, start)
             if dr.hint(self._aims_again, mode="scalar"):
                 # The step aside must not make the ray graze the small lamp it ends at.
-                to = end - here
-                aims = met & is_finite
+                to = end - start
+                aims = is_hit & is_finite
                 reach = dr.select(aims, dr.norm(to), reach)
                 way = dr.select(aims, to / dr.maximum(reach, 1e-12), way)
             n += 1
-            brightest: Any = dr.max(left)
-            go_on = met & (brightest > 0) & (reach > 0) & (n < MAX_TRANSPARENT)
+            brightest: Any = dr.max(share)
+            go_on = is_hit & (brightest > 0) & (reach > 0) & (n < MAX_TRANSPARENT)
         # Treat anything behind more sheets than occur in practice as occluded.
-        return dr.select(n >= MAX_TRANSPARENT, 0, left)
+        return dr.select(n >= MAX_TRANSPARENT, 0, share)
 
     def sample_face(self, face: Any, u: Any, active: Any) -> tuple[Any, Any]:
         """(point, unit normal) uniform over a face.
@@ -277,11 +277,11 @@ class DeviceScene:
         """
         if not len(faces):
             return
-        at = device_array(mi.UInt32, faces) * FACE_FLOATS
+        row = device_array(mi.UInt32, faces) * FACE_FLOATS
         for column, values in ((FRONT_PDF, front), (BACK_PDF, back)):
-            dr.scatter(self._rows, device_array(mi.Float, values), at + column)
+            dr.scatter(self._rows, device_array(mi.Float, values), row + column)
         bits = dr.reinterpret_array(mi.Float, device_array(mi.UInt32, lamps))
-        dr.scatter(self._rows, bits, at + TARGET_EMITTER)
+        dr.scatter(self._rows, bits, row + TARGET_EMITTER)
         dr.eval(self._rows)
 
     def _packet(self, face: Any, k: int, active: Any) -> Any:
@@ -386,7 +386,7 @@ class Panes:
             alpha=dr.select(is_pane, 0, si.bsdf.alpha),
             kind=dr.select(is_pane, mi.UInt32(GLASS), si.bsdf.kind),
         )
-        found = si._replace(
+        nearest = si._replace(
             valid=si.valid | is_pane,
             p=dr.select(is_pane, p, si.p),
             ng=dr.select(is_pane, n, si.ng),
@@ -395,7 +395,7 @@ class Panes:
             bsdf=clear,
             is_cutout=si.is_cutout & ~is_pane,
         )
-        return found, is_pane
+        return nearest, is_pane
 
     @dr.syntax
     def _nearer(self, valid: Any, at: Any, o: Any, d: Any, looks: Any) -> tuple[Any, Any, Any]:
@@ -435,8 +435,8 @@ def _ray_step(p: Any) -> Any:
 
 def _first_face(scene: Any, ray: Any, active: Any) -> tuple[Any, Any, Any]:
     """(number, barycentric coordinates, whether there is one) of the first face along a ray."""
-    found = scene.ray_intersect_preliminary(ray, False, active)
-    return found.prim_index, found.prim_uv, active & found.is_valid()
+    hit = scene.ray_intersect_preliminary(ray, False, active)
+    return hit.prim_index, hit.prim_uv, active & hit.is_valid()
 
 
 def _ray(o: Any, d: Any, reach: Any) -> Any:

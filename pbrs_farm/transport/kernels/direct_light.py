@@ -129,10 +129,10 @@ def _direct_light(
     taken = _taken_by_sunlit(context, vertex, path, sample, value, contributes)
     if roulette is not None:
         rate = context.emitters.arrival.of_kind(si.p, sample.kind, contributes)
-        left = value * sample.radiance * weight
+        rest = value * sample.radiance * weight
         if taken is not None:
-            left = dr.maximum(left - taken, 0)
-        is_cast, chance = roulette.cast_by_chance(left, rate)
+            rest = dr.maximum(rest - taken, 0)
+        is_cast, chance = roulette.cast_by_chance(rest, rate)
         contributes, weight = contributes & is_cast, weight / chance
         taken = None if taken is None else taken / chance
 

@@ -291,8 +291,8 @@ class Emitters:
         free = counted < 0
         pdf = dr.select(free, chances[DOME], dr.select(counted == DOME, 1, 0)) * texel_pdf
         for k in range(MAX_PORTALS):
-            asked = dr.select(counted == FIRST_PORTAL + k, 1, 0)
-            weight = dr.select(free, chances[FIRST_PORTAL + k], asked)
+            is_counted = dr.select(counted == FIRST_PORTAL + k, 1, 0)
+            weight = dr.select(free, chances[FIRST_PORTAL + k], is_counted)
             pdf += weight * self._portal_pdf(k, p, d)
         return dr.select(counted == SUN, 0, radiance), pdf
 
@@ -344,8 +344,8 @@ class Emitters:
         y = dr.safe_acos(d.y) * (1 / math.pi) * self._dome_height_f
         nearest_x = dr.clip(mi.Int32(x), 0, w - 1)
         nearest_y = dr.clip(mi.Int32(y), 0, h - 1)
-        at = mi.UInt32(nearest_y * w + nearest_x) + first
-        pdf = dr.gather(mi.Vector4f, self._dome, at, active)[3]
+        texel_index = mi.UInt32(nearest_y * w + nearest_x) + first
+        pdf = dr.gather(mi.Vector4f, self._dome, texel_index, active)[3]
         # Blend the radiance of four texels; longitude repeats, latitude ends.
         fx, fy = dr.floor(x - 0.5), dr.floor(y - 0.5)
         tx, ty = x - 0.5 - fx, y - 0.5 - fy
@@ -353,8 +353,8 @@ class Emitters:
         for dx, dy in ((0, 0), (1, 0), (0, 1), (1, 1)):
             column, row = mi.Int32(fx) + dx, dr.clip(mi.Int32(fy) + dy, 0, h - 1)
             column = dr.select(column < 0, column + w, dr.select(column >= w, column - w, column))
-            at = mi.UInt32(row * w + column) + first
-            texel = dr.gather(mi.Vector4f, self._dome, at, active)
+            texel_index = mi.UInt32(row * w + column) + first
+            texel = dr.gather(mi.Vector4f, self._dome, texel_index, active)
             weight = (tx if dx else 1 - tx) * (ty if dy else 1 - ty)
             total += weight * colour(texel)
         return total, pdf

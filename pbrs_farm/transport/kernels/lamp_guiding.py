@@ -184,8 +184,8 @@ class NearbyLampSampler:
             return slot._replace(counts=dr.select(is_asked, 0.0, slot.counts))
         lamp = dr.select(is_asked, mi.UInt32(counted), slot.lamp)
         tables = self._spheres, self._strengths, self._interiors
-        asked = (dr.gather(mi.Vector4f, table, lamp, active & is_asked) for table in tables)
-        rows = (dr.select(is_asked, a, b) for a, b in zip(asked, slot.rows, strict=True))
+        counted_rows = (dr.gather(mi.Vector4f, table, lamp, active & is_asked) for table in tables)
+        rows = (dr.select(is_asked, a, b) for a, b in zip(counted_rows, slot.rows, strict=True))
         return _Slot(lamp, dr.select(is_asked, 1.0, slot.counts), _LampRows(*rows))
 
 

@@ -84,8 +84,8 @@ class OutdoorChoice:
         # Add in place: a copy per thread would put the number of voxels into the kernel, and every
         # home
         # would compile a new one.
-        one, mode = mi.UInt32(1), dr.ReduceMode.Direct
-        dr.scatter_add(counts.vertices, one, place, counted, mode=mode)
+        unit, mode = mi.UInt32(1), dr.ReduceMode.Direct
+        dr.scatter_add(counts.vertices, unit, place, counted, mode=mode)
         # The root, so that a few bright vertices do not say all; whole numbers, so that their order
         # changes no sum.
         root = mi.UInt32(_STEPS * dr.sqrt(dr.clip(brought * self._scale, 0, _MOST)) + 0.5)
@@ -103,14 +103,14 @@ def weights_by_place(weights: F64, counts: NDArray[np.uint32], grid: VoxelGrid) 
 
     weights: (techniques,) of the view. counts: TechniqueCounts.numpy().
     """
-    own = counts[..., : len(weights)].astype(np.uint64)
-    near_vertices, near_brought = (grid.with_neighbours(rows) for rows in own)
-    vertices, brought = own.astype(np.float64)
+    own_counts = counts[..., : len(weights)].astype(np.uint64)
+    near_vertices, near_brought = (grid.with_neighbours(rows) for rows in own_counts)
+    vertices, brought = own_counts.astype(np.float64)
     everywhere = (brought.sum(0) + 0.5 * _STEPS) / (vertices.sum(0) + 1)
     near = (near_brought + PRIOR_VERTICES * everywhere) / (near_vertices + PRIOR_VERTICES)
-    here = (brought + PRIOR_VERTICES * near) / (vertices + PRIOR_VERTICES)
+    rate = (brought + PRIOR_VERTICES * near) / (vertices + PRIOR_VERTICES)
     # Mix in the view's weights: the visibility from a voxel is estimated from few vertices.
-    rows = weights * here / everywhere
+    rows = weights * rate / everywhere
     rows /= rows.sum(1, keepdims=True)
     rows = (1 - _VIEW_SHARE) * rows + _VIEW_SHARE * weights
     return np.asarray(np.round(rows, 6) / np.round(rows, 6).sum(1, keepdims=True))

@@ -146,8 +146,8 @@ class Outside:
         of_things = (share[..., None] * shown).sum(0)
         row = np.arange(dome.shape[0]) * rows // dome.shape[0]
         column = np.arange(dome.shape[1]) * columns // dome.shape[1]
-        at = np.ix_(row, column)
-        return np.asarray(dome * (1 - covered[at])[..., None] + of_things[at], np.float32)
+        cell = np.ix_(row, column)
+        return np.asarray(dome * (1 - covered[cell])[..., None] + of_things[cell], np.float32)
 
     def _shown(self, home: DeviceScene, o: Any, d: Any, active: Any) -> tuple[Any, Any, Any]:
         si = self._scene.intersect_past_holes(o, d, active)

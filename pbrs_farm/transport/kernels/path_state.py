@@ -215,8 +215,8 @@ def surface_path(vertex: Vertex, d: Any, pdf: Any) -> PathState:
 
 def _first_ray(o: Any, d: Any, depth: Any, reference: ReferencePoint, pdf: Any) -> PathState:
     white, none, unguided = mi.Color3f(1), mi.UInt32(0), mi.UInt32(NO_FACE)
-    met = mi.Bool(False)
-    return PathState(o, d, white, depth, none, met, reference, pdf, mi.Float(0), unguided)
+    has_met = mi.Bool(False)
+    return PathState(o, d, white, depth, none, has_met, reference, pdf, mi.Float(0), unguided)
 
 
 def white_vertex(p: Any, n: Any, near: NearbyLamps) -> Vertex:

@@ -211,8 +211,8 @@ def _choose_lobe(emitters: Emitters, vertex: Vertex, path: PathState, u: Any) ->
 
 def _mirrored_share(emitters: Emitters, reflectance: Any) -> Any:
     """Share of rays reflected at a pane: about in proportion to the light, at most half."""
-    wanted = reflectance / (reflectance + (1 - reflectance) * emitters.pane_odds)
-    return dr.minimum(wanted, dr.maximum(reflectance, _MAX_PANE))
+    odds = reflectance / (reflectance + (1 - reflectance) * emitters.pane_odds)
+    return dr.minimum(odds, dr.maximum(reflectance, _MAX_PANE))
 
 
 def _mirrored_ray(
@@ -262,17 +262,17 @@ def _emitted_light(
 
     # Leave out what the camera sees directly where one emitter is asked for: it needs no choice.
     counts = mi.Bool(by_scatter)
-    for asked in emitter_filter:
-        counts |= False if asked is None else asked == ALL_EMITTERS
+    for counted in emitter_filter:
+        counts |= False if counted is None else counted == ALL_EMITTERS
     outdoor, indoor, sky_albedo = mi.Color3f(0), mi.Color3f(0), mi.Color3f(1)
     if emitter_filter.outdoor is not None:
-        here, asked = path.reference.p, emitter_filter.outdoor
-        chances = emitters.outdoor_choice.chances(here, missed)
-        sun, sun_pdf = emitters.eval_sun(chances, path.d, asked)
+        reference, counted = path.reference.p, emitter_filter.outdoor
+        chances = emitters.outdoor_choice.chances(reference, missed)
+        sun, sun_pdf = emitters.eval_sun(chances, path.d, counted)
         is_seen = False if emitters.outside is None else ~by_scatter
-        dome, dome_pdf = emitters.eval_dome(chances, here, path.d, asked, missed, is_seen)
+        dome, dome_pdf = emitters.eval_dome(chances, reference, path.d, counted, missed, is_seen)
         # If only a portal counts, add only directions drawn through it.
-        is_asked = (asked > NO_EMITTERS) & (asked < FIRST_PORTAL)
+        is_asked = (counted > NO_EMITTERS) & (counted < FIRST_PORTAL)
         sees_sky = missed & counts & emitters.has_sky & is_asked
         if emitters.outside is not None:
             meets_sun = missed & by_scatter & (dr.max(sun) > 0)
@@ -346,7 +346,7 @@ def _follow(step: _Step, scattered: ScatteredRay) -> tuple[PathState, DirectionP
     straight_d = dr.select(mirrored, mi.Vector3f(scattered.mirror_d), path.d)
     d = dr.select(bounced, scattered.d, straight_d)
     outward = dr.select(dr.dot(d, si.ng) > 0, si.ng, -si.ng)
-    here = no_reference(si.p) if vertex.near is None else vertex.near.reference
+    reference = no_reference(si.p) if vertex.near is None else vertex.near.reference
     is_null = passed | (vertex.is_glass & mirrored)
     target_face = dr.select(mirrored, NO_FACE, path.target_face)
     pdf_by_surface = dr.select(bounced, scattered.pdf, 0)
@@ -359,7 +359,7 @@ def _follow(step: _Step, scattered: ScatteredRay) -> tuple[PathState, DirectionP
             depth=vertex.depth,
             n_nulls=path.n_nulls + dr.select(is_null, mi.UInt32(1), 0),
             met_glass=path.met_glass | (vertex.is_glass & is_null),
-            reference=dr.select(bounced, here, path.reference),
+            reference=dr.select(bounced, reference, path.reference),
             bsdf_pdf=dr.select(bounced, pdf, dr.select(mirrored, 0, path.bsdf_pdf)),
             guiding_odds=dr.select(bounced, odds, dr.select(mirrored, 0, path.guiding_odds)),
             target_face=dr.select(bounced, scattered.target_face, target_face),
@@ -387,8 +387,8 @@ def _throughput(step: _Step, scattered: ScatteredRay) -> Any:
     factor = dr.select(vertex.is_rough, scattered.value / scattered.pdf, mi.Color3f(1))
     factor = dr.select(vertex.is_mirror, bsdf.f0, factor)
     passed = vertex.is_glass & scattered.passed
-    left = thin_glass_transmittance(bsdf.tau, vertex.wi.z)
-    beta = step.path.beta * dr.select(passed, left, factor)
+    passed_light = thin_glass_transmittance(bsdf.tau, vertex.wi.z)
+    beta = step.path.beta * dr.select(passed, passed_light, factor)
     if step.strategy.near is None and vertex.is_pane is None:
         return beta
     # Make up for having chosen reflection more often than it happens.

@@ -170,11 +170,11 @@ def sample_alias_table(alias: Any, first: Any, count: Any, u: Any, active: Any) 
     i = dr.minimum(mi.UInt32(x), count - 1)
     f = x - mi.Float(i)
     row = dr.gather(mi.Vector2f, alias, first + i, active)
-    other = dr.reinterpret_array(mi.UInt32, row[1])
+    alternative = dr.reinterpret_array(mi.UInt32, row[1])
     stay = f < row[0]
     # Stretch the remainder of u to [0, 1).
     again = dr.select(stay, f / row[0], (f - row[0]) / (1 - row[0]))
-    return dr.select(stay, i, other), as_random(again)
+    return dr.select(stay, i, alternative), as_random(again)
 
 
 def alias_rows(weights: NDArray[np.floating]) -> F32:
@@ -187,18 +187,18 @@ def alias_rows(weights: NDArray[np.floating]) -> F32:
     n = len(w)
     total = w.sum()
     chance = w * (n / total) if total > 0 else np.ones(n)
-    stay, other = np.ones(n), np.arange(n, dtype=np.uint32)
+    stay, aliases = np.ones(n), np.arange(n, dtype=np.uint32)
     # Pair each entry below the mean with one above it, which fills it up.
     small = [int(i) for i in np.flatnonzero(chance < 1)]
     large = [int(i) for i in np.flatnonzero(chance >= 1)]
-    left = chance.tolist()
+    rest = chance.tolist()
     while small and large:
         i, j = small.pop(), large[-1]
-        stay[i], other[i] = left[i], j
-        left[j] -= 1 - left[i]
-        if left[j] < 1:
+        stay[i], aliases[i] = rest[i], j
+        rest[j] -= 1 - rest[i]
+        if rest[j] < 1:
             small.append(large.pop())
     rows = np.empty((n, 2), np.float32)
     rows[:, 0] = np.clip(stay, 0, 1)
-    rows[:, 1] = other.view(np.float32)
+    rows[:, 1] = aliases.view(np.float32)
     return rows

@@ -73,8 +73,8 @@ class SunPlane:
         a = np.cross(direction, helper)
         a /= np.linalg.norm(a)
         b = np.cross(direction, a)
-        at = (places - middle) @ np.stack([a, b], 1)
-        low, size = at.min(0), np.ptp(at, axis=0)
+        plane = (places - middle) @ np.stack([a, b], 1)
+        low, size = plane.min(0), np.ptp(plane, axis=0)
         edge = _EDGE_M
         while np.prod(shape := np.floor(size / edge) + 1) > _MAX_CELLS:
             edge *= 1.1

@@ -75,9 +75,9 @@ def trace_lit_points(
     cell = device_array(mi.UInt32, cells)
     rays = trace_sun_rays(scene, sun, plane, cell, sampler)
     # Keep the cell that the other technique finds: at an edge rounding may say the next one.
-    at, inside = plane.cell(rays.si.p, rays.d)
-    lit = rays.lit & inside & (at == cell)
-    pdf = dr.gather(mi.Float, pdfs, at, lit)
+    cells_hit, inside = plane.cell(rays.si.p, rays.d)
+    lit = rays.lit & inside & (cells_hit == cell)
+    pdf = dr.gather(mi.Float, pdfs, cells_hit, lit)
     si, f0 = rays.si, rgb(rays.si.bsdf.f0)
     # Write each point's row, and keep the lit ones.
     normals = *xyz(si.ng), pdf, *xyz(si.n_interpolated), si.bsdf.alpha
@@ -139,12 +139,12 @@ def _worth_of(
 @dr.syntax
 def _behind_glass(scene: DeviceScene, o: Any, d: Any) -> Any:
     """Where a ray starts that passes all glass and cut-outs before its first other surface."""
-    here, n = mi.Point3f(o), mi.UInt32(0)
+    start, n = mi.Point3f(o), mi.UInt32(0)
     goes_on = dr.full(mi.Bool, True, dr.width(o))
     while goes_on:
-        si = scene.intersect(here, d, goes_on)
+        si = scene.intersect(start, d, goes_on)
         passes = goes_on & si.valid & (si.is_cutout | (si.bsdf.kind == GLASS))
-        here = dr.select(passes, offset_ray_origin(si.p, -si.ng), here)
+        start = dr.select(passes, offset_ray_origin(si.p, -si.ng), start)
         n += 1
         goes_on = passes & (n < MAX_TRANSPARENT)
-    return here
+    return start

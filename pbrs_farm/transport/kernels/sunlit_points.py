@@ -122,8 +122,8 @@ class SunlitPoints:
         first = dr.gather(mi.UInt32, self._first, number, active)
         count = dr.gather(mi.UInt32, self._first, number + 1, active) - first
         active = active & (total > 0) & (count > 0)
-        at = first + dr.minimum(mi.UInt32(rest * mi.Float(count)), count - 1)
-        rows = gather_packets(self._rows, at, POINT_FLOATS // 4, active)
+        index = first + dr.minimum(mi.UInt32(rest * mi.Float(count)), count - 1)
+        rows = gather_packets(self._rows, index, POINT_FLOATS // 4, active)
 
         # Evaluate its reflection towards p.
         to = point(rows[0]) - p
@@ -150,12 +150,12 @@ class SunlitPoints:
         d: unit direction to the sun.
         """
         p, p_bsdf = ray
-        at, inside = self._plane.cell(si.p, d)
+        cell, inside = self._plane.cell(si.p, d)
         active = active & inside & (p_bsdf > 0) & (dr.max(si.bsdf.tau) <= 0)
-        row = dr.gather(mi.Vector2f, self._cells, at, active)
+        row = dr.gather(mi.Vector2f, self._cells, cell, active)
         chance, number = mi.Float(0), mi.UInt32(row[1])
-        for k, other in enumerate(self.chances(p, active)):
-            chance = dr.select(number == k, other, chance)
+        for k, p_other in enumerate(self.chances(p, active)):
+            chance = dr.select(number == k, p_other, chance)
         y = _Point(si.ng, si.n_interpolated, dr.dot(si.ng, d), row[0])
         to = p - si.p
         distance = dr.norm(to)

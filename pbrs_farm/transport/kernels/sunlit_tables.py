@@ -81,8 +81,8 @@ def find_used_cells(scene: DeviceScene, sun: SunDisc, grid: VoxelGrid, vertices:
     centres = grid.centres()[vertices > 0]
     corners = (np.indices((2, 2, 2)).reshape(3, -1).T - 0.5) * grid.edge_m
     plane = SunPlane(sun.direction, (centres[:, None] + corners).reshape(-1, 3))
-    wanted = device_array(mi.Float, (vertices / vertices.sum()).astype(np.float32))
-    places, worth = value_cells(scene, sun, plane, grid, wanted, _CELL_SEED)
+    visits = device_array(mi.Float, (vertices / vertices.sum()).astype(np.float32))
+    places, worth = value_cells(scene, sun, plane, grid, visits, _CELL_SEED)
     # Let a cell count for its neighbours, too: one ray a cell is a noisy estimate.
     picture = worth.astype(np.float64).reshape(plane.shape)
     smooth = np.asarray(uniform_filter(picture, _SMOOTH, mode="constant"), np.float64).ravel()
@@ -93,9 +93,9 @@ def find_used_cells(scene: DeviceScene, sun: SunDisc, grid: VoxelGrid, vertices:
     if not len(lit):
         return UsedCells(plane, groups, np.zeros(plane.n_cells))
     # A cell whose own ray lit nothing goes with the nearest cell on the plane.
-    at = np.stack(np.divmod(np.arange(plane.n_cells), plane.shape[1]), 1).astype(np.float64)
+    cells = np.stack(np.divmod(np.arange(plane.n_cells), plane.shape[1]), 1).astype(np.float64)
     of_lit = _group_places(places[lit].astype(np.float64), shares[lit])
-    groups[used] = of_lit[_nearest_place(at[used], at[lit])]
+    groups[used] = of_lit[_nearest_place(cells[used], cells[lit])]
     return UsedCells(plane, groups, shares / shares.sum())
 
 
@@ -129,8 +129,8 @@ def trace_points(
     # few the share is not known.
     lit = np.bincount(groups[numbers], minlength=MAX_SUNLIT)
     scale = np.where(lit >= _LEAST_LIT, sent / np.maximum(lit, 1), 0)
-    kept = scale[groups[numbers]] > 0
-    rows, numbers = rows[kept], numbers[kept]
+    is_lit = scale[groups[numbers]] > 0
+    rows, numbers = rows[is_lit], numbers[is_lit]
     rows[:, PLANE_PDF] *= scale[groups[numbers]]
     table = np.zeros((used.plane.n_cells, 2), np.float32)
     table[is_used, 0] = pdfs[is_used] * scale[used.groups[is_used]]
@@ -164,10 +164,10 @@ def _group_places(places: F64, weights: F64) -> I64:
         away = ((places[:, None] - centres) ** 2).sum(2).min(1)
         centres = np.append(centres, places[[int(np.argmax(away * weights))]], 0)
     for _ in range(_ROUNDS):
-        own = _nearest_place(places, centres)
-        total = np.bincount(own, weights, len(centres))
+        groups = _nearest_place(places, centres)
+        total = np.bincount(groups, weights, len(centres))
         for k in np.flatnonzero(total > 0):
-            centres[k] = np.average(places[own == k], axis=0, weights=weights[own == k])
+            centres[k] = np.average(places[groups == k], axis=0, weights=weights[groups == k])
     return _nearest_place(places, centres)
 
 

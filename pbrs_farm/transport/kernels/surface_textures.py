@@ -121,12 +121,12 @@ def _four_texels(
     fx, fy = dr.floor(x), dr.floor(y)
     x0, y0 = mi.Int32(fx), mi.Int32(fy)
     tx, ty = x - fx, y - fy
-    found = []
+    samples = []
     for dx, dy in ((0, 0), (1, 0), (0, 1), (1, 1)):
         column, row = x0 + dx, y0 + dy
         column = dr.select(column < 0, column + w, dr.select(column >= w, column - w, column))
         row = dr.select(row < 0, row + h, dr.select(row >= h, row - h, row))
         index = first + mi.UInt32(row * w + column)
         bits = dr.gather(mi.UInt32, texels, index, active)
-        found.append((bits, (tx if dx else 1 - tx) * (ty if dy else 1 - ty)))
-    return found
+        samples.append((bits, (tx if dx else 1 - tx) * (ty if dy else 1 - ty)))
+    return samples

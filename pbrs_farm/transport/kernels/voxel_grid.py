@@ -38,8 +38,8 @@ class VoxelGrid:
 
     def centres(self) -> F64:
         """(voxels, 3) their middles."""
-        at = np.indices(tuple(int(n) for n in self._host_shape)).reshape(3, -1).T
-        return np.asarray(self._host_low + (at + 0.5) * self.edge_m)
+        cell = np.indices(tuple(int(n) for n in self._host_shape)).reshape(3, -1).T
+        return np.asarray(self._host_low + (cell + 0.5) * self.edge_m)
 
     def with_neighbours(self, rows: NDArray[np.unsignedinteger]) -> NDArray[np.unsignedinteger]:
         """(voxels, K) sums of rows over each voxel and its (up to 26) neighbours.

@@ -93,20 +93,20 @@ def bootstrap_chains(
     quantiles = (np.arange(n_chains) + np.random.default_rng(seed).random()) / n_chains
     chosen = np.searchsorted(np.cumsum(targets) / targets.sum(), quantiles)
     chosen = np.random.default_rng(seed + 1).permutation(np.minimum(chosen, n_bootstrap - 1))
-    at = mi.UInt32(with_slack(chosen.astype(np.uint32)))
+    rows = mi.UInt32(with_slack(chosen.astype(np.uint32)))
 
     # Draw the numbers of the chosen paths again; copy what the paths are.
     n, n_paths = dr.opaque(mi.UInt32, n_chains), dr.opaque(mi.UInt32, n_bootstrap)
     index = dr.arange(mi.UInt32, STORED_DIMS * n_chains)
-    keys = dr.gather(mi.UInt32, key, dr.gather(mi.UInt32, at, index % n))
+    keys = dr.gather(mi.UInt32, key, dr.gather(mi.UInt32, rows, index % n))
     column = dr.arange(mi.UInt32, SUFFIX_FLOATS * n_chains)
-    source = column // n * n_paths + dr.gather(mi.UInt32, at, column % n)
+    source = column // n * n_paths + dr.gather(mi.UInt32, rows, column % n)
     chains = Chains(
         samples=HashedSampler(keys, mi.UInt32(0)).get_1d(index // n),
-        light=dr.gather(mi.Color3f, paths.light, at),
-        target=dr.gather(mi.Float, paths.target, at),
-        pixel=dr.gather(mi.UInt32, paths.pixel, at),
-        shared=dr.gather(mi.Float, paths.shared, at),
+        light=dr.gather(mi.Color3f, paths.light, rows),
+        target=dr.gather(mi.Float, paths.target, rows),
+        pixel=dr.gather(mi.UInt32, paths.pixel, rows),
+        shared=dr.gather(mi.Float, paths.shared, rows),
         suffixes=dr.gather(mi.Float, paths.suffixes, source),
     )
     dr.eval(*chains)

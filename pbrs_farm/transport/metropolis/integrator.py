@@ -147,12 +147,14 @@ class ChainRun:
 
     def _prefixes_of(self, sets: range) -> Prefixes:
         """These sets of prefixes, traced unless the last launch had them all."""
-        held = self._prefixes
-        if held is None or sets.start < held.sets.start or sets.stop > held.sets.stop:
-            self._prefixes = held = None  # a set of a large picture is a gigabyte: never keep both
-            held = trace_prefixes(self._context, self._n_pixels, sets, self._seed)
-        self._prefixes = held
-        return held
+        prefixes = self._prefixes
+        if prefixes is None or sets.start < prefixes.sets.start or sets.stop > prefixes.sets.stop:
+            self._prefixes = prefixes = (
+                None  # a set of a large picture is a gigabyte: never keep both
+            )
+            prefixes = trace_prefixes(self._context, self._n_pixels, sets, self._seed)
+        self._prefixes = prefixes
+        return prefixes
 
     def estimate(self) -> Estimate:
         """The light so far, scaled to the mean of the target function."""
@@ -197,9 +199,9 @@ def chain_run(
         context, started = _restored(context, kept)
         return ChainRun(view, context, min_segments, started)
     # Bootstrap the importance, then the chains.
-    wanted = _wanted(view)
-    n_chains = n_chains_of(wanted, view.fields)
-    n_paths = int(np.clip(wanted, _MIN_BOOTSTRAP, _MAX_BOOTSTRAP))
+    n_wanted = _wanted(view)
+    n_chains = n_chains_of(n_wanted, view.fields)
+    n_paths = int(np.clip(n_wanted, _MIN_BOOTSTRAP, _MAX_BOOTSTRAP))
     context = with_importance(context, shape, n_paths // 4, view.seed ^ 0x5BD1E995)
     chains, target = bootstrap_chains(context, n_paths, n_chains, view.seed)
     if chains is None:
@@ -246,8 +248,8 @@ def _path_context(
 
     There is none at the first two vertices, so that a suffix does not depend on its prefix.
     """
-    every = dr.opaque(mi.Int32, ALL_EMITTERS)
+    sees_all = dr.opaque(mi.Int32, ALL_EMITTERS)
     is_indoor = group is Group.INDOOR
-    emitter_filter = EmitterFilter(every, None) if is_indoor else EmitterFilter(None, every)
+    emitter_filter = EmitterFilter(sees_all, None) if is_indoor else EmitterFilter(None, sees_all)
     late = fields.model_copy(update={"rr_depth": max(fields.rr_depth, _MIN_RR_DEPTH)})
     return PathContext(scene, emitters, device_fields(late), emitter_filter)

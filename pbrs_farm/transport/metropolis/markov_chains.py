@@ -143,8 +143,8 @@ def mutate(context: ChainContext, chains: Chains, how: Mutations) -> tuple[Chain
         is_large = unit_float(hash32(key ^ 0x51ED270B)) < how.p_large
         proposal = MutatedSampler(x_samples, key, is_large)
         u = proposal.get_2d(mi.UInt32(0))
-        pixel, corner, at = sample_film(film, u, context.paths.fields.is_tent)
-        y = dr.select(fresh, _camera_split_path(context.camera, corner, at), y)
+        pixel, corner, sample = sample_film(film, u, context.paths.fields.is_tent)
+        y = dr.select(fresh, _camera_split_path(context.camera, corner, sample), y)
         y, alive = _extend(context, proposal, y, y_suffix, active)
         done = active & ~alive
 
@@ -179,9 +179,9 @@ def draw_paths(context: ChainContext, sampler: HashedSampler, n: int) -> Chains:
     """n independent paths, one per lane, as chain states; their random numbers are not kept."""
     film = context.film
     is_tent = context.paths.fields.is_tent
-    pixel, corner, at = sample_film(film, sampler.get_2d(mi.UInt32(0)), is_tent)
+    pixel, corner, sample = sample_film(film, sampler.get_2d(mi.UInt32(0)), is_tent)
     suffix = dr.alloc_local(mi.Float, SUFFIX_FLOATS)
-    y = _camera_split_path(context.camera, corner, at)
+    y = _camera_split_path(context.camera, corner, sample)
     # Extend each lane's path until it ends; the loop is recorded, ended lanes are masked.
     active = mi.Bool(True)
     while active:
@@ -236,9 +236,9 @@ def _extend(
     # Split the path where it makes its second vertex.
     is_beyond = before >= 2
     is_second = active & (before < 2) & (following.depth == 2)
-    is_independent, asked = result.is_view_independent, context.paths.emitter_filter
+    is_independent, emitter_filter = result.is_view_independent, context.paths.emitter_filter
     reach = split.first, split.passed
-    bounded = record_suffix(suffix, result, path, reach, asked, is_second & is_independent)
+    bounded = record_suffix(suffix, result, path, reach, emitter_filter, is_second & is_independent)
     prefix_beta = dr.select(is_second, following.beta, split.prefix_beta)
     following.beta = dr.select(is_second, 1, following.beta)
 
@@ -285,8 +285,8 @@ def _move(
     """
     x.weight += dr.select(done, 1 - a, 0)
     proposed.weight = a
-    left = dr.select(accept, x, proposed)
-    _splat_state(film, chain, left, done)
+    rest = dr.select(accept, x, proposed)
+    _splat_state(film, chain, rest, done)
     return dr.select(accept, proposed, x)
 
 

@@ -116,8 +116,8 @@ def _trace_prefix(context: ChainContext, sampler: Sampler, pixel: Any) -> _Prefi
     """Follow mirrors and glass to the first rough surface; no emitter counts."""
     paths = context.paths._replace(emitter_filter=EmitterFilter(None, None))
     u = sampler.get_2d(mi.UInt32(0))
-    corner, at = sample_pixel(context.film, pixel, u, paths.fields.is_tent)
-    path = camera_path(context.camera, corner, at)
+    corner, sample = sample_pixel(context.film, pixel, u, paths.fields.is_tent)
+    path = camera_path(context.camera, corner, sample)
     prefix = _Prefix(
         mi.Point3f(0),
         mi.Vector3f(0),
@@ -135,7 +135,7 @@ def _trace_prefix(context: ChainContext, sampler: Sampler, pixel: Any) -> _Prefi
         beta, d = mi.Color3f(path.beta), mi.Vector3f(path.d)
         path, result, alive = advance(paths, sampler, path, active)
         si, bsdf = result.si, result.si.bsdf
-        found = _Prefix(
+        traced = _Prefix(
             mi.Point3f(si.p),
             si.n,
             si.ng,
@@ -147,6 +147,6 @@ def _trace_prefix(context: ChainContext, sampler: Sampler, pixel: Any) -> _Prefi
             beta,
             mi.Bool(True),
         )
-        prefix = dr.select(active & result.is_rough & (path.depth == 1), found, prefix)
+        prefix = dr.select(active & result.is_rough & (path.depth == 1), traced, prefix)
         active = active & alive & (path.depth == 0)
     return prefix

@@ -134,16 +134,16 @@ def _lane_of(
     first_slot = number * n_slots + slot - slot % launch.n
     # Let neighbouring chains take different sets: they are even in number, so that the film's
     # halves, of even and of odd chains, share no prefix.
-    n_sets, every = (dr.opaque(mi.UInt32, v) for v in rounds.schedule)
-    block = (dr.opaque(mi.UInt32, rounds.numbers.start) + number) // every
+    n_sets, period = (dr.opaque(mi.UInt32, v) for v in rounds.schedule)
+    block = (dr.opaque(mi.UInt32, rounds.numbers.start) + number) // period
     in_run = block * n_sets + chain % n_sets
-    left = dr.opaque(mi.UInt32, rounds.n_steps) - number * ROUND_STEPS
+    n_left = dr.opaque(mi.UInt32, rounds.n_steps) - number * ROUND_STEPS
     return _Lane(
         x2=gather_packets(records.rows, record, SUFFIX_PACKETS),
         chain=chain,
         own_pixel=own_pixel,
         shared=dr.gather(mi.Float, records.shared, record),
-        weight=mi.Float(dr.minimum(left, ROUND_STEPS)),
+        weight=mi.Float(dr.minimum(n_left, ROUND_STEPS)),
         first_slot=first_slot,
         first_prefix=(in_run - dr.opaque(mi.UInt32, prefixes.sets.start)) * n_pixels,
     )
@@ -159,8 +159,8 @@ def _light_of_pixels(launch: _Launch, lane: _Lane, max_n: int) -> tuple[Any, Any
         is_pixel, is_own = pixel != NO_PIXEL, pixel == lane.own_pixel
         row = lane.first_prefix + pixel
         x1 = gather_packets(launch.prefix_rows, row, PREFIX_PACKETS, is_pixel)
-        others = _shared_light(launch.scene, x1, lane.x2, is_pixel & ~is_own)
-        value = dr.select(is_own, colour(lane.x2[8]) * lane.shared, others)
+        light = _shared_light(launch.scene, x1, lane.x2, is_pixel & ~is_own)
+        value = dr.select(is_own, colour(lane.x2[8]) * lane.shared, light)
         # Skip non-finite values.
         target = target_function(launch.film, pixel, value, is_pixel)
         good = (target > 0) & dr.isfinite(target)

@@ -85,11 +85,11 @@ def record_suffix(
     direct = result.outdoor_sample if emitter_filter.indoor is None else result.indoor_sample
     # Convert to K's measure: by the pdf of x2 by all techniques, and the probability of the glass
     # between. That of leaving x2 is known only where the ray ends.
-    left, passed = reach
+    rest, passed = reach
     cos = dr.abs(dr.dot(si.ng, path.d))
     distance2 = dr.squared_norm(si.p - path.reference.p)
     measure = cos / distance2
-    pdfs = left.techniques / dr.maximum(result.guided_weight, 1e-30) * measure * passed
+    pdfs = rest.techniques / dr.maximum(result.guided_weight, 1e-30) * measure * passed
     values = (
         *xyz(si.p),
         pdfs,
@@ -109,7 +109,7 @@ def record_suffix(
     for k, value in enumerate(values):
         suffix.write(value, mi.UInt32(k), active)
     suffix.write(direct.d.z, mi.UInt32(_EMITTER_Z), active)
-    return shared_share(left.bsdf * measure)
+    return shared_share(rest.bsdf * measure)
 
 
 def shared_share(area_pdf: Any) -> Any:
@@ -126,9 +126,9 @@ def finish_suffix(suffix: Any, light: Any, split: SplitPath, active: Any) -> Non
     share = dr.select(is_known, second.share, 0)
     guided = dr.maximum(pdf - share * second.bsdf, 0)
     arriving = dr.select(is_known, split.suffix_light, 0)
-    own = light * (suffix.read(mi.UInt32(_PDFS), active) * pdf)
+    direct = light * (suffix.read(mi.UInt32(_PDFS), active) * pdf)
     for c in range(3):
         suffix.write(arriving[c], mi.UInt32(_ARRIVING + c), active)
-        suffix.write(own[c], mi.UInt32(_OWN_LIGHT + c), active)
+        suffix.write(direct[c], mi.UInt32(_OWN_LIGHT + c), active)
     suffix.write(share, mi.UInt32(_PDFS), active)
     suffix.write(guided, mi.UInt32(_GUIDED_PDF), active)
