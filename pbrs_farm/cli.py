@@ -187,7 +187,7 @@ def first_screen() -> Parser:
     return parser
 
 
-def _bare_parser() -> tuple[Parser, Callable[..., argparse.ArgumentParser]]:
+def _bare_parser() -> tuple[Parser, Callable[..., Parser]]:
     """The parser without verbs, and what adds one."""
     parser = Parser(
         prog="pbrs-farm",

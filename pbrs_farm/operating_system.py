@@ -132,7 +132,7 @@ def is_running(pid: int) -> bool:
     """True while a process of this number runs, or has ended and was not waited for."""
     import psutil
 
-    return psutil.pid_exists(pid)
+    return bool(psutil.pid_exists(pid))
 
 
 def after_fork(act: Callable[[], None]) -> None:

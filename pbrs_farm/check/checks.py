@@ -10,9 +10,8 @@ import importlib
 import pkgutil
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, Literal
-
-from pbrs_farm import check as package
 
 Subject = Literal["root", "files", "house", "camera", "view", "views"]
 """What a check looks at: a root, the files of a house, its documents, a view's camera, a view, all views of a house."""
@@ -42,13 +41,12 @@ def checks(of: Subject) -> tuple[Check, ...]:
 
 def all_checks() -> tuple[Check, ...]:
     """Every entry of the table, cheap ones first."""
-    names = sorted(
-        m.name for m in pkgutil.iter_modules(package.__path__) if m.name.endswith("_checks")
-    )
+    folder = str(Path(__file__).parent)
+    names = sorted(m.name for m in pkgutil.iter_modules([folder]) if m.name.endswith("_checks"))
     return _entries(tuple(names))
 
 
 @functools.cache
 def _entries(names: tuple[str, ...]) -> tuple[Check, ...]:
-    modules = [importlib.import_module(f"{package.__name__}.{name}") for name in names]
+    modules = [importlib.import_module(f"{__package__}.{name}") for name in names]
     return tuple(sorted((c for m in modules for c in m.CHECKS), key=lambda check: check.cost))

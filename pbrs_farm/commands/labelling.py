@@ -28,7 +28,8 @@ if TYPE_CHECKING:
     from pbrs_farm.export.chosen_view import Choice
     from pbrs_farm.export.form import Form
     from pbrs_farm.export.view_options import ViewOptions
-    from pbrs_farm.views.packing.packing_plan import Packing, PackOptions
+    from pbrs_farm.views.packing.pack_options import PackOptions
+    from pbrs_farm.views.packing.packing_plan import Packing
 
 SPLIT = "by home: train/val/test (default 80/10/10); without it all views are one"
 

@@ -421,5 +421,6 @@ class View:
     @property
     def shot(self) -> Shot:
         """Take, frame and camera of the rig, parsed from the id."""
-        is_first = self.rig is None or self.rig.instant == self.id
-        return Shot.of_id(self.id, () if is_first else (self.rig.camera,))
+        if self.rig is None or self.rig.instant == self.id:
+            return Shot.of_id(self.id)
+        return Shot.of_id(self.id, (self.rig.camera,))

@@ -152,7 +152,11 @@ def _sensor_shot(
     fields, tone = camera.sensor, camera.tone
     if not fields.is_on:
         return None
-    parts = ["sensor", work.recipe.digest("sensor"), *([variant] if variant else [])]
+    parts: list[str | int] = [
+        "sensor",
+        work.recipe.digest("sensor"),
+        *([variant] if variant else []),
+    ]
     seed = work.recipe.shot(work.view_id or "").seed(work.house_id, *parts, per="view")
     if fields.lag_s == 0:
         return SensorShot(fields, seed)

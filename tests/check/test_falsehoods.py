@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from numpy.typing import NDArray
 
-from pbrs_farm.check import fields, light_checks, methods, verify
+from pbrs_farm.check import developing, fields, light_checks, methods, verify
 from pbrs_farm.core import layers
 from pbrs_farm.core.layers import optional_layer
 from pbrs_farm.images import array_from_png, png_from_array
@@ -143,7 +143,7 @@ def test_a_doubt_at_half_the_size_is_settled_as_the_light_stands(
     finished_root: Root, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # As where a median turns on which half of the pixels is lit: gains that no halved light gives.
-    halved = light_checks.white_balance
+    halved = developing.white_balance
 
     def elsewhere(total: NDArray[Any], *words: Any, **named: Any) -> Any:
         gains = halved(total, *words, **named)
