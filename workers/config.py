@@ -197,13 +197,13 @@ _ELSEWHERE: Final = {"redis_url", "store_url", "store", "limits", "webhook", "to
 
 
 def _read_setting(
-    cls: type[FarmConfig | Limits], given: Mapping[str, str], prefix: str
+    cls: type[FarmConfig | Limits], environment: Mapping[str, str], prefix: str
 ) -> dict[str, Any]:
     """Field -> value parsed from its variable; BadInput for an invalid one."""
     # Read each variable by the type of its field; an unknown one is an error: no slip passes.
     kinds = {f.name: str(f.type) for f in fields(cls) if f.name not in _ELSEWHERE}
     values = {}
-    for name, text in given.items():
+    for name, text in environment.items():
         setting = name.removeprefix(prefix).lower()
         setting = _FORMER_NAMES.get(setting, setting)
         kind = kinds.get(setting)

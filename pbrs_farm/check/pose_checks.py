@@ -88,9 +88,9 @@ def _points_of(seen: SeenView) -> F64:
     return np.asarray(np.stack([centre, normal, np.broadcast_to(eye, centre.shape)], 1)[flat])
 
 
-def _positions(seen: SeenView, rows: I64, columns: I64) -> F64:
-    origin, directions = seen.view.rays(rows, columns)
-    return np.asarray(origin + directions * (seen.depth[rows, columns] / 1000)[:, None])
+def _positions(view: SeenView, rows: I64, columns: I64) -> F64:
+    origin, directions = view.view.rays(rows, columns)
+    return np.asarray(origin + directions * (view.depth[rows, columns] / 1000)[:, None])
 
 
 def _nearest(depth: NDArray[Any]) -> F64:

@@ -67,7 +67,7 @@ def _checked(job: dict[str, Any], file: str) -> dict[str, Any]:
 
 
 def submit_arguments(
-    job: Mapping[str, Any], given: argparse.Namespace, parser: argparse.ArgumentParser, file: str
+    job: Mapping[str, Any], args: argparse.Namespace, parser: argparse.ArgumentParser, file: str
 ) -> argparse.Namespace:
     """The arguments of submit that the job stands for; what was given beside its file counts before it.
 
@@ -76,9 +76,9 @@ def submit_arguments(
     from workers.job import SubmitRequest
 
     table = {**job.get("render", {}), **job.get("select", {})}
-    chosen = argparse.Namespace(**{**vars(given), "homes": list(job["homes"])})
+    chosen = argparse.Namespace(**{**vars(args), "homes": list(job["homes"])})
     for name, value in values_of_table(table, SubmitRequest, file).items():
-        if getattr(given, name) == parser.get_default(name):
+        if getattr(args, name) == parser.get_default(name):
             setattr(chosen, name, value)
     return chosen
 

@@ -91,7 +91,7 @@ class PlotArea(SvgPicture):
         self.text(place, f"{value:g}", "end" if before else "start", 10)
 
 
-def distribution(scores: F64, kept: Bools, threshold: float, title: str) -> Markup:
+def distribution(scores: F64, is_kept: Bools, threshold: float, title: str) -> Markup:
     """Scores 0..1 in 50 bars, the kept part of each apart, and the threshold.
 
     scores is (n,) float64, kept (n,) bool of the same views. The axis counts views and is rounded
@@ -101,7 +101,7 @@ def distribution(scores: F64, kept: Bools, threshold: float, title: str) -> Mark
     # Count all views and the kept ones by the same bars.
     edges = np.linspace(0, 1, 51)
     whole, _ = np.histogram(scores, edges)
-    good, _ = np.histogram(scores[kept], edges)
+    good, _ = np.histogram(scores[is_kept], edges)
     top = 4 * max(-(-int(whole.max(initial=0)) // 4), 1)  # four whole steps of the axis
     frame = PlotArea(460, 260, f"Distribution of the {title} of all scored views")
     frame.axes(title, _TENTHS, [f"{top * k // 4:,}" for k in range(5)])
@@ -114,7 +114,7 @@ def distribution(scores: F64, kept: Bools, threshold: float, title: str) -> Mark
     return frame.svg()
 
 
-def joint(colour: F64, depth: F64, kept: Bools, limits: tuple[float, float]) -> Markup:
+def joint(colour: F64, depth: F64, is_kept: Bools, limits: tuple[float, float]) -> Markup:
     """Colour score against depth score: a cell is darker the more views it holds (log scale).
 
     A cell that holds both is parted by their shares: a view refused for another reason than its
@@ -122,7 +122,7 @@ def joint(colour: F64, depth: F64, kept: Bools, limits: tuple[float, float]) -> 
     """
     n, bounds = 50, [[0, 1], [0, 1]]
     cells, _, _ = np.histogram2d(colour, depth, bins=n, range=bounds)
-    good, _, _ = np.histogram2d(colour[kept], depth[kept], bins=n, range=bounds)
+    good, _, _ = np.histogram2d(colour[is_kept], depth[is_kept], bins=n, range=bounds)
     frame = PlotArea(460, 400, "Colour score against depth score")
     frame.axes("colour score", _TENTHS, _TENTHS)
     top = np.log1p(cells.max(initial=0)) or 1.0

@@ -190,7 +190,7 @@ def write_verdicts(
 
 
 def _judged(
-    entry: ViewEntry, names: Sequence[str], others: list[ChosenView]
+    entry: ViewEntry, names: Sequence[str], shown: list[ChosenView]
 ) -> tuple[dict[str, float], str]:
     """A view's numbers and the first reason; one that is kept is put to the others of its room."""
     view, numbers, reason = ChosenView(entry, Choice()), dict[str, float](), ""
@@ -199,10 +199,10 @@ def _judged(
             numbers[rule.name] = rule.measure(view)
             reason = reason or (rule.reason if numbers[rule.name] > rule.most else "")
     if _TWINS in names and not reason:
-        numbers[_TWINS] = max((_alike(view, peer) for peer in others), default=0.0)
+        numbers[_TWINS] = max((_alike(view, peer) for peer in shown), default=0.0)
         reason = "twin" if numbers[_TWINS] > _TWIN_MOST else ""
     if not reason:
-        others.append(view)
+        shown.append(view)
     return numbers, reason
 
 

@@ -276,10 +276,10 @@ def _finish_metal(
     return LaidMaterial(house.material(polished))
 
 
-def tinted(house: MutableHouse, pattern: Pattern, wanted: F64, *, is_grained: bool) -> LaidMaterial:
+def tinted(house: MutableHouse, pattern: Pattern, colour: F64, *, is_grained: bool) -> LaidMaterial:
     """The pattern's material in another mean colour, linear: its picture times a diffuse of at most 1."""
     laid = pattern_material(house, pattern)
-    ratio = wanted / np.maximum(np.array(laid.mean_rgb), 1e-3)
+    ratio = colour / np.maximum(np.array(laid.mean_rgb), 1e-3)
     ratio = ratio / max(1.0, float(ratio.max()))
     r, g, b = (round(float(c), 4) for c in srgb_from_linear(ratio))
     tinted = replace(house.materials[laid.number], diffuse=(r, g, b))

@@ -103,13 +103,13 @@ def add_furniture(house: MutableHouse, catalogue: Catalogue, style: Style, share
 def _draw_wanted(
     house: MutableHouse,
     room: RoomSpace,
-    wanted: Sequence[tuple[str, float]],
+    wishes: Sequence[tuple[str, float]],
     rng: np.random.Generator,
     share: float,
 ) -> list[str]:
     has = {house.items[n].nyu40 for n in room.items}
     names = []
-    for name, chance in wanted:
+    for name, chance in wishes:
         kind = KINDS[name]
         # The other side of a bed may still want its nightstand.
         less = _BESIDE_ALIKE if kind.beside is not None else _ALIKE
@@ -151,14 +151,14 @@ def _stand_at_wall(
 
 
 def _generated(
-    kind: WantedKind, look: BoardLook, size: tuple[float, float, float], own: int
+    kind: WantedKind, look: BoardLook, size: tuple[float, float, float], seed: int
 ) -> Model:
-    rng = np.random.default_rng(own)
+    rng = np.random.default_rng(seed)
     return grained(content().things[kind.model](rng, look.style, look.boards, size), look)
 
 
 def _from_catalogue(
-    catalogue: Catalogue, kind: WantedKind, width: float, own: int, own_share: float
+    catalogue: Catalogue, kind: WantedKind, width: float, seed: int, own_share: float
 ) -> Model | None:
     """A model of about that width; None if there is none."""
     fit = [
@@ -172,8 +172,8 @@ def _from_catalogue(
     ]
     if not fit:
         return None
-    chosen = own_or_all(fit, catalogue.own, own_share, np.random.default_rng(own))
-    piece = chosen[own % len(chosen)]
+    chosen = own_or_all(fit, catalogue.own, own_share, np.random.default_rng(seed))
+    piece = chosen[seed % len(chosen)]
     shape = catalogue.shape(piece)
     if shape is None or sum(len(s.faces) for s in shape.surfaces) > _MOST_FACES:
         return None
@@ -181,16 +181,16 @@ def _from_catalogue(
 
 
 def _find_spot(
-    house: MutableHouse, floor: RoomFloor, kind: WantedKind, made: Model, rng: np.random.Generator
+    house: MutableHouse, floor: RoomFloor, kind: WantedKind, model: Model, rng: np.random.Generator
 ) -> FloorSpot | None:
     """A random free place for the piece; None if there is none."""
-    low, high = made[1].bounds
+    low, high = model[1].bounds
     w, h, d = (float(v) for v in high - low)
     if floor.is_too_full(w * d):
         return None
     y = floor.room.room.floor_y
     # As far as its own doors and drawers come out.
-    swept = [s.area.bounds[3] for s in swept_by(made[1].surfaces, made[1].joints)]
+    swept = [s.area.bounds[3] for s in swept_by(model[1].surfaces, model[1].joints)]
     before_m = max(kind.before_m, max(swept, default=0.0) - float(high[2]) + _SIDE_M)
     depth = min(OUT_M + d + before_m, _FREE_BEFORE_M)
     places: list[tuple[int, float, float]] = []
@@ -262,14 +262,14 @@ def _is_cooked_at(
     return False
 
 
-def _put_at_spot(house: MutableHouse, floor: RoomFloor, made: Model, spot: FloorSpot) -> None:
-    _piece, shape = made
+def _put_at_spot(house: MutableHouse, floor: RoomFloor, model: Model, spot: FloorSpot) -> None:
+    _piece, shape = model
     low, high = shape.bounds
     # Its back comes to the wall, the middle of its width to the spot.
     y = floor.room.room.floor_y + _LIFT_M - float(low[1])
     position = spot.face.point(spot.s, y, OUT_M - float(low[2]))
     position = position - spot.face.along * float(low[0] + high[0]) / 2
-    _add_to_floor(house, floor, made, position, spot.face.turn_rad)
+    _add_to_floor(house, floor, model, position, spot.face.turn_rad)
     floor.take(spot.body, spot.front)
     floor.wall_m -= float(high[0] - low[0])
 
@@ -303,10 +303,10 @@ def _chair_before(
 
 
 def _add_to_floor(
-    house: MutableHouse, floor: RoomFloor, made: Model, at: F64, turn_rad: float
+    house: MutableHouse, floor: RoomFloor, model: Model, at: F64, turn_rad: float
 ) -> None:
     room = floor.room.room
     item = house.placed(
-        *made, at, turn_rad, item_id=next_id(house, PASS), room_id=room.id, level_id=room.level_id
+        *model, at, turn_rad, item_id=next_id(house, PASS), room_id=room.id, level_id=room.level_id
     )
-    house.add(item, PASS, made[0])
+    house.add(item, PASS, model[0])

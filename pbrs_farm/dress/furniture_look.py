@@ -57,9 +57,9 @@ def look_of(
     return BoardLook(style, content().boards(body, front, top, cloth), {wood: grain.size_m})
 
 
-def grained(made: Model, look: BoardLook) -> Model:
+def grained(model: Model, look: BoardLook) -> Model:
     """The piece with the grain of its wood along each board."""
-    piece, shape = made
+    piece, shape = model
     surfaces = []
     for surface in shape.surfaces:
         size_m = look.size_m.get(shape.materials[surface.material])

@@ -81,11 +81,11 @@ class OldPlace:
         """(N, 3) points of the turned frame."""
         return np.asarray(points @ self.turn)
 
-    def held_at(self, held: HeldBy) -> F64:
+    def held_at(self, held_by: HeldBy) -> F64:
         """(3,) in the turned frame: the point that stays, of the box's bottom or top."""
         middle = (self.low + self.high) / 2
-        y = self.high[1] if held is HeldBy.TOP else self.low[1]
-        return np.array([middle[0], y, self.low[2] if held is HeldBy.BACK else middle[2]])
+        y = self.high[1] if held_by is HeldBy.TOP else self.low[1]
+        return np.array([middle[0], y, self.low[2] if held_by is HeldBy.BACK else middle[2]])
 
 
 def old_place(item: Item, group: str) -> OldPlace | None:

@@ -188,9 +188,9 @@ class FacesAround:
 
 
 def faces_around(
-    scene: SceneTriangles, own: Collection[int], grid: PlanGrid, low_y: float
+    scene: SceneTriangles, supports: Collection[int], grid: PlanGrid, low_y: float
 ) -> FacesAround:
-    """Faces over a grid from low_y upwards; own: indices of the supporting items."""
+    """Faces over a grid from low_y upwards; supports: indices of the supporting items."""
     ends = grid.plan_of(np.array([0, grid.shape[1]] * 2), np.repeat([0, grid.shape[0]], 2))
     low = np.array([ends[:, 0].min(), low_y - _NEAR_M, ends[:, 1].min()])
     high = np.array([ends[:, 0].max(), low_y + MOST_FREE_M, ends[:, 1].max()])
@@ -203,7 +203,7 @@ def faces_around(
             corners = scene.of_item(wall)
             level = np.abs(unit_normals(corners)[:, 1]) > 0.5
             solid |= covered(grid, corners[level])
-    return FacesAround(grid, hits, np.isin(owner, list(own))[hits.triangle], solid)
+    return FacesAround(grid, hits, np.isin(owner, list(supports))[hits.triangle], solid)
 
 
 class _Level(NamedTuple):

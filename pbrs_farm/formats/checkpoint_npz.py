@@ -27,10 +27,10 @@ class KeptParts:
     parts: Mapping[str, Mapping[str, NDArray[Any]]]  # part -> name -> array
 
 
-def checkpoint_npz(kept: KeptParts) -> bytes:
+def checkpoint_npz(parts: KeptParts) -> bytes:
     """The file, an uncompressed .npz without pickles: arrays as "<part>/<name>", the digest, seconds spent."""
-    rows: dict[str, Any] = {_DIGEST: np.array(kept.digest), _SPENT: np.array(kept.spent_s)}
-    for part, arrays in kept.parts.items():
+    rows: dict[str, Any] = {_DIGEST: np.array(parts.digest), _SPENT: np.array(parts.spent_s)}
+    for part, arrays in parts.parts.items():
         rows |= {f"{part}/{name}": array for name, array in arrays.items()}
     buffer = io.BytesIO()
     np.savez(buffer, allow_pickle=False, **rows)

@@ -64,16 +64,16 @@ def card_tiles(tiles: Sequence[Tile]) -> CardTiles:
 
 
 def gallery_pages(
-    folder: Path, made: Mapping[Path, CardTiles] | None = None
+    folder: Path, cards: Mapping[Path, CardTiles] | None = None
 ) -> Iterator[tuple[str, str]]:
     """(file name, HTML) of each page, made one at a time. Raises BadInput as gallery.
 
-    made: view folder -> card_tiles that are there already.
+    cards: view folder -> existing card_tiles.
     """
     views, reasons = best_first(views_of(folder)), reasons_of(folder)
     n_pages = max(1, -(-len(views) // PAGE_VIEWS))
     for number in range(1, n_pages + 1):
-        yield page_name(number), _page(folder, views, reasons, (number, n_pages), made or {})
+        yield page_name(number), _page(folder, views, reasons, (number, n_pages), cards or {})
 
 
 def gallery(folder: Path) -> str:
@@ -86,14 +86,14 @@ def gallery(folder: Path) -> str:
 
 def _page(
     folder: Path,
-    every: Sequence[ViewEntry],
+    entries: Sequence[ViewEntry],
     reasons: Mapping[tuple[str, str], str],
     place: tuple[int, int],
     made: Mapping[Path, CardTiles],
 ) -> str:
     """HTML of one page, place = (its number, of how many); only its own pictures are read."""
     number, n_pages = place
-    views = every[(number - 1) * PAGE_VIEWS : number * PAGE_VIEWS]
+    views = entries[(number - 1) * PAGE_VIEWS : number * PAGE_VIEWS]
     cards: list[dict[str, Any]] = []
     aspect = "4 / 3"
     for view in views:
@@ -102,10 +102,10 @@ def _page(
         if not cards and tiles.shape is not None:
             aspect = f"{tiles.shape[1]} / {tiles.shape[0]}"
         cards.append(_card(folder, view, tiles, reasons.get((view.house.id, view.id))))
-    n_houses = len({view.house.id for view in every})
+    n_houses = len({view.house.id for view in entries})
     return page(
         *TEMPLATE,
-        title=f"{len(every)} views of {n_houses} house{'s'[: n_houses != 1]}",
+        title=f"{len(entries)} views of {n_houses} house{'s'[: n_houses != 1]}",
         number=number,
         pages=[(k, page_name(k)) for k in _near_pages(number, n_pages)],
         aspect=aspect,

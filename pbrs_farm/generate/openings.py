@@ -160,9 +160,9 @@ def _add_passage(drawing: WallDrawing, room: int) -> bool:
     )
 
 
-def _runs_between(drawing: WallDrawing, room: int, others: Iterable[int]) -> list[WallRun]:
+def _runs_between(drawing: WallDrawing, room: int, targets: Iterable[int]) -> list[WallRun]:
     """The walls between a room and others, the longest first."""
-    runs = [r for r in drawing.runs if room in r.rooms and r.rooms & set(others)]
+    runs = [r for r in drawing.runs if room in r.rooms and r.rooms & set(targets)]
     runs = [r for r in runs if r.rooms not in open_pairs(drawing.layout)]
     return sorted(runs, key=lambda r: (-r.length, r.line, r.low))
 

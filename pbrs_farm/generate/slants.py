@@ -116,11 +116,11 @@ def _relit(old: Plan, new: Plan) -> Plan:
     return replace(new, openings=tuple(openings))
 
 
-def _fits(plan: Plan, opening: PlanOpening, others: Sequence[PlanOpening]) -> bool:
+def _fits(plan: Plan, opening: PlanOpening, openings: Sequence[PlanOpening]) -> bool:
     """True if an opening is within its room's side, clear of corners and of other openings."""
     wall, room = plan.walls[opening.wall], plan.rooms[opening.room]
     half = opening.width / 2
-    if any(abs(p.along - opening.along) < half + p.width / 2 + _APART_M for p in others):
+    if any(abs(p.along - opening.along) < half + p.width / 2 + _APART_M for p in openings):
         return False
     nx, nz = wall.normal
     away = wall.thickness / 2 + 0.02

@@ -158,13 +158,13 @@ def _add_window(
     return width * height
 
 
-def _widen(drawing: WallDrawing, room: int, wanted: float) -> None:
+def _widen(drawing: WallDrawing, room: int, target: float) -> None:
     """Make a room's windows French ones where plain ones give too little light."""
     window_numbers = [i for i, o in enumerate(drawing.openings) if _is_window_of(o, room)]
     for i in window_numbers:
         glass = sum(drawing.openings[j].width * drawing.openings[j].height for j in window_numbers)
         old = drawing.openings[i]
-        if glass >= wanted:
+        if glass >= target:
             return
         drawing.openings[i] = PlanOpening(
             OpeningKind.FRENCH_WINDOW,

@@ -81,24 +81,24 @@ def _stamp(path: Path) -> int:
 
 
 @lru_cache(maxsize=4)
-def _catalogue(given: tuple[tuple[Path, int], ...], has_package: bool | None) -> Catalogue:
+def _catalogue(libraries: tuple[tuple[Path, int], ...], has_package: bool | None) -> Catalogue:
     from pbrs_farm.dress.content import content
 
-    catalogue = content().with_families(_of_libraries(given, has_package))
+    catalogue = content().with_families(_of_libraries(libraries, has_package))
     return replace(catalogue, painted_folder=cache_folder() / "painted")
 
 
-def _of_libraries(given: tuple[tuple[Path, int], ...], has_package: bool | None) -> Catalogue:
+def _of_libraries(libraries: tuple[tuple[Path, int], ...], has_package: bool | None) -> Catalogue:
     from pbrs_farm.read.catalogue.read_catalogue import catalogue_from
 
     # None: no package is wanted.
     if has_package is None:
-        return catalogue_from((), given=[path for path, _ in given], store=_store())
+        return catalogue_from((), given=[path for path, _ in libraries], store=_store())
     package, program = furniture_package.cached() if has_package else None, homes_package.cached()
     catalogue = catalogue_from(
         package.libraries if package else (),
         jar=program.jar if program else None,
-        given=[path for path, _ in given],
+        given=[path for path, _ in libraries],
         store=_store(),
     )
     if package is not None:

@@ -308,12 +308,12 @@ def _modules_of(run: _Run, appliances: Sequence[Item]) -> list[_Module]:
     return modules[:-1]
 
 
-def _with_invented(modules: list[_Module], wanted: Sequence[str]) -> list[_Module]:
+def _with_invented(modules: list[_Module], kinds: Sequence[str]) -> list[_Module]:
     """The run with a cooker a third along it and a sink at two thirds, in place of cabinets."""
     modules = list(modules)
     for kind, share in (("cooker", 1 / 3), ("sink", 2 / 3)):
         free = [k for k, m in enumerate(modules) if m.kind == "base"]
-        if kind in wanted and len(free) > 1:
+        if kind in kinds and len(free) > 1:
             middle = share * modules[-1].high
             best = min(free, key=lambda k: abs((modules[k].low + modules[k].high) / 2 - middle))
             modules[best] = modules[best]._replace(kind=kind)

@@ -20,12 +20,12 @@ _SRGB8_ALPHA8: Final = 0x8C43  # OpenGL's internal format: the GPU decodes sRGB 
 _MAX_TEXTURE_PX: Final = 4096  # every OpenGL 3.3 driver takes as much
 
 
-def n_samples(context: Any, wanted: int) -> int:
+def n_samples(context: Any, n_wanted: int) -> int:
     """Samples a pixel: as wanted or what the context can give, 2 at least.
 
-    context: a moderngl context; wanted: at least 1.
+    context: a moderngl context; n_wanted: at least 1.
     """
-    return max(2, min(wanted, int(context.max_samples)))
+    return max(2, min(n_wanted, int(context.max_samples)))
 
 
 def open_context() -> Any:

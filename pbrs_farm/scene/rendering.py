@@ -277,7 +277,7 @@ class Renderer:
 
 
 def _without_other_film(
-    work: Work, held: Mapping[str, View], given: Mapping[str, View]
+    work: Work, stored: Mapping[str, View], new: Mapping[str, View]
 ) -> dict[str, View]:
     """The views that are held, without the frames of another film than is given.
 
@@ -285,16 +285,16 @@ def _without_other_film(
     """
     films = [
         {name: cameras_json([v], {}) for name, v in views.items() if v.frame is not None}
-        for views in (held, given)
+        for views in (stored, new)
     ]
     if not films[1] or films[0] == films[1]:
-        return dict(held)
+        return dict(stored)
     work.store.delete(keys.marker_key(work.house_id, "tracks"))
     for name in films[0]:
         for step in plan.STEPS.values():
             if step.per_view:
                 work.store.delete(keys.marker_key(work.house_id, step.name, name))
-    return {name: view for name, view in held.items() if name not in films[0]}
+    return {name: view for name, view in stored.items() if name not in films[0]}
 
 
 def _sketch_by_rays(cached: CachedHouse, camera: Camera) -> NDArray[np.uint8]:

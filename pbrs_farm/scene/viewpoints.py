@@ -134,8 +134,8 @@ class Viewpoints(Sequence[Viewpoint]):
         return f"<div>{self.home.plan(self)}<br>{cells}{more}</div>"
 
 
-def _caption(one: Viewpoint) -> str:
-    return one.id if one.chosen_by is None else f"{one.id}, score {one.view.score:.3g}"
+def _caption(view: Viewpoint) -> str:
+    return view.id if view.chosen_by is None else f"{view.id}, score {view.view.score:.3g}"
 
 
 def viewpoint_of(camera: Camera, house: House, fields: CameraFields) -> Viewpoint:

@@ -107,16 +107,16 @@ def _floats(scores: Any, name: str) -> F64:
     return np.asarray(values, np.float64)
 
 
-def _beyond_cap(scores: Any, kept: Bools, cap: int) -> Bools:
+def _beyond_cap(scores: Any, is_kept: Bools, cap: int) -> Bools:
     """(n,) bool: kept views of a room that already has cap better ones (0 = no limit).
 
     Better: the smaller of the two scores is larger; then the smaller view id.
     """
-    beyond = np.zeros(len(kept), bool)
-    if cap <= 0 or not kept.any():
+    beyond = np.zeros(len(is_kept), bool)
+    if cap <= 0 or not is_kept.any():
         return beyond
     # Sort by house and room, in each room the best first.
-    rows = np.nonzero(kept)[0]
+    rows = np.nonzero(is_kept)[0]
     worse_score = np.minimum(_floats(scores, "colour_score"), _floats(scores, "depth_score"))[rows]
     house, room, view = (_ranks(scores[name])[rows] for name in ("house", "room", "view"))
     order = np.lexsort((view, -worse_score, room, house))
@@ -128,12 +128,12 @@ def _beyond_cap(scores: Any, kept: Bools, cap: int) -> Bools:
     return beyond
 
 
-def _surplus(scores: Any, kept: Bools, fields: SelectionFields) -> Bools:
+def _surplus(scores: Any, is_kept: Bools, fields: SelectionFields) -> Bools:
     """(n,) bool: kept views that are left out so that the classes of the others are balanced."""
-    surplus = np.zeros(len(kept), bool)
-    if fields.balance == "none" or not kept.any():
+    surplus = np.zeros(len(is_kept), bool)
+    if fields.balance == "none" or not is_kept.any():
         return surplus
-    rows = np.nonzero(kept)[0]
+    rows = np.nonzero(is_kept)[0]
     # Go by the order of ids, so that ties do not depend on the order of rows.
     order = rows[np.lexsort((_ranks(scores["view"])[rows], _ranks(scores["house"])[rows]))]
     shares = class_shares(scores["classes"].take(pa.array(order)).to_pylist())

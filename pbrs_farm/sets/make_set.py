@@ -232,11 +232,13 @@ def _manifest_digest(root: Path) -> str:
     return digest_of_regular(root / keys.MANIFEST)
 
 
-def _write_form(data_set: DataSet, form: SetForm, made: MadePart, out: Path, steps: _Steps) -> None:
+def _write_form(
+    data_set: DataSet, form: SetForm, made_part: MadePart, out: Path, steps: _Steps
+) -> None:
     """Write the kept views of a part in a form."""
-    if not made.kept:
+    if not made_part.kept:
         return
-    folder = out / _FORMS / form.name / made.part.name
+    folder = out / _FORMS / form.name / made_part.part.name
 
     def write() -> None:
         # remains of a killed call
@@ -244,7 +246,7 @@ def _write_form(data_set: DataSet, form: SetForm, made: MadePart, out: Path, ste
         folder.parent.mkdir(parents=True, exist_ok=True)
         if form.packing is None:
             export(
-                made.root,
+                made_part.root,
                 folder,
                 form.to,
                 selection=data_set.name,
@@ -252,46 +254,46 @@ def _write_form(data_set: DataSet, form: SetForm, made: MadePart, out: Path, ste
                 shares=data_set.shares,
             )
         else:
-            views = open_views(str(made.root)).only(selection=data_set.name)
-            modes = form.packing.modes or tuple(map(str, made.part.want.modes))
+            views = open_views(str(made_part.root)).only(selection=data_set.name)
+            modes = form.packing.modes or tuple(map(str, made_part.part.want.modes))
             pack(views, folder, replace(form.packing, modes=modes), form=form.to)
 
     def files() -> list[str]:
         return [p.relative_to(out).as_posix() for p in folder.rglob("*") if p.is_file()]
 
-    verdicts = [[v.house, v.view, v.reason] for v in made.verdicts]
+    verdicts = [[v.house, v.view, v.reason] for v in made_part.verdicts]
     choice = repr(form.packing or form.choice)
     digest = keys.digest(
         form.to,
         choice,
         repr(data_set.shares),
         verdicts,
-        _manifest_digest(made.root),
+        _manifest_digest(made_part.root),
         pbrs_farm.__version__,
     )
-    steps.unless_done(f"{form.name}.{made.part.name}", digest, write, files)
+    steps.unless_done(f"{form.name}.{made_part.part.name}", digest, write, files)
 
 
-def _index_text(data_set: DataSet, made: Sequence[MadePart]) -> str:
+def _index_text(data_set: DataSet, made_parts: Sequence[MadePart]) -> str:
     text = io.StringIO()
     rows = csv.writer(text, lineterminator="\n")
     rows.writerow(("part", "house", "view", "split", "left_out"))
-    for of in made:
+    for of in made_parts:
         for verdict in of.verdicts:
             split = split_of_house(verdict.house, data_set.shares) if data_set.shares else ""
             rows.writerow((of.part.name, verdict.house, verdict.view, split, verdict.reason))
     return text.getvalue()
 
 
-def _root_sums(made: MadePart, out: Path) -> Iterator[tuple[str, str]]:
+def _root_sums(made_part: MadePart, out: Path) -> Iterator[tuple[str, str]]:
     """(file, sha256) of the rendered files, from the manifest."""
-    below = made.root.relative_to(out).as_posix()
-    manifest = FolderStore(made.root).get(keys.MANIFEST)
+    below = made_part.root.relative_to(out).as_posix()
+    manifest = FolderStore(made_part.root).get(keys.MANIFEST)
     for house, lines in lines_by_house(manifest):
         # the manifest of a home has these lines
         yield f"{below}/{keys.house_key(house, keys.MANIFEST)}", keys.sha256(lines)
         for key, digest in sha256_by_key(lines).items():
             yield f"{below}/{key}", digest
     for file in _ROOT_FILES:
-        if (made.root / file).is_file():
-            yield f"{below}/{file}", digest_of_regular(made.root / file)
+        if (made_part.root / file).is_file():
+            yield f"{below}/{file}", digest_of_regular(made_part.root / file)

@@ -21,7 +21,7 @@ sha256sum --check --quiet SHA256SUMS # nothing is printed where all files are as
 ```"""
 
 
-def card_text(data_set: DataSet, made: Sequence[MadeViews]) -> str:
+def card_text(data_set: DataSet, made_views: Sequence[MadeViews]) -> str:
     """The card in Markdown; equal for equal sets."""
     card = data_set.card
     licence = card.licence and f"Licence: {card.licence}."
@@ -29,16 +29,18 @@ def card_text(data_set: DataSet, made: Sequence[MadeViews]) -> str:
         f"# {card.title}",
         card.text.strip(),
         licence,
-        _table(("part", "split", "homes", "houses", "views"), list(_split_rows(data_set, made))),
+        _table(
+            ("part", "split", "homes", "houses", "views"), list(_split_rows(data_set, made_views))
+        ),
         _split_text(data_set),
-        *(_part_text(*of) for of in made),
+        *(_part_text(*of) for of in made_views),
         "## Forms",
         _forms_text(data_set),
         "## Made again, and checked",
         _COMMAND.format(file=data_set.file, name=data_set.name),
         f"The file has the digest `{keys.sha256(data_set.data)}` (SHA-256). Files are equal to the last bit by one version of "
         f"pbrs_farm (here {pbrs_farm.__version__}) on processors of one kind; another kind may round a last digit otherwise.",
-        _credits(made),
+        _credits(made_views),
     ]
     return "\n\n".join(block for block in blocks if block) + "\n"
 
@@ -48,8 +50,8 @@ def _table(columns: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
     return "\n".join(f"| {' | '.join(str(cell) for cell in line)} |" for line in lines)
 
 
-def _split_rows(data_set: DataSet, made: Sequence[MadeViews]) -> Iterator[tuple[object, ...]]:
-    for part, _root, verdicts, _reasons in made:
+def _split_rows(data_set: DataSet, made_views: Sequence[MadeViews]) -> Iterator[tuple[object, ...]]:
+    for part, _root, verdicts, _reasons in made_views:
         of: dict[str, list[RuleVerdict]] = {}
         for verdict in verdicts:
             shares = data_set.shares
@@ -73,7 +75,7 @@ def _split_text(data_set: DataSet) -> str:
 
 
 def _part_text(
-    part: SetPart, _root: Path, kept: Sequence[RuleVerdict], reasons: Mapping[str, int]
+    part: SetPart, _root: Path, chosen: Sequence[RuleVerdict], reasons: Mapping[str, int]
 ) -> str:
     recipe, want = part.recipe, part.want
     left_out = [f"{n} {reason}" for reason, n in sorted(Counter(reasons).items()) if n]
@@ -90,7 +92,7 @@ def _part_text(
     ]
     return "\n".join(
         [
-            f"## {part.name}: {len(kept)} view{'s' * (len(kept) != 1)}",
+            f"## {part.name}: {len(chosen)} view{'s' * (len(chosen) != 1)}",
             "",
             *(f"- {row}" for row in rows),
         ]
@@ -108,10 +110,10 @@ def _forms_text(data_set: DataSet) -> str:
     return "\n".join([*rows, "- `index.csv`: each view, its split, and why it is left out"])
 
 
-def _credits(made: Sequence[MadeViews]) -> str:
+def _credits(made_views: Sequence[MadeViews]) -> str:
     files = [
         f"`parts/{part.name}/{keys.ATTRIBUTION}`"
-        for part, root, _kept, _reasons in made
+        for part, root, _kept, _reasons in made_views
         if (root / keys.ATTRIBUTION).is_file()
     ]
     if not files:

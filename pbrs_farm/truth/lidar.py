@@ -200,25 +200,25 @@ def _followed(beams: _Beams, caster: FirstHits, house: House, farthest_m: float)
     return ends
 
 
-def _turn_back(beams: _Beams, own: NDArray[np.intp], face: I32, geometry: Geometry) -> None:
-    normal = _normals(geometry, face, beams.direction[own])
+def _turn_back(beams: _Beams, rays: NDArray[np.intp], face: I32, geometry: Geometry) -> None:
+    normal = _normals(geometry, face, beams.direction[rays])
     mirror = np.eye(3) - 2 * normal[:, :, None] * normal[:, None, :]
-    beams.direction[own] = np.einsum("nij,nj->ni", mirror, beams.direction[own])
-    beams.unfold[own] = beams.unfold[own] @ mirror
-    beams.left[own] *= MIRROR_REFLECTANCE
-    beams.mirrored[own] += 1
-    _note_first(beams, own, face, geometry)
+    beams.direction[rays] = np.einsum("nij,nj->ni", mirror, beams.direction[rays])
+    beams.unfold[rays] = beams.unfold[rays] @ mirror
+    beams.left[rays] *= MIRROR_REFLECTANCE
+    beams.mirrored[rays] += 1
+    _note_first(beams, rays, face, geometry)
 
 
-def _pass(beams: _Beams, own: NDArray[np.intp], face: I32, geometry: Geometry) -> None:
-    beams.left[own] *= GLASS_TRANSMISSION
-    beams.through[own] += 1
-    _note_first(beams, own, face, geometry)
+def _pass(beams: _Beams, rays: NDArray[np.intp], face: I32, geometry: Geometry) -> None:
+    beams.left[rays] *= GLASS_TRANSMISSION
+    beams.through[rays] += 1
+    _note_first(beams, rays, face, geometry)
 
 
-def _note_first(beams: _Beams, own: NDArray[np.intp], face: I32, geometry: Geometry) -> None:
-    first = beams.via[own] == 0
-    beams.via[own[first]] = geometry.face_item[face[first]]
+def _note_first(beams: _Beams, rays: NDArray[np.intp], face: I32, geometry: Geometry) -> None:
+    first = beams.via[rays] == 0
+    beams.via[rays[first]] = geometry.face_item[face[first]]
 
 
 def _distances(geometry: Geometry, face: I32, origin: F64, direction: F64) -> F64:

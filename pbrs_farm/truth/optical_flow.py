@@ -161,30 +161,30 @@ def reaches(points: F64, faces: I32, camera: Camera, first_hit: FirstHit) -> Boo
     return np.asarray((t >= 1 - slack) | (face == faces))
 
 
-def flow_label(found: Correspondence) -> F32:
+def flow_label(matches: Correspondence) -> F32:
     """(H, W, 2) float32 for a 16-bit EXR: pixels right and down up to 32,768, 0 where undefined."""
-    return np.clip(found.flow, -_MOST_PX, _MOST_PX).astype(np.float32)
+    return np.clip(matches.flow, -_MOST_PX, _MOST_PX).astype(np.float32)
 
 
-def flow_kitti(found: Correspondence) -> NDArray[np.uint16]:
+def flow_kitti(matches: Correspondence) -> NDArray[np.uint16]:
     """(H, W, 3) uint16 as KITTI stores flow: 64 x + 2**15, 64 y + 2**15, 1 = seen in the other picture.
 
     0, 0, 0 if it is not, and for a motion of 512 pixels or more, for which the format has no number.
     """
-    steps = np.rint(found.flow * KITTI_FLOW_STEP) + 2**15
-    valid = (found.state == SEEN) & ((steps >= 0) & (steps <= 65535)).all(-1)
+    steps = np.rint(matches.flow * KITTI_FLOW_STEP) + 2**15
+    valid = (matches.state == SEEN) & ((steps >= 0) & (steps <= 65535)).all(-1)
     steps = np.where(valid[..., None], np.clip(steps, 0, 65535), 0)
     return np.concatenate([steps, valid[..., None]], axis=-1).astype(np.uint16)
 
 
-def disparity_label(found: Correspondence) -> NDArray[np.uint16]:
+def disparity_label(matches: Correspondence) -> NDArray[np.uint16]:
     """(H, W) uint16 as KITTI stores disparity: 256 times the pixels by which rows are shifted.
 
     1..65535 for a surface, hidden in the other picture or not; 0 = nothing.
     """
-    shift = np.abs(found.flow[..., 0])
+    shift = np.abs(matches.flow[..., 0])
     steps = np.clip(np.rint(shift * KITTI_DISPARITY_STEP), 1, 65535)
-    return np.where(found.in_front, steps, 0).astype(np.uint16)
+    return np.where(matches.in_front, steps, 0).astype(np.uint16)
 
 
 def partners_of(view: View, views: Mapping[str, View]) -> dict[Relation, View]:

@@ -79,14 +79,14 @@ def garbage(farm: Farm, keep_s: float, now_s: float) -> list[Garbage]:
     return kinds
 
 
-def remove(farm: Farm, found: Iterable[Garbage]) -> int:
+def remove(farm: Farm, groups: Iterable[Garbage]) -> int:
     """Delete objects, and forget cancelled jobs without any left; returns the number of objects.
 
-    found: a recent result of `garbage`: ages are not checked again. Objects that are missing already are
+    groups: a recent result of `garbage`: ages are not checked again. Objects that are missing already are
     counted too.
     """
     n = 0
-    for kind in found:
+    for kind in groups:
         for key in kind.found:
             farm.store.delete(key)
             n += 1

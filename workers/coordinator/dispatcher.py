@@ -115,18 +115,18 @@ class Dispatcher:
     def _send_round(
         self,
         views: Sequence[JobView],
-        given: Mapping[str, Mapping[str, int]],
+        quotas: Mapping[str, Mapping[str, int]],
         spare: dict[str, int],
         ceilings: _Ceilings,
     ) -> tuple[int, list[JobView]]:
         """Dispatch each job's quota plus spare capacity. Returns the number of tasks and the jobs with more work.
 
-        given: job -> pool -> tasks. spare: pool -> tasks of any job; reduced by tasks beyond a quota, and
+        quotas: job -> pool -> tasks. spare: pool -> tasks of any job; reduced by tasks beyond a quota, and
         raised by unused quotas.
         """
         n_sent, with_more = 0, []
         for view in views:
-            quota = given.get(view.job_id, {})
+            quota = quotas.get(view.job_id, {})
             most = {pool: n + quota.get(pool, 0) for pool, n in spare.items()}
             sent = self._send_job(view, ceilings.limit(most, view))
             n_sent += sent.total()

@@ -106,10 +106,10 @@ def _names_of_house(store: LaidOutStore, house: str) -> frozenset[str]:
     return _names_of_markers(store.list(keys.house_key(house, "done/"))).get(house, frozenset())
 
 
-def _names_of_markers(found: Iterable[str]) -> dict[str, frozenset[str]]:
+def _names_of_markers(keys_found: Iterable[str]) -> dict[str, frozenset[str]]:
     # Keys look like houses/<id>/done/<step>[.<view>].json
     names: dict[str, list[str]] = {}
-    for key in found:
+    for key in keys_found:
         parsed = keys.parse_house_key(key)
         if parsed is not None and parsed.step:
             names.setdefault(parsed.house, []).append(keys.marker_name(parsed.step, parsed.view))

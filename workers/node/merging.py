@@ -82,11 +82,11 @@ def merge_job(store: Store, spec: JobSpec, on_step: OnText) -> None:
 
 
 def _merge_by_house(
-    store: Store, own: set[str], new: Iterator[tuple[str, bytes | None]]
+    store: Store, houses: set[str], new: Iterator[tuple[str, bytes | None]]
 ) -> Iterator[tuple[str, bytes | None]]:
     """The job's rows and those of other houses of the root, by house, one house at a time."""
     rows = lines_by_house(get_or_none(store, keys.MANIFEST) or b"")
-    old = ((house, part) for house, part in rows if house not in own)
+    old = ((house, part) for house, part in rows if house not in houses)
     return heapq.merge(old, new, key=lambda row: row[0])
 
 

@@ -152,23 +152,23 @@ class Slot:
             claimed = [_Claimed(job, task_from_text(name), claim) for name, claim in claims.items()]
             claims = self._run_claimed(claimed, recipe)
 
-    def _run_claimed(self, held: list[_Claimed], recipe: str) -> dict[str, Claim]:
+    def _run_claimed(self, queue: list[_Claimed], recipe: str) -> dict[str, Claim]:
         """Run tasks to their ends, one after another; those to go on with."""
         self._heartbeat_at = self._clock() + self._config.heartbeat_s
         self._ended, self._report_at = {}, self._clock() + _REPORT_EVERY_S
-        while held:
-            first, *held = held
-            if self._is_preempted() and held:
+        while queue:
+            first, *queue = queue
+            if self._is_preempted() and queue:
                 # Return tasks that have not started immediately, together with the running one.
-                self._hand_back(held)
-                held = []
+                self._hand_back(queue)
+                queue = []
             request = _request(first)
-            ended = self._render(first, request, held)
+            ended = self._render(first, request, queue)
             if ended.cause:
                 self._failed(first, ended)
                 if ended.cause in _ENDS_ALL:
-                    self._hand_back(held)
-                    held = []
+                    self._hand_back(queue)
+                    queue = []
                 continue
             result = Result.model_validate(ended.body)
             if result.left_out and not self._is_lack_told:
@@ -178,9 +178,9 @@ class Slot:
             self._ended[str(first.task)] = end
             _log.info("%s of job %s: done in %.1f s", first.task, first.job, ended.seconds)
             # Successors need not wait for the last of many tasks.
-            if held and self._clock() >= self._report_at:
+            if queue and self._clock() >= self._report_at:
                 self._report(first, None)
-            if not held:
+            if not queue:
                 # A task of seconds gains nothing from the scene another one of its house has loaded.
                 is_long = ended.seconds >= self._config.sticky_s
                 go_on = GoOn(recipe, self._config.queues or QUEUES, is_long=is_long)
@@ -189,26 +189,28 @@ class Slot:
             self._report(first, None)
         return {}
 
-    def _report(self, held: _Claimed, go_on: GoOn | None) -> dict[str, Claim]:
+    def _report(self, claimed: _Claimed, go_on: GoOn | None) -> dict[str, Claim]:
         """Report finished tasks to the ledger; returns newly granted tasks."""
         ends, self._report_at = self._ended, self._clock() + _REPORT_EVERY_S
         self._ended = {}
-        report = partial(self._ledger.finish_many, held.job, ends, held.claim.token, go_on)
+        report = partial(self._ledger.finish_many, claimed.job, ends, claimed.claim.token, go_on)
         return self._retry(report)
 
-    def _hand_back(self, held: Sequence[_Claimed]) -> None:
+    def _hand_back(self, tasks: Sequence[_Claimed]) -> None:
         """Return claimed tasks that were not started, uncounted."""
-        for item in held:
+        for item in tasks:
             fault = Fault("preempted", "preempted: not begun", "not begun", self._config.worker)
             give = partial(
                 self._ledger.fail, item.job, str(item.task), item.claim.token, fault, delay_s=0.0
             )
             self._retry(give)
 
-    def _render(self, held: _Claimed, request: TaskRequest, waiting: Sequence[_Claimed]) -> Ended:
+    def _render(
+        self, claimed: _Claimed, request: TaskRequest, waiting: Sequence[_Claimed]
+    ) -> Ended:
         """Have the task run, and keep its lease and those of what waits for it meanwhile."""
         self._upload_at = self._clock() + _LOG_EVERY_S
-        deadline_s = self._config.limits.deadline_s(held.task.stage)
+        deadline_s = self._config.limits.deadline_s(claimed.task.stage)
         self._process.begin(request.model_dump_json().encode(), task_s=deadline_s)
         while True:
             heard = self._process.poll(_POLL_S)
@@ -217,24 +219,24 @@ class Slot:
             # Keep the others from claiming what would wait as well.
             if heard is not None and heard.kind == "waiting":
                 self._open_breaker(heard.text)
-            stop = self._why_stop(held, waiting)
+            stop = self._why_stop(claimed, waiting)
             if stop is not None:
                 return self._process.kill(stop, f"stopped: {stop}")
             # A long task's log can be read while it runs.
             if self._clock() >= self._upload_at:
                 self._upload_at = self._clock() + _LOG_EVERY_S
-                self._put(held.log_key, self._process.log_tail())
+                self._put(claimed.log_key, self._process.log_tail())
 
-    def _why_stop(self, held: _Claimed, waiting: Sequence[_Claimed]) -> FaultClass | None:
+    def _why_stop(self, claimed: _Claimed, waiting: Sequence[_Claimed]) -> FaultClass | None:
         """None, or why the running task must end now; sends the heartbeat when it is due."""
         if self._is_preempted():
             return "preempted"
         if self._clock() < self._heartbeat_at:
             return None
         self._heartbeat_at = self._clock() + self._config.heartbeat_s
-        tasks = [str(held.task), *(str(waiter.task) for waiter in waiting), *self._ended]
+        tasks = [str(claimed.task), *(str(waiter.task) for waiter in waiting), *self._ended]
         try:
-            answer = self._ledger.heartbeat(held.job, tasks, held.claim.token)
+            answer = self._ledger.heartbeat(claimed.job, tasks, claimed.claim.token)
         except LedgerUnavailable as error:
             # Go on: if the lease has run out meanwhile, the token is refused later.
             _log.warning("no heartbeat: %s", error)
@@ -245,8 +247,8 @@ class Slot:
     def _is_preempted(self) -> bool:
         return self._config.preemption_file.exists()
 
-    def _failed(self, held: _Claimed, ended: Ended) -> None:
-        fault = self._fault(held, ended)
+    def _failed(self, claimed: _Claimed, ended: Ended) -> None:
+        fault = self._fault(claimed, ended)
         if fault.log:
             self._put(fault.log, self._process.log_tail())
         if fault.fault == "storage":
@@ -254,19 +256,19 @@ class Slot:
         # Increasing delays with jitter.
         delay_s = 0.0
         if fault.fault != "preempted":
-            delay_s = self._config.retry_delay_s * held.attempt * random.uniform(0.7, 1.3)
-        task, token = str(held.task), held.claim.token
+            delay_s = self._config.retry_delay_s * claimed.attempt * random.uniform(0.7, 1.3)
+        task, token = str(claimed.task), claimed.claim.token
         verdict = self._retry(
-            lambda: self._ledger.fail(held.job, task, token, fault, delay_s=delay_s)
+            lambda: self._ledger.fail(claimed.job, task, token, fault, delay_s=delay_s)
         )
         _log.warning(
-            "%s attempt %d: %s (%s): %s", task, held.attempt, fault.fault, verdict, fault.message
+            "%s attempt %d: %s (%s): %s", task, claimed.attempt, fault.fault, verdict, fault.message
         )
         # A task that failed for good leaves a record that outlives Redis.
         if verdict == "failed":
-            self._put(failed_key(held.job, task), fault.json())
+            self._put(failed_key(claimed.job, task), fault.json())
 
-    def _fault(self, held: _Claimed, ended: Ended) -> Fault:
+    def _fault(self, claimed: _Claimed, ended: Ended) -> Fault:
         """Record of a failed task for the ledger."""
         kind, text = ended.cause, ended.text
         if kind == REPORTED:
@@ -276,8 +278,8 @@ class Slot:
             fingerprint=f"{kind}: {without_numbers(text)}",
             message=ended.text,
             worker=self._config.worker,
-            attempt=held.attempt,
-            log="" if kind in _NO_LOG else held.log_key,
+            attempt=claimed.attempt,
+            log="" if kind in _NO_LOG else claimed.log_key,
             tail=self._process.log_tail(_TAIL_IN_FAULT),
         )
 
@@ -351,16 +353,16 @@ class Slot:
                 self._sleep(random.uniform(1.0, 3.0))
 
 
-def _request(held: _Claimed) -> TaskRequest:
-    task, inputs = held.task, held.claim.inputs
+def _request(claimed: _Claimed) -> TaskRequest:
+    task, inputs = claimed.task, claimed.claim.inputs
     # Only geometry reads the home itself; later stages find its bundle in the store.
     is_geometry = task.unit == WHOLE and task.stage == GEOMETRY
     return TaskRequest(
-        job_id=held.job,
+        job_id=claimed.job,
         house=task.house,
         unit=task.unit,
         stage=task.stage,
         views=batches_from_text(inputs)[int(task.unit)] if task.unit.isdigit() else (),
         source=inputs if is_geometry else "",
-        attempt=held.attempt,
+        attempt=claimed.attempt,
     )

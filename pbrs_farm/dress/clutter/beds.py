@@ -103,9 +103,9 @@ def dress_bed(placing: Placing, scene: SceneTriangles, index: int) -> int:
     return n
 
 
-def _narrowed(made: Model, factor: float) -> Model:
+def _narrowed(model: Model, factor: float) -> Model:
     """The item with its width scaled."""
-    piece, shape = made
+    piece, shape = model
     scale = np.array([factor, 1.0, 1.0])
     surfaces = tuple(
         smooth(s.name, s.positions.astype(np.float64) * scale, s.faces) for s in shape.surfaces
@@ -191,9 +191,9 @@ def _has_pillows(bed: Lying) -> bool:
     return bool((part > bed.level + 0.03).mean() > 0.15)
 
 
-def _place_on_bed(bed: Lying, across: float, from_head_m: float, made: Model) -> tuple[F64, float]:
+def _place_on_bed(bed: Lying, across: float, from_head_m: float, model: Model) -> tuple[F64, float]:
     # World (x, z) of an item at a distance from the head, and its rotation.
-    depth = made[0].size[1]
+    depth = model[0].size[1]
     row = bed.rows[0] + (from_head_m + depth / 2) / bed.grid.cell_m
     column = bed.columns[0] + across * (bed.columns[1] - bed.columns[0])
     return bed.grid.plan_of(column, row), bed.grid.turn_rad
@@ -203,7 +203,7 @@ def lay_down(
     placing: Placing,
     scene: SceneTriangles,
     index: int,
-    made: Model,
+    model: Model,
     plan: F64,
     turn_rad: float,
     level: float,
@@ -212,7 +212,7 @@ def lay_down(
 
     Its underside is flattened: no point is below the support.
     """
-    piece, shape = made
+    piece, shape = model
     turn = rotation_y(turn_rad + float(placing.rng.normal(0, 0.05)))
     half = piece.size[2] / 2
     corners, overlaps = around_thing(scene, index, plan, turn, np.asarray(piece.size), level)
@@ -239,5 +239,5 @@ def lay_down(
         smooth(s.name, points - fall, s.faces)
         for s, points in zip(shape.surfaces, pressed, strict=True)
     ]
-    put_as_it_is(placing, made, surfaces)
+    put_as_it_is(placing, model, surfaces)
     return True

@@ -244,14 +244,14 @@ def _laid_flat(
 def _put_cloth(
     placing: Placing,
     family: str,
-    made: Net,
+    net: Net,
     ground: Ground,
     thick_m: float,
     material: Material,
     nyu40: int,
 ) -> F64:
     """Add dropped cloth to the house; returns its triangles (F, 3, 3)."""
-    surface = sheet_of(family, made, ground, thick_m)
+    surface = sheet_of(family, net, ground, thick_m)
     thing = standing_piece(family, [(surface, material)], group="blanket", nyu40=nyu40)
     points = surface.positions.astype(np.float64)
     if family != "duvet":

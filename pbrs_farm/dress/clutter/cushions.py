@@ -52,13 +52,13 @@ def around_thing(
     return corners[owner == index], bool(meets.any())
 
 
-def put_as_it_is(placing: Placing, made: Model, surfaces: list[Surface]) -> None:
+def put_as_it_is(placing: Placing, model: Model, surfaces: list[Surface]) -> None:
     """Add an item whose surfaces (in the order of its shape's) have world coordinates already.
 
     For cloth and cushions shaped to their support. Normals are kept, and materials are those of the
     shape. Collisions are not checked.
     """
-    piece, shape = made
+    piece, shape = model
     nonempty = tuple(
         replace(surface, material=old.material)
         for surface, old in zip(surfaces, shape.surfaces, strict=True)
@@ -157,9 +157,9 @@ def _seat_before_back(grid: PlanGrid, tops: F64, seat: Bools, level: float) -> S
 
 
 def _lean(
-    placing: Placing, scene: SceneTriangles, index: int, seat: Seat, made: Model, at: float
+    placing: Placing, scene: SceneTriangles, index: int, seat: Seat, model: Model, at: float
 ) -> bool:
-    piece, shape = made
+    piece, shape = model
     half, thick = piece.size[0] / 2, piece.size[2]
     span = seat.back_row[max(0, int(at - half / CELL_M)) : int(at + half / CELL_M) + 1]
     if not len(span) or not np.isfinite(span).all() or np.ptp(span) > 6:
@@ -188,7 +188,7 @@ def _lean(
         end = start + len(surface.positions)
         surfaces.append(smooth(surface.name, placed[start:end], surface.faces))
         start = end
-    put_as_it_is(placing, made, surfaces)
+    put_as_it_is(placing, model, surfaces)
     return True
 
 

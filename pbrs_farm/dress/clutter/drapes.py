@@ -136,7 +136,7 @@ def _usual_most(net: Net) -> float:
     return float(np.percentile(net.stretches(), 99))
 
 
-def _fall(at: F64, thread_m: tuple[float, float], ground: Ground, apart: float) -> None:
+def _fall(at: F64, thread_m: tuple[float, float], ground: Ground, gap_m: float) -> None:
     """Let vertices (3, R, C) fall until they lie: Verlet steps with drag and grip; in place."""
     before = at.copy()
     for k in range(_STEPS):
@@ -148,22 +148,22 @@ def _fall(at: F64, thread_m: tuple[float, float], ground: Ground, apart: float) 
             _pull(at, thread_m, _PUSH)
             _pull_across(at, thread_m, 1.0, _BEND)
         _lift_threads(at, ground, 0.0)
-        move = ground.ways_out(at, apart)
+        move = ground.ways_out(at, gap_m)
         gripped = move.any(0)
         at += move
         at[:, gripped] -= _GRIP * (at - start)[:, gripped] * [[1.0], [0.0], [1.0]]
         before = np.where(gripped, at, start)
 
 
-def _lift_threads(at: F64, ground: Ground, apart: float) -> None:
-    """Move threads off obstacles between their ends, in place; apart: clearance, metres.
+def _lift_threads(at: F64, ground: Ground, gap_m: float) -> None:
+    """Move threads off obstacles between their ends, in place; gap_m: clearance.
 
     Otherwise the back of a sofa would pass between two threads, and edges would stick out of cloth.
     """
     for view in (at, at.swapaxes(1, 2)):
         a, b = view[:, :-1], view[:, 1:]
         # Half of it: a vertex has a thread to either side.
-        move = ground.ways_out((a + b) / 2, apart) / 2
+        move = ground.ways_out((a + b) / 2, gap_m) / 2
         a += move
         b += move
 

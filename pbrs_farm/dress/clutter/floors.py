@@ -124,8 +124,8 @@ def _before_front(item: Item, floor_y: float) -> BaseGeometry:
     return shapely.Polygon([near - across, near + across, far + across, far - across])
 
 
-def _put_on_floor(placing: Placing, floor: _Floor, made: Model, *, at_wall: bool) -> bool:
-    low, high = made[1].bounds
+def _put_on_floor(placing: Placing, floor: _Floor, model: Model, *, at_wall: bool) -> bool:
+    low, high = model[1].bounds
     reach = float(np.hypot(high[0] - low[0], high[2] - low[2])) / 2
     # Its middle keeps from everything by its own radius, but not much more.
     distance = ndimage.distance_transform_edt(np.pad(floor.free, 1))[1:-1, 1:-1] * CELL_M
@@ -148,7 +148,7 @@ def _put_on_floor(placing: Placing, floor: _Floor, made: Model, *, at_wall: bool
         x, z = floor.grid.plan_of(columns[k] + 0.5, rows[k] + 0.5)
         turn = _turn_from_wall(to_wall, int(rows[k]), int(columns[k]))
         placing.put(
-            made,
+            model,
             np.array([x, placing.room.floor_y + LIFT_M, z]),
             turn + float(placing.rng.normal(0, 0.2)),
         )
@@ -160,16 +160,16 @@ def _put_on_floor(placing: Placing, floor: _Floor, made: Model, *, at_wall: bool
     return False
 
 
-def _distance_to_walls(floor: _Floor, asked: Bools) -> F64:
+def _distance_to_walls(floor: _Floor, cells: Bools) -> F64:
     """(H, W) metres from the asked cells to real walls: rooms may open into each other.
 
     Where a home has no walls, to the room's outline.
     """
-    distances = np.full(asked.shape, np.inf)
+    distances = np.full(cells.shape, np.inf)
     room = floor.room
     near = shapely.intersection(room.walls, room.area.buffer(_NEAR_WALLS_M))
     near = room.area.boundary if near.is_empty else near
-    distances[asked] = shapely.distance(shapely.points(floor.grid.centres()[asked]), near)
+    distances[cells] = shapely.distance(shapely.points(floor.grid.centres()[cells]), near)
     return distances
 
 

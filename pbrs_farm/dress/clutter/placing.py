@@ -26,13 +26,13 @@ _NEAR_M = 0.06
 _MOST_IN_ROOM = 4
 
 
-def separate_pair(made: Model, rng: np.random.Generator, mess: float) -> Model:
+def separate_pair(model: Model, rng: np.random.Generator, mess: float) -> Model:
     """Turn and move the halves of a pair, such as shoes along x, independently.
 
     Parts left and right of the centre move as wholes; mess 0 leaves them unchanged. The piece's size is
     updated, and normals are dropped, since parts were turned.
     """
-    piece, shape = made
+    piece, shape = model
     turns, ahead = rng.normal(0, 0.6 * mess, 2), rng.normal(0, 0.06 * mess, 2)
     quarter = piece.size[0] / 4
     surfaces = []
@@ -85,12 +85,12 @@ class Placing:
         default_factory=list
     )  # triangles of dropped cloth, which later cloth may fall on
 
-    def put(self, made: Model, at: F64, turn_rad: float) -> None:
+    def put(self, model: Model, at: F64, turn_rad: float) -> None:
         """Add the item with its base centred at (3,) world metres, turned about +y.
 
         The caller has checked that the place is free: nothing is tested here, and no cells are marked.
         """
-        piece, shape = made
+        piece, shape = model
         low, high = shape.bounds
         base = np.array([(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])
         number = sum(self.house.done.values())
@@ -115,13 +115,13 @@ class Placing:
         """Count an item that was not placed."""
         self.house.refused[f"{PASS}: {reason}"] += 1
 
-    def drop(self, top: Worktop, made: Model, *, faces_anywhere: bool, depth_pull: float) -> bool:
+    def drop(self, top: Worktop, model: Model, *, faces_anywhere: bool, depth_pull: float) -> bool:
         """Put the item where it fits on the worktop; False if it fits nowhere.
 
         depth_pull: preference for the back (> 0) or the front (< 0), per metre.
         """
-        size = np.asarray(made[0].size)[[0, 2, 1]]
-        low, high = made[1].bounds
+        size = np.asarray(model[0].size)[[0, 2, 1]]
+        low, high = model[1].bounds
         size = high - low
         sd = 0.06 + 0.3 * self.house.mess
         turn = self.rng.uniform(-np.pi, np.pi) if faces_anywhere else self.rng.normal(0, sd)
@@ -138,15 +138,15 @@ class Placing:
         k = int(self.rng.choice(len(rows), p=weight / weight.sum()))
         spot = TopSpot(int(rows[k]), int(columns[k]), *n)
         top.take(spot)
-        self.put(made, top.middle(spot), top.grid.turn_rad + float(turn_rad))
+        self.put(model, top.middle(spot), top.grid.turn_rad + float(turn_rad))
         return True
 
-    def drop_near(self, top: Worktop, made: Model, at: F64, *, turn_rad: float = 0.0) -> bool:
+    def drop_near(self, top: Worktop, model: Model, at: F64, *, turn_rad: float = 0.0) -> bool:
         """Put the item at a plan position (2,), or within 6 cm of it; False if it does not fit.
 
         at: world x and z. Occupies the worktop's cells on success; failures are not counted.
         """
-        low, high = made[1].bounds
+        low, high = model[1].bounds
         # Of the free spots take the nearest; n: the rows and columns of cells that it covers.
         rows, columns, n = top.spots(turned_size(high - low, turn_rad), margin_m=0.01)
         if not len(rows):
@@ -158,7 +158,7 @@ class Placing:
             return False
         spot = TopSpot(int(rows[k]), int(columns[k]), *n)
         top.take(spot)
-        self.put(made, top.middle(spot), top.grid.turn_rad + turn_rad)
+        self.put(model, top.middle(spot), top.grid.turn_rad + turn_rad)
         return True
 
 

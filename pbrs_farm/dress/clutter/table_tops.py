@@ -25,15 +25,15 @@ _CHAIR_M = 0.6  # a chair's middle is this near to the table it belongs to
 _USUAL_M2 = 0.4  # usual area of receptacles that clutter.toml does not name
 
 
-def fill_top(placing: Placing, top: Worktop, receptacle: str, there: Collection[str] = ()) -> int:
+def fill_top(placing: Placing, top: Worktop, receptacle: str, present: Collection[str] = ()) -> int:
     """Put items on the worktop by the table of shares; returns their number.
 
-    there: kinds already on it in the source.
+    present: kinds already on it in the source.
     """
     rng = placing.rng
     factor = min(top.support.area / CLUTTER.usual_m2.get(receptacle, _USUAL_M2), _MOST_FACTOR)
     kinds: list[str] = []
-    most = CLUTTER.most_on_one | dict.fromkeys(there, 0)
+    most = CLUTTER.most_on_one | dict.fromkeys(present, 0)
     for row in shares().get(receptacle, ()):
         chance = np.clip((row.share + placing.bias * row.share**0.5) * factor, 0, 0.98)
         remaining = most.get(row.kind, _MOST_OF_A_KIND) - kinds.count(row.kind)

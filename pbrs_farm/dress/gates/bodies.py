@@ -67,17 +67,17 @@ class Body:
 
 
 def bodies_of(
-    house: MutableHouse, pieces: Mapping[str, Piece], known: Mapping[int, Body] | None = None
+    house: MutableHouse, pieces: Mapping[str, Piece], reusable: Mapping[int, Body] | None = None
 ) -> list[Body]:
     """A body for each item of the house that has triangles, in order.
 
-    pieces: by id. known: reusable bodies by the id of their item.
+    pieces: by id. reusable: bodies by the id of their item.
     """
     bodies = []
     n_source = len(house.source.items)
     for index, item in enumerate(house.items):
         was = house.source.items[index] if index < n_source else None
-        cached = (known or {}).get(id(item))
+        cached = (reusable or {}).get(id(item))
         if cached is not None:
             cached.index = index
             bodies.append(cached)

@@ -66,9 +66,9 @@ def _goes(bodies: Sequence[Body], own: int, other: int) -> int:
     return max(own, other) if bodies[own].is_new and bodies[own].was is None else other
 
 
-def _stopped_by(scene: SceneTriangles, own: int, near: Sequence[int], joint: Joint) -> int | None:
+def _stopped_by(scene: SceneTriangles, seed: int, near: Sequence[int], joint: Joint) -> int | None:
     """Which of some items stops a part before nine tenths of its way; None: it opens."""
-    items: list[Item] = [scene.items[own], *(scene.items[i] for i in near)]
+    items: list[Item] = [scene.items[seed], *(scene.items[i] for i in near)]
     some = SceneTriangles(items)
     target = joint.lower + LEAST_OPEN * (joint.upper - joint.lower)
     value, by = free_value(some, 0, joint.part, target)

@@ -216,14 +216,14 @@ def _ceiling(above: F64, room: Room) -> Callable[[F64], F64]:
     return ceiling_y
 
 
-def _house_space(items: Sequence[Item], kept: _KeptSpaces) -> HouseSpace:
-    points = tuple(kept.items[id(i)][1] for i in items)
-    bounds = np.array([kept.items[id(i)][2] for i in items]).reshape(-1, 2, 3)
+def _house_space(items: Sequence[Item], cache: _KeptSpaces) -> HouseSpace:
+    points = tuple(cache.items[id(i)][1] for i in items)
+    bounds = np.array([cache.items[id(i)][2] for i in items]).reshape(-1, 2, 3)
     rooms = []
-    for empty in kept.rooms:
-        inside = _items_in(items, points, bounds, empty, kept)
-        room_passages = [p for p in kept.passages if empty.room.id in p.room_ids]
-        faces = [_face_behind_things(face, items, points, bounds, kept) for face in empty.faces]
+    for empty in cache.rooms:
+        inside = _items_in(items, points, bounds, empty, cache)
+        room_passages = [p for p in cache.passages if empty.room.id in p.room_ids]
+        faces = [_face_behind_things(face, items, points, bounds, cache) for face in empty.faces]
         rooms.append(
             RoomSpace(
                 empty.room,
@@ -237,34 +237,34 @@ def _house_space(items: Sequence[Item], kept: _KeptSpaces) -> HouseSpace:
                 empty.above,
             )
         )
-    return HouseSpace(tuple(rooms), kept.passages, points, bounds)
+    return HouseSpace(tuple(rooms), cache.passages, points, bounds)
 
 
 def _face_behind_things(
-    face: WallFace, items: Sequence[Item], points: Sequence[F64], bounds: F64, kept: _KeptSpaces
+    face: WallFace, items: Sequence[Item], points: Sequence[F64], bounds: F64, cache: _KeptSpaces
 ) -> WallFace:
     """The empty face limited by items in front of it; rugs are ignored."""
-    if id(face) not in kept.reach:
-        kept.reach[id(face)] = reach_of(face)
-    near_numbers = meeting(bounds, kept.reach[id(face)])
+    if id(face) not in cache.reach:
+        cache.reach[id(face)] = reach_of(face)
+    near_numbers = meeting(bounds, cache.reach[id(face)])
     near = [n for n in near_numbers if items[n].nyu40 != FLOOR_MAT]
     key = tuple(id(items[n]) for n in near)
-    cached = kept.faces.get(id(face))
+    cached = cache.faces.get(id(face))
     if cached is None or cached[0] != key:
-        hidden = [_hidden_by(face, items[n], points[n], kept) for n in near]
-        cached = kept.faces[id(face)] = key, with_things(face, hidden)
+        hidden = [_hidden_by(face, items[n], points[n], cache) for n in near]
+        cached = cache.faces[id(face)] = key, with_things(face, hidden)
     return cached[1]
 
 
-def _hidden_by(face: WallFace, item: Item, points: F64, kept: _KeptSpaces) -> Hidden | None:
+def _hidden_by(face: WallFace, item: Item, points: F64, cache: _KeptSpaces) -> Hidden | None:
     key = id(face), id(item)
-    if key not in kept.hidden:
-        kept.hidden[key] = hidden_cells(face, points)
-    return kept.hidden[key]
+    if key not in cache.hidden:
+        cache.hidden[key] = hidden_cells(face, points)
+    return cache.hidden[key]
 
 
 def _items_in(
-    items: Sequence[Item], points: Sequence[F64], bounds: F64, empty: _EmptyRoom, kept: _KeptSpaces
+    items: Sequence[Item], points: Sequence[F64], bounds: F64, empty: _EmptyRoom, cache: _KeptSpaces
 ) -> tuple[int, ...]:
     """Numbers of the items of which a good part is in the room; neighbours' poke through outlines."""
     room, area = empty.room, empty.area
@@ -278,10 +278,10 @@ def _items_in(
         if items[number].kind in (ItemKind.DOOR, ItemKind.WINDOW):
             continue
         key = room.id, id(items[number])
-        if key not in kept.inside:
+        if key not in cache.inside:
             some = points[number][:: max(1, len(points[number]) // 200)]
             share = shapely.contains_xy(area, some[:, 0], some[:, 2]).mean()
-            kept.inside[key] = bool(share > _INSIDE_SHARE)
-        if kept.inside[key]:
+            cache.inside[key] = bool(share > _INSIDE_SHARE)
+        if cache.inside[key]:
             numbers.append(number)
     return tuple(numbers)

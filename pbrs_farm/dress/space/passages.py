@@ -173,10 +173,10 @@ def _depth_of_walls(
     return float(depths.min()), float(depths.max())
 
 
-def _runs_of_true(found: Bools, gap: int) -> list[tuple[int, int]]:
+def _runs_of_true(mask: Bools, gap: int) -> list[tuple[int, int]]:
     """(first, end) of each stretch of True, those with at most so many False between joined."""
     runs: list[tuple[int, int]] = []
-    for k in np.flatnonzero(found).tolist():
+    for k in np.flatnonzero(mask).tolist():
         if runs and k - runs[-1][1] <= gap:
             runs[-1] = (runs[-1][0], k + 1)
         else:

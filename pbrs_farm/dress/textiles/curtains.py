@@ -102,10 +102,10 @@ def window_side(
     return None if _is_dressed(house, space, candidate) else candidate
 
 
-def _is_dressed(house: MutableHouse, space: HouseSpace, seen: WindowSide) -> bool:
+def _is_dressed(house: MutableHouse, space: HouseSpace, side: WindowSide) -> bool:
     # A curtain or blind of the source, or of the window's other neighbour, hangs there.
-    half = seen.window.width / 2
-    low, high = seen.bounds(-half, half, seen.window.bottom_y, seen.window.top_y, 0.3)
+    half = side.window.width / 2
+    low, high = side.bounds(-half, half, side.window.bottom_y, side.window.top_y, 0.3)
     low, high = low - 0.1, high + 0.1
     return any(
         house.items[n].nyu40 in (CURTAIN, BLINDS)
@@ -119,7 +119,7 @@ def hang_curtains(
     house: MutableHouse,
     space: HouseSpace,
     room: RoomSpace,
-    seen: WindowSide,
+    side: WindowSide,
     cloth: Cloth,
     rng: np.random.Generator,
 ) -> bool:
@@ -128,11 +128,11 @@ def hang_curtains(
     Both panels or none. They are added to the house; the space does not follow and must be
     asked anew.
     """
-    window = seen.window
-    highest = seen.ceiling_y - _UNDER_CEILING_M
+    window = side.window
+    highest = side.ceiling_y - _UNDER_CEILING_M
     rod_y = highest if cloth.is_draped else min(window.top_y + _OVER_WINDOW_M, highest)
     depth = float(rng.uniform(0.026, 0.038))
-    rod_z = max(seen.sticks_out_m + 1.3 * depth + 0.015, 0.075)
+    rod_z = max(side.sticks_out_m + 1.3 * depth + 0.015, 0.075)
     if rod_y < window.top_y + 0.02 or rod_z > _MOST_OUT_M:
         house.refused[f"{PASS}: no place for a curtain rod"] += 1
         return False
@@ -141,7 +141,7 @@ def hang_curtains(
     cover = float(rng.uniform(0.15, 0.25)) * window.width * (1.5 if cloth.is_draped else 1.0)
     for sign in (-1, 1):
         widths = _DRAPED_M + _BESIDE_M if cloth.is_draped else _BESIDE_M
-        panel = _panel_place(space, room, seen, sign, (cover, widths), rod_y, out, house)
+        panel = _panel_place(space, room, side, sign, (cover, widths), rod_y, out, house)
         if panel is not None:
             panels.append(panel)
     # One panel alone looks as if the other had been stolen.
@@ -150,15 +150,15 @@ def hang_curtains(
         return False
     # Both panels end at one height.
     bottom = max(p[2] for p in panels)
-    piece, shape, middle = _curtain_set(seen, panels, bottom, rod_y, rod_z, depth, cloth, rng)
-    _add_at_window(house, room, piece, shape, seen, middle, bottom)
+    piece, shape, middle = _curtain_set(side, panels, bottom, rod_y, rod_z, depth, cloth, rng)
+    _add_at_window(house, room, piece, shape, side, middle, bottom)
     return True
 
 
 def _panel_place(
     space: HouseSpace,
     room: RoomSpace,
-    seen: WindowSide,
+    side: WindowSide,
     sign: int,
     spans: tuple[float, Sequence[float]],
     rod_y: float,
@@ -170,8 +170,8 @@ def _panel_place(
     spans: how much of the window it covers, and widths of wall beside it, tried in this order.
     """
     cover, widths = spans
-    half = seen.window.width / 2
-    sill = seen.window.bottom_y
+    half = side.window.width / 2
+    sill = side.window.bottom_y
     without = [n for n, i in enumerate(house.items) if i.kind is ItemKind.WINDOW]
     heaters = [n for n, i in enumerate(house.items) if words_of_item(i) & RADIATORS]
     free = shapely.difference(room.area, room.walls)
@@ -179,24 +179,24 @@ def _panel_place(
     for beyond in widths:
         inner, outer = sign * (half - cover), sign * (half + beyond)
         x0, x1 = min(inner, outer), max(inner, outer)
-        corner = seen.origin + seen.along * (outer + sign * 0.04) + seen.inward * out / 2
+        corner = side.origin + side.along * (outer + sign * 0.04) + side.inward * out / 2
         # A bracket 3 cm from the panel's end must meet the wall: a round one bends away.
         if not shapely.contains_xy(free, corner[0], corner[2]) or not is_flat(
-            free, seen, outer - sign * 0.03
+            free, side, outer - sign * 0.03
         ):
             continue
         # Before a window high in the wall only short ones hang.
-        is_high = sill > seen.floor_y + _HIGH_SILL_M
-        full = (seen.floor_y + _FROM_FLOOR_M,) if not is_high else ()
+        is_high = sill > side.floor_y + _HIGH_SILL_M
+        full = (side.floor_y + _FROM_FLOOR_M,) if not is_high else ()
         for bottom in (*full, sill - 0.15, sill - 0.05):
-            if bottom > sill or bottom < seen.floor_y:
+            if bottom > sill or bottom < side.floor_y:
                 continue
             # It hangs down to the floor, or over a radiator or nothing: not onto a worktop.
-            low, high = seen.bounds(x0, x1, bottom, rod_y + 0.02, out)
+            low, high = side.bounds(x0, x1, bottom, rod_y + 0.02, out)
             if _is_opened_into(swept, low, high):
                 continue
             least = low.copy()
-            least[1] = max(seen.floor_y + _FROM_FLOOR_M, bottom - _OVER_THINGS_M)
+            least[1] = max(side.floor_y + _FROM_FLOOR_M, bottom - _OVER_THINGS_M)
             if space.is_free(low, high, without=without) and space.is_free(
                 least, high, without=[*without, *heaters]
             ):
@@ -213,14 +213,14 @@ def _is_opened_into(swept: Sequence[Swept], low: F64, high: F64) -> bool:
     )
 
 
-def is_flat(free: BaseGeometry, seen: WindowSide, x: float) -> bool:
+def is_flat(free: BaseGeometry, side: WindowSide, x: float) -> bool:
     """Whether the wall's face at x across the window is where it is at the window.
 
     free is the plan area without walls. Ask it on both sides of the cloth, lest a rod
     end in a corner.
     """
-    position = seen.origin + seen.along * x
-    before, behind = position + seen.inward * _FLAT_M, position - seen.inward * _FLAT_M
+    position = side.origin + side.along * x
+    before, behind = position + side.inward * _FLAT_M, position - side.inward * _FLAT_M
     return bool(
         shapely.contains_xy(free, before[0], before[2])
         and not shapely.contains_xy(free, behind[0], behind[2])
@@ -258,7 +258,7 @@ def room_cloth(
 
 
 def _curtain_set(
-    seen: WindowSide,
+    side: WindowSide,
     panels: list[tuple[float, float, float]],
     bottom: float,
     rod_y: float,
@@ -291,20 +291,20 @@ def hang_blind(
     house: MutableHouse,
     space: HouseSpace,
     room: RoomSpace,
-    seen: WindowSide,
+    side: WindowSide,
     style: Style,
     rng: np.random.Generator,
 ) -> bool:
     """A roller blind or slats before the window, let down a little to half."""
-    window = seen.window
-    z = max(seen.sticks_out_m + 0.012, 0.012)
-    top = min(window.top_y + 0.06, seen.ceiling_y - 0.01)
+    window = side.window
+    z = max(side.sticks_out_m + 0.012, 0.012)
+    top = min(window.top_y + 0.06, side.ceiling_y - 0.01)
     half = window.width / 2 + 0.03
     drop = float(rng.uniform(0.12, 0.5)) * (window.top_y - window.bottom_y) + top - window.top_y
-    low, high = seen.bounds(-half, half, top - drop, top, z + 0.07)
+    low, high = side.bounds(-half, half, top - drop, top, z + 0.07)
     window_items = [n for n, i in enumerate(house.items) if i.id == window.item_id]
     free = shapely.difference(room.area, room.walls)
-    if not (is_flat(free, seen, half) and is_flat(free, seen, -half)):
+    if not (is_flat(free, side, half) and is_flat(free, side, -half)):
         house.refused[f"{PASS}: the wall bends beside a window"] += 1
         return False
     if z > 0.1 or top < window.top_y + 0.01 or not space.is_free(low, high, without=window_items):
@@ -318,7 +318,7 @@ def hang_blind(
         arm = np.array([sign * (half - 0.004), drop - 0.03, (z + 0.02) / 2])
         parts.append((box("holder", arm, np.array([0.004, 0.02, (z + 0.02) / 2]), 0), white))
     piece, shape = hanging_piece("blind", "blinds", BLINDS, parts)
-    _add_at_window(house, room, piece, shape, seen, 0.0, top - drop)
+    _add_at_window(house, room, piece, shape, side, 0.0, top - drop)
     return True
 
 
@@ -360,18 +360,18 @@ def _add_at_window(
     room: RoomSpace,
     piece: Piece,
     shape: Shape,
-    seen: WindowSide,
+    side: WindowSide,
     x: float,
     y: float,
 ) -> Item:
-    position = seen.origin + seen.along * x + seen.inward * GAP_M
+    position = side.origin + side.along * x + side.inward * GAP_M
     position[1] = y
     placed = replace(piece, place=Place.WALL)
     item = house.placed(
         placed,
         shape,
         position,
-        seen.turn_rad,
+        side.turn_rad,
         item_id=next_id(house, PASS),
         room_id=room.room.id,
         level_id=room.room.level_id,

@@ -122,7 +122,7 @@ def _dial(rng: np.random.Generator, ground: Rgb) -> Srgb8Image:
 
 def hang_anywhere(
     hanging: Hanging,
-    made: Model,
+    model: Model,
     low_m: float,
     depth_m: float,
     rng: np.random.Generator,
@@ -134,7 +134,7 @@ def hang_anywhere(
 
     above_m: free height above it. False, with the reason counted, if there is no place.
     """
-    piece, shape = made
+    piece, shape = model
     (x0, _y0, _z0), (x1, y1, _z1) = shape.bounds
     low, width = hanging.floor_y + low_m, float(x1 - x0)
     places = [
@@ -186,10 +186,10 @@ def _draw_fitting(catalogue: Catalogue, group: str, rng: np.random.Generator) ->
 
 
 def _fit_beside_door(
-    hanging: Hanging, door: Passage, side: int, made: Model, rng: np.random.Generator
+    hanging: Hanging, door: Passage, side: int, model: Model, rng: np.random.Generator
 ) -> bool:
     """Hang a switch on one side of a door: the handle's side is unknown, so any free side."""
-    piece, shape = made
+    piece, shape = model
     low = hanging.floor_y + _SWITCH_M - float(shape.bounds[1, 1]) / 2
     half = float(np.abs(shape.bounds[:, 0]).max()) + 0.02
     order = (1.0, -1.0) if rng.random() < 0.5 else (-1.0, 1.0)

@@ -214,11 +214,11 @@ def _masks(
     return coverage(item, camera, cut_outs) | visible, visible
 
 
-def _mask_facts(alone: NDArray[Any], seen: NDArray[Any], valid: NDArray[Any]) -> dict[str, Any]:
-    n_all, n_seen = int(alone.sum()), int(seen.sum())
+def _mask_facts(alone: NDArray[Any], visible: NDArray[Any], valid: NDArray[Any]) -> dict[str, Any]:
+    n_all, n_seen = int(alone.sum()), int(visible.sum())
     return {
         "bbox_obj": _box(alone),
-        "bbox_visib": _box(seen),
+        "bbox_visib": _box(visible),
         "px_count_all": n_all,
         "px_count_valid": int((alone & valid).sum()),
         "px_count_visib": n_seen,

@@ -178,19 +178,21 @@ def references_of(clip: Clip) -> list[Reference]:
 
 
 def _phrases(
-    picture: _Picture, noun: str, own: Sequence[Thing], singles: set[int]
+    picture: _Picture, noun: str, namesakes: Sequence[Thing], singles: set[int]
 ) -> Iterator[tuple[str, Thing]]:
-    if len(own) == 1:
-        yield f"the {noun}", own[0]
+    if len(namesakes) == 1:
+        yield f"the {noun}", namesakes[0]
     else:
-        yield from _by_side(picture, noun, own)
-        yield from _by_distance(picture, noun, own)
-    yield from _by_colour(picture, noun, own)
-    yield from _by_support(picture, noun, own, singles)
+        yield from _by_side(picture, noun, namesakes)
+        yield from _by_distance(picture, noun, namesakes)
+    yield from _by_colour(picture, noun, namesakes)
+    yield from _by_support(picture, noun, namesakes, singles)
 
 
-def _by_side(picture: _Picture, noun: str, own: Sequence[Thing]) -> Iterator[tuple[str, Thing]]:
-    row = sorted(own, key=picture.column)
+def _by_side(
+    picture: _Picture, noun: str, namesakes: Sequence[Thing]
+) -> Iterator[tuple[str, Thing]]:
+    row = sorted(namesakes, key=picture.column)
     columns = [picture.column(t) for t in row]
     if min(np.diff(columns)) < _APART or len(row) > len(_ORDINALS):
         return
@@ -200,45 +202,49 @@ def _by_side(picture: _Picture, noun: str, own: Sequence[Thing]) -> Iterator[tup
         yield f"the {_ORDINALS[k]} {noun} from the left", thing
 
 
-def _by_distance(picture: _Picture, noun: str, own: Sequence[Thing]) -> Iterator[tuple[str, Thing]]:
-    away = [picture.distance_m(t) for t in own]
+def _by_distance(
+    picture: _Picture, noun: str, namesakes: Sequence[Thing]
+) -> Iterator[tuple[str, Thing]]:
+    away = [picture.distance_m(t) for t in namesakes]
     if not np.isfinite(away).all():
         return
     order = np.argsort(away, kind="stable")
     if away[order[1]] - away[order[0]] >= _NEARER_M:
-        yield f"the {noun} nearest to the camera", own[order[0]]
+        yield f"the {noun} nearest to the camera", namesakes[order[0]]
     if away[order[-1]] - away[order[-2]] >= _NEARER_M:
-        yield f"the {noun} farthest from the camera", own[order[-1]]
+        yield f"the {noun} farthest from the camera", namesakes[order[-1]]
 
 
-def _by_colour(picture: _Picture, noun: str, own: Sequence[Thing]) -> Iterator[tuple[str, Thing]]:
-    shares = [picture.colour_shares(t) for t in own]
-    for k, thing in enumerate(own):
+def _by_colour(
+    picture: _Picture, noun: str, namesakes: Sequence[Thing]
+) -> Iterator[tuple[str, Thing]]:
+    shares = [picture.colour_shares(t) for t in namesakes]
+    for k, thing in enumerate(namesakes):
         for colour in _COLOURS:
             other_shares = [s[colour] for j, s in enumerate(shares) if j != k]
             is_its = (
                 shares[k][colour] >= _OF_COLOUR and max(other_shares, default=0.0) < _OF_ANOTHER
             )
-            if is_its and _is_of_another_colour(picture, thing, own):
+            if is_its and _is_of_another_colour(picture, thing, namesakes):
                 yield f"the {colour} {noun}", thing
 
 
-def _is_of_another_colour(picture: _Picture, thing: Thing, own: Sequence[Thing]) -> bool:
+def _is_of_another_colour(picture: _Picture, thing: Thing, namesakes: Sequence[Thing]) -> bool:
     """Than all others of its name, so that no two shades beside a border of two words tell them apart."""
     mean = picture.mean_colour(thing)
-    other_colours = (picture.mean_colour(t) for t in own if t is not thing)
+    other_colours = (picture.mean_colour(t) for t in namesakes if t is not thing)
     return all(np.linalg.norm(colour - mean) >= _COLOURS_APART for colour in other_colours)
 
 
 def _by_support(
-    picture: _Picture, noun: str, own: Sequence[Thing], singles: set[int]
+    picture: _Picture, noun: str, namesakes: Sequence[Thing], singles: set[int]
 ) -> Iterator[tuple[str, Thing]]:
     for support in picture.clip.things:
         if support.instance not in singles or support.noun == noun:
             continue
-        on = [t for t in own if _stands_on(t, support)]
+        on = [t for t in namesakes if _stands_on(t, support)]
         # All that may stand on it are known: one, and the others do not.
-        if len(on) == 1 and len(own) > 1:
+        if len(on) == 1 and len(namesakes) > 1:
             yield f"the {noun} on the {support.noun}", on[0]
 
 

@@ -222,13 +222,13 @@ def _windows(rng: np.random.Generator, bars: tuple[str, ...], frame: Rgb) -> F32
     return sheet
 
 
-def _draw_behind(rng: np.random.Generator, own: F32) -> None:
+def _draw_behind(rng: np.random.Generator, pane: F32) -> None:
     """The view in the panes of a window: a dark room, curtains, blinds, plants."""
-    high, wide = own.shape[:2]
+    high, wide = pane.shape[:2]
     y, x = np.arange(high)[:, None] / high, np.arange(wide)[None] / wide
     # The room is a little lighter towards its ceiling and where its far wall is.
     depth = 0.7 + 0.6 * np.exp(-(((y - 0.25) / 0.22) ** 2)) + 0.25 * (x > rng.uniform(0.3, 0.7))
-    own[:] = (depth * rng.uniform(0.7, 1.5))[..., None] * np.array(_GLASS)
+    pane[:] = (depth * rng.uniform(0.7, 1.5))[..., None] * np.array(_GLASS)
     cloth = np.array(
         ((0.42, 0.41, 0.38), (0.34, 0.28, 0.20), (0.25, 0.26, 0.28), (0.40, 0.36, 0.29))[
             int(rng.integers(0, 4))
@@ -240,26 +240,26 @@ def _draw_behind(rng: np.random.Generator, own: F32) -> None:
         reach = rng.uniform(0.14, 0.3)
         side = (x < reach) | (x > 1 - reach * rng.uniform(0.6, 1.1))
         drawn = np.broadcast_to(side, (high, wide))
-        own[drawn] = (folds * np.ones((high, 1)))[drawn][:, None] * cloth * 0.55
+        pane[drawn] = (folds * np.ones((high, 1)))[drawn][:, None] * cloth * 0.55
     elif kind < 0.55:  # a thin curtain before all, or before the lower part
         drawn = np.broadcast_to(y > (0.0 if rng.random() < 0.7 else 0.45), (high, wide))
-        own[drawn] += (0.5 * folds * np.ones((high, 1)))[drawn][:, None] * np.array(
+        pane[drawn] += (0.5 * folds * np.ones((high, 1)))[drawn][:, None] * np.array(
             [0.36, 0.36, 0.34]
         )
     elif kind < 0.75:  # a blind drawn part of the way
         drawn = np.broadcast_to(y < rng.uniform(0.25, 0.9), (high, wide))
         lines = 0.8 + 0.2 * ((y * high) % 5 < 3.5) if rng.random() < 0.5 else np.ones((high, 1))
-        own[drawn] = (lines * np.ones((1, wide)))[drawn][:, None] * cloth * 0.8
+        pane[drawn] = (lines * np.ones((1, wide)))[drawn][:, None] * cloth * 0.8
     if rng.random() < 0.3:  # something green on the sill
         for _ in range(int(rng.integers(3, 8))):
             spot = rng.uniform(0.1, 0.9), 1 - rng.uniform(0.05, 0.2)
             leaf = ((x - spot[0]) / 0.09) ** 2 + ((y - spot[1]) / 0.09) ** 2 < 1
-            own[leaf] = np.array([0.02, 0.045, 0.015]) * rng.uniform(0.7, 1.8)
+            pane[leaf] = np.array([0.02, 0.045, 0.015]) * rng.uniform(0.7, 1.8)
 
 
-def _draw_bars(own: F32, kind: str, frame: Rgb) -> None:
+def _draw_bars(pane: F32, kind: str, frame: Rgb) -> None:
     """The frame and its bars: light from above left, so that each has an edge and throws a shadow."""
-    high, wide = own.shape[:2]
+    high, wide = pane.shape[:2]
     bars = {
         "one": (),
         "two": ((0, 0.5, 1, 0.5),),
@@ -278,15 +278,15 @@ def _draw_bars(own: F32, kind: str, frame: Rgb) -> None:
         half = line // 2
         rows.append((max(a - half, 0), min(b + half, high), max(c - half, 0), min(d + half, wide)))
     for a, b, c, d in rows:  # shadows first
-        own[a : b + 3, c : d + 3] *= 0.5
+        pane[a : b + 3, c : d + 3] *= 0.5
     rgb = np.array(frame)
     for a, b, c, d in rows:
-        own[a:b, c:d] = rgb
+        pane[a:b, c:d] = rgb
     for a, b, c, d in rows[4:]:
         upright = b - a > d - c
         edge = (slice(a, b), slice(d - 2, d)) if upright else (slice(b - 2, b), slice(c, d))
-        own[edge] = 0.6 * rgb
-    own[:2], own[:, :2] = 0.7 * rgb, 0.7 * rgb
+        pane[edge] = 0.6 * rgb
+    pane[:2], pane[:, :2] = 0.7 * rgb, 0.7 * rgb
 
 
 def _door(rng: np.random.Generator) -> F32:

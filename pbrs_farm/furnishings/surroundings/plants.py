@@ -73,12 +73,12 @@ def leaves_of(rng: np.random.Generator, number: int) -> Leaves:
     )
 
 
-def _spray(rng: np.random.Generator, own: Species) -> F32:
+def _spray(rng: np.random.Generator, species: Species) -> F32:
     """(_PX, _PX, 4) linear and alpha: leaves about twigs, the later ones over the earlier."""
     picture = np.zeros((_PX, _PX, 4), np.float32)
-    picture[..., :3] = own.dark
-    long_, wide = own.leaf_px
-    for _ in range(own.n_leaves):
+    picture[..., :3] = species.dark
+    long_, wide = species.leaf_px
+    for _ in range(species.n_leaves):
         # Leaves fill a round spray and hang outwards from its middle.
         turn, away = rng.uniform(0, 2 * np.pi), 0.42 * _PX * np.sqrt(rng.random())
         tip = _PX / 2 + away * np.array([np.cos(turn), np.sin(turn)])
@@ -92,7 +92,7 @@ def _spray(rng: np.random.Generator, own: Species) -> F32:
         # Pointed at both ends, a light vein along the middle, one half in shade.
         inside = np.abs(v) < 1 - u * u
         share = rng.uniform(0.15, 1.0)
-        rgb = np.array(own.dark) * (1 - share) + np.array(own.light) * share
+        rgb = np.array(species.dark) * (1 - share) + np.array(species.light) * share
         shade = np.where(v > 0, 1.0, 0.78) * np.where(np.abs(v) < 0.13, 1.25, 1.0) * (1 - 0.15 * u)
         patch = picture[low[1] : high[1], low[0] : high[0]]
         patch[inside, :3] = shade[inside][:, None] * rgb

@@ -80,18 +80,18 @@ def _rank(type_: RoomType) -> int:
 def arrangement_of(
     brief: RoomBrief,
     space: FurnishSpace,
-    others: list[Rect],
+    obstacles: list[Rect],
     rng: np.random.Generator,
     *,
     n_standing: int = 0,
 ) -> Arrangement:
     """Arrange a room: all required groups, then optional ones, then fillers up to its density.
 
-    others: rectangles of furniture in adjoining open rooms. n_standing: existing pieces in the room,
+    obstacles: rectangles of furniture in adjoining open rooms. n_standing: existing pieces in the room,
     which count towards its density. If required groups do not fit in the brief's order, other orders
     are tried.
     """
-    walk = WalkMap(space, others)
+    walk = WalkMap(space, obstacles)
     groups = [g for g in brief.groups if g.templates or _is_kitchen(g, brief)]
     places = [
         brief.kitchen or places_of(g, space, rng) if not g.templates else places_of(g, space, rng)

@@ -75,9 +75,9 @@ def furnish_report(
     return FurnishReport(tuple(broken), n / area, walked / area)
 
 
-def missing(type_: RoomType, here: list[PlacedPiece], catalogue: Catalogue) -> list[str]:
+def missing(type_: RoomType, pieces: list[PlacedPiece], catalogue: Catalogue) -> list[str]:
     """The groups that a room of that type lacks."""
-    has = {p.piece.group for p in here}
+    has = {p.piece.group for p in pieces}
     required = MUST_HAVES.get(type_, ())
     if type_ not in (RoomType.BALCONY, RoomType.STAIRS):
         required = (*required, ("ceiling_lamp", "floor_lamp"))
@@ -88,10 +88,10 @@ def missing(type_: RoomType, here: list[PlacedPiece], catalogue: Catalogue) -> l
     ]
 
 
-def _blocked(space: FurnishSpace, here: list[PlacedPiece]) -> list[str]:
+def _blocked(space: FurnishSpace, pieces: list[PlacedPiece]) -> list[str]:
     """Furniture before doors, above window sills, or outside the room."""
     faults = []
-    for piece in here:
+    for piece in pieces:
         ground = _ground_rect(piece)
         if piece.elevation < 1.9 and any(_meet(ground, d) for d in space.doors.tolist()):
             faults.append(f"{piece.piece.name} stands before a door")

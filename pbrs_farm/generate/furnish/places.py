@@ -134,11 +134,13 @@ def places_of(group: PieceGroup, space: FurnishSpace, rng: np.random.Generator) 
     )
 
 
-def fixed_places(found: Sequence[Standing]) -> Places:
+def fixed_places(standings: Sequence[Standing]) -> Places:
     """Places that were determined elsewhere."""
-    frames = frames_array([p.frame for p in found])
-    scores = np.array([p.score for p in found], np.float64)
-    return _sorted_places([p.template for p in found], np.arange(len(found)), frames, scores)
+    frames = frames_array([p.frame for p in standings])
+    scores = np.array([p.score for p in standings], np.float64)
+    return _sorted_places(
+        [p.template for p in standings], np.arange(len(standings)), frames, scores
+    )
 
 
 def _sorted_places(
@@ -275,9 +277,9 @@ def _scores(template: Template, frames: F64, walls: Ints, space: FurnishSpace) -
     return scores
 
 
-def _distances_to_nearest(points: F64, others: Sequence[Point]) -> F64:
+def _distances_to_nearest(points: F64, targets: Sequence[Point]) -> F64:
     """(N,) distance of each point to the nearest of others."""
-    offsets = points[:, None] - np.array(others)[None]
+    offsets = points[:, None] - np.array(targets)[None]
     return np.asarray(np.hypot(offsets[..., 0], offsets[..., 1]).min(1))
 
 

@@ -153,12 +153,12 @@ def _by_fixtures(m2: float, has: set[str], n_doors: int, *, is_lit: bool, is_lar
     return "store" if n_doors == 1 or m2 < _STORE_M2 else "hall"
 
 
-def _with_living(kept: list[tuple[DrawnArea, str]]) -> list[tuple[DrawnArea, str]]:
-    types = [kind for _, kind in kept]
-    plain = [k for k, (area, kind) in enumerate(kept) if area.is_plain and kind == "bedroom"]
+def _with_living(rooms: list[tuple[DrawnArea, str]]) -> list[tuple[DrawnArea, str]]:
+    types = [kind for _, kind in rooms]
+    plain = [k for k, (area, kind) in enumerate(rooms) if area.is_plain and kind == "bedroom"]
     if {RoomType.LIVING, RoomType.STUDIO} & set(types) or not plain:
-        return kept
-    largest = max(plain, key=lambda k: (kept[k][0].shape.area, -k))
+        return rooms
+    largest = max(plain, key=lambda k: (rooms[k][0].shape.area, -k))
     # One room to live and to sleep in, where no other is left to sleep in.
     kind = "living" if types.count("bedroom") > 1 else "studio"
-    return [(a, kind if k == largest else t) for k, (a, t) in enumerate(kept)]
+    return [(a, kind if k == largest else t) for k, (a, t) in enumerate(rooms)]

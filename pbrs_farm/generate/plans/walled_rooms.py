@@ -68,7 +68,7 @@ class _Ring:
 
 
 def _walls_of(
-    number: int, shape: Polygon, rings: list[_Ring], others: list[int], *, is_open_air: bool
+    number: int, shape: Polygon, rings: list[_Ring], neighbours: list[int], *, is_open_air: bool
 ) -> list[PlanWall]:
     """The walls that a room adds: to rooms of higher number, and outer ones (a balcony: parapets)."""
     outer, height = (PARAPET_M, PARAPET_HEIGHT_M) if is_open_air else (OUTER_M, None)
@@ -78,7 +78,7 @@ def _walls_of(
         b, before, after = ring[(k + 1) % len(ring)], ring[k - 1], ring[(k + 2) % len(ring)]
         side = _Side(a, b)
         free = [(0.0, side.length)]
-        for neighbour in others:
+        for neighbour in neighbours:
             for low, high, gap in side.shared(rings[neighbour]):
                 free = _without(free, low, high)
                 if neighbour > number:

@@ -283,22 +283,22 @@ def _read_index(file: Path) -> tuple[str, tuple[_Indexed, ...], tuple[Note, ...]
         return None
 
 
-def _piece_of_model(path: Path, one: _Indexed, notes: LibraryNotes) -> FolderPiece:
+def _piece_of_model(path: Path, entry: _Indexed, notes: LibraryNotes) -> FolderPiece:
     piece = Piece(
-        id=f"{path.name}#{one.file.rpartition('.')[0]}",
-        name=one.name,
-        group=one.group,
-        place=Place(one.place),
-        nyu40=one.nyu40,
-        size=one.size,
-        kind=ItemKind(one.kind),
+        id=f"{path.name}#{entry.file.rpartition('.')[0]}",
+        name=entry.name,
+        group=entry.group,
+        place=Place(entry.place),
+        nyu40=entry.nyu40,
+        size=entry.size,
+        kind=ItemKind(entry.kind),
         library=path.name,
-        creator=one.creator,
-        licence=one.licence,
+        creator=entry.creator,
+        licence=entry.licence,
     )
-    file = path / one.file
-    model = ObjectModel(keys.slug(file.stem), one.name, one.group, one.nyu40, file, path)
-    return piece, partial(_shape, model, piece, one.quarters, notes)
+    file = path / entry.file
+    model = ObjectModel(keys.slug(file.stem), entry.name, entry.group, entry.nyu40, file, path)
+    return piece, partial(_shape, model, piece, entry.quarters, notes)
 
 
 def _shape(model: ObjectModel, piece: Piece, quarters: int, notes: LibraryNotes) -> Shape | None:

@@ -239,9 +239,9 @@ def _objathor(path: Path, name: str, notes: LibraryNotes) -> ModelTable:
     return ModelTable(models, is_whole=True)
 
 
-def _is_plain(one: str) -> bool:
+def _is_plain(name: str) -> bool:
     """Whether a model's id is a name and no path."""
-    return bool(one) and one.replace("-", "").replace("_", "").isalnum()
+    return bool(name) and name.replace("-", "").replace("_", "").isalnum()
 
 
 def _data(file: Path) -> bytes:

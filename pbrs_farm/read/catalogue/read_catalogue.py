@@ -173,11 +173,11 @@ def _rule_of_entry(entry: Entry, group: str) -> GroupRule | None:
 
 
 def _piece_of_entry(
-    library: Library, entry: Entry, rule: GroupRule, seen: PieceVerdict, notes: LibraryNotes
+    library: Library, entry: Entry, rule: GroupRule, verdict: PieceVerdict, notes: LibraryNotes
 ) -> tuple[Piece, Loader]:
     # Swap width and depth of a piece turned by a quarter.
     width, depth, height = entry.piece.size
-    is_across = round(seen.turn_deg / 90) % 2 == 1
+    is_across = round(verdict.turn_deg / 90) % 2 == 1
     piece = Piece(
         id=entry.id,
         name=entry.piece.name,
@@ -191,5 +191,5 @@ def _piece_of_entry(
         licence=library.licence,
         low_m=entry.piece.elevation,
     )
-    load = partial(library_shape, entry, rule.place, seen.turn_deg, library.contents, notes)
+    load = partial(library_shape, entry, rule.place, verdict.turn_deg, library.contents, notes)
     return piece, load

@@ -150,9 +150,9 @@ def _is_niche(rim: F64, sides: Sequence[F64]) -> bool:
     return bool(np.ptp(rim[:, 2]) < thick - _RIM_M)
 
 
-def _is_covered(place: F64, axes: F64, own: Sequence[_WallFrame]) -> bool:
+def _is_covered(place: F64, axes: F64, frames: Sequence[_WallFrame]) -> bool:
     """Whether faces of a wall's sides lie before or behind a place (3,) along, up and across it."""
-    sides = [f.corners @ axes for f in own if abs(float(f.normal @ axes[:, 2])) > 0.999]
+    sides = [f.corners @ axes for f in frames if abs(float(f.normal @ axes[:, 2])) > 0.999]
     if not sides:
         return False
     # Look across the wall as from below.
@@ -160,10 +160,10 @@ def _is_covered(place: F64, axes: F64, own: Sequence[_WallFrame]) -> bool:
     return bool(np.isfinite(y[0]))
 
 
-def _across_void(void: Void, own: Sequence[_WallFrame]) -> F64:
+def _across_void(void: Void, frames: Sequence[_WallFrame]) -> F64:
     """(3,) the direction across the wall: of its largest sides the one that the door's leaf agrees with."""
-    largest = max(f.area_m2 for f in own)
-    sides = [f for f in own if f.area_m2 >= _SIDE_SHARE * largest]
+    largest = max(f.area_m2 for f in frames)
+    sides = [f for f in frames if f.area_m2 >= _SIDE_SHARE * largest]
     leaf = void.item.box if void.item is not None else None
     if leaf is None or len(sides) == 1:
         return max(sides, key=lambda f: f.area_m2).normal

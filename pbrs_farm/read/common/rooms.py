@@ -120,13 +120,13 @@ def _with_heights(
     polygon: F64,
     name: str,
     types: tuple[str, ...],
-    given: dict[str, float | None],
+    heights: dict[str, float | None],
     items: Sequence[Item],
 ) -> Room:
     """The room with heights of the floor and ceiling that lie over its polygon."""
     # Take the floor's height as given, as the floor below has it, or 0.
     floors = _over(items, ItemKind.FLOOR, polygon)
-    floor_y = given["floor_y"]
+    floor_y = heights["floor_y"]
     low = floor_height(floors) if floor_y is None else floor_y
     low = 0.0 if low is None else low
     # Leave out ceilings that belong to the next room.
@@ -139,7 +139,7 @@ def _with_heights(
     # Without a ceiling the room is as high as its walls, or a storey.
     walls = [float(s.positions[:, 1].max()) for s in _over(items, ItemKind.WALL, polygon, _EDGE_M)]
     nominal = max((y for y in walls if low + 1.0 < y < low + 10.0), default=low + _STOREY_M)
-    high = given["ceiling_y"] or ceiling or nominal
+    high = heights["ceiling_y"] or ceiling or nominal
     return Room(
         id="",
         name=name,

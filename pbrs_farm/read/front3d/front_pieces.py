@@ -146,10 +146,10 @@ class FrontModels:
         return None if model is None else _without_shadow(model)
 
     def _box_only(
-        self, piece: FrontPiece, vocabulary: str, name: str, seen: GivenClass, item_id: str
+        self, piece: FrontPiece, vocabulary: str, name: str, item_class: GivenClass, item_id: str
     ) -> Item | None:
         self.n_missing += 1
-        if piece.size is None or seen.kind in _STRUCTURE:
+        if piece.size is None or item_class.kind in _STRUCTURE:
             return None
         size = np.array(piece.size) * np.abs(piece.scale)
         centre = piece.world_from_model[:3, 3] + np.array([0.0, size[1] / 2, 0.0])

@@ -130,7 +130,7 @@ class SceneMaterials:
         return material, self._emission(fields_json, place)
 
     def _alpha(
-        self, fields_json: dict[str, Any], factor: float, found: LoadedTexture | None, place: str
+        self, fields_json: dict[str, Any], factor: float, picture: LoadedTexture | None, place: str
     ) -> tuple[float, float | None]:
         """(opacity, alpha threshold of cut-outs or None) by the alpha mode.
 
@@ -138,7 +138,7 @@ class SceneMaterials:
         cannot be blended, as in Cycles' passes; a uniformly transparent picture makes glass of its mean.
         """
         mode = fields_json.get("alphaMode", "OPAQUE")
-        alpha = found.alpha if found else OPAQUE_ALPHA
+        alpha = picture.alpha if picture else OPAQUE_ALPHA
         if mode == "BLEND":
             is_even = alpha.most < USUAL_CUTOFF or alpha.least == alpha.most
             has_holes = not is_even and alpha.least < USUAL_CUTOFF
@@ -186,8 +186,8 @@ class SceneMaterials:
             return factor, picture, False
         return np.array([1, 1, 1, factor[3]]), converted, False
 
-    def _lie_alike(self, one: dict[str, Any], other: dict[str, Any]) -> bool:
-        return texture_layout(self._gltf, one) == texture_layout(self._gltf, other)
+    def _lie_alike(self, first: dict[str, Any], other: dict[str, Any]) -> bool:
+        return texture_layout(self._gltf, first) == texture_layout(self._gltf, other)
 
     def _specular_factor(self, glossy: dict[str, Any], place: str) -> F64:
         factors = numbers(

@@ -90,7 +90,7 @@ _COLLECTIONS: Final = frozenset(
 )
 
 
-def collection_of(name: str, seen: NodeClass) -> NodeClass | None:
+def collection_of(name: str, node_class: NodeClass) -> NodeClass | None:
     """Class of the members of a node without a mesh, if its name is a collective noun.
 
     None: the node is one item ("Chair"). "Chairs": chairs. "Furniture", "Ground floor" (a storey): no
@@ -99,10 +99,10 @@ def collection_of(name: str, seen: NodeClass) -> NodeClass | None:
     words = words_of(name)
     # words_of gives singulars beside plurals.
     plurals = {w[:-1] for w in words if w.endswith("s") and w[:-1] in words}
-    if words & _COLLECTIONS or seen.kind in (ItemKind.FLOOR, ItemKind.GROUND):
+    if words & _COLLECTIONS or node_class.kind in (ItemKind.FLOOR, ItemKind.GROUND):
         return NodeClass(0, ItemKind.OBJECT, is_tagged=False)
     if any(nyu40_of("", w) is not None or w in STRUCTURE_WORDS for w in plurals):
-        return seen
+        return node_class
     return None
 
 

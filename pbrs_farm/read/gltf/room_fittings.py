@@ -124,12 +124,12 @@ def _of_name(name: str) -> int:
     return _FRAMED if words & _FRAME_WORDS else _UNSAID
 
 
-def _connected_parts(corners: F64, said: I64) -> I64:
+def _connected_parts(corners: F64, kind_of_face: I64) -> I64:
     """(F,) connected parts, those of fittings apart from the walls that they share corners with."""
     part = np.zeros(len(corners), np.int64)
     n = 0
-    for kind in np.unique(said):
-        is_kind = said == kind
+    for kind in np.unique(kind_of_face):
+        is_kind = kind_of_face == kind
         part[is_kind] = components(corners[is_kind]) + n
         n = int(part[is_kind].max()) + 1
     return part
@@ -168,14 +168,14 @@ def _join_touching_parts(bounds: F64, fitted: Bools) -> I64:
     return thing
 
 
-def _fitting_item(item: Item, faces: Bools, said: I64, number: int) -> Item:
+def _fitting_item(item: Item, faces: Bools, kind_of_face: I64, number: int) -> Item:
     """The item of some faces: what the names of its materials say most."""
     kind, nyu40, name = ItemKind.OBJECT, OTHERSTRUCTURE, "fitting"
-    if (said == _DOORLIKE).any():
+    if (kind_of_face == _DOORLIKE).any():
         kind, nyu40, name = ItemKind.DOOR, DOOR, "door"
-    elif (said == _GLAZED).any():
+    elif (kind_of_face == _GLAZED).any():
         kind, nyu40, name = ItemKind.WINDOW, WINDOW, "window"
-    elif (said == _SKIRTED).any():
+    elif (kind_of_face == _SKIRTED).any():
         nyu40, name = WALL, "skirting"
     surfaces = picked(item, faces)
     points = np.concatenate([s.positions for s in surfaces]).astype(np.float64)

@@ -184,10 +184,10 @@ def _gather_things(gltf: Gltf, mapping: Mapping) -> list[_Thing]:
     return things
 
 
-def _is_shown(own: NodeClass, collection: NodeClass) -> bool:
+def _is_shown(own_class: NodeClass, collection: NodeClass) -> bool:
     """Whether a person or plant is what members of a collection show: a man among statues."""
     living = (ItemKind.PERSON, ItemKind.PLANT)
-    return own.kind in living and collection.kind not in living
+    return own_class.kind in living and collection.kind not in living
 
 
 def _item(
@@ -195,12 +195,12 @@ def _item(
     thing: _Thing,
     materials: SceneMaterials,
     notes: Notes,
-    known: dict[Any, list[tuple[int | None, Mesh]]],
+    cache: dict[Any, list[tuple[int | None, Mesh]]],
     fields: ReadFields,
 ) -> Item | None:
     surfaces: list[Surface] = []
     shining: dict[int, Emission] = {}
-    parts = list(_meshes(gltf, thing, notes, known, fields))
+    parts = list(_meshes(gltf, thing, notes, cache, fields))
     if thing.is_by_name and parts:
         size = _size_of(parts)
         sized = class_of_node_name(thing.name, materials=thing.materials, size=size)
@@ -309,7 +309,7 @@ def _meshes(
     gltf: Gltf,
     thing: _Thing,
     notes: Notes,
-    known: dict[Any, list[tuple[int | None, Mesh]]],
+    cache: dict[Any, list[tuple[int | None, Mesh]]],
     fields: ReadFields,
 ) -> Iterator[tuple[Placed, list[tuple[int | None, Mesh]]]]:
     """(node, its meshes with the numbers of their materials) of every part that has a mesh."""
@@ -321,10 +321,10 @@ def _meshes(
             notes.add("flat-node", f"nodes[{part.index}]", "its scale is 0; left out")
             continue
         entry(gltf, "meshes", node["mesh"])
-        if node["mesh"] not in known:
+        if node["mesh"] not in cache:
             most = fields.max_model_triangles
-            known[node["mesh"]] = meshes_of(gltf, node["mesh"], max_triangles=most)
-        meshes = known[node["mesh"]]
+            cache[node["mesh"]] = meshes_of(gltf, node["mesh"], max_triangles=most)
+        meshes = cache[node["mesh"]]
         if meshes and _extent_m(meshes, part.world_from_node) < _LEAST_EXTENT_M:
             notes.add("flat-node", f"nodes[{part.index}]", "nothing is left of it; left out")
             continue

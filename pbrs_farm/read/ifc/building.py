@@ -393,11 +393,11 @@ class _Building:
         return [room for space in spaces if (room := self._room(space)) is not None]
 
     def _under_ceilings(
-        self, told: Sequence[tuple[Room, F64]], overheads: Overheads
+        self, spaces: Sequence[tuple[Room, F64]], overheads: Overheads
     ) -> list[tuple[Room, F64 | None]]:
         """Limit the rooms to the height of their ceilings; drop rooms on a roof, with nothing above."""
         limited: list[tuple[Room, F64 | None]] = []
-        for room, top in told:
+        for room, top in spaces:
             above = overheads.over(room)
             near_y = room.ceiling_y + NEAR_M
             if _is_called_attic(room.name) and above.share(near_y) < _COVERED:
@@ -503,8 +503,8 @@ def _has_body(product: Any) -> bool:
     return bool(names & {"Body", "Facetation", "Body-FallBack"})
 
 
-def _is_piece(seen: NodeClass) -> bool:
-    return not seen.kind.is_structure and seen.kind not in _OPENINGS
+def _is_piece(node_class: NodeClass) -> bool:
+    return not node_class.kind.is_structure and node_class.kind not in _OPENINGS
 
 
 def _class_of_part_of_name(name: str) -> NodeClass | None:

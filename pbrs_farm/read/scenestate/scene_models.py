@@ -132,18 +132,18 @@ class SceneModels:
         return replace(item, lights=(assumed_light(item),)) if kind is ItemKind.LAMP else item
 
     def _box_only(
-        self, one: PlacedModel, row: _Row | None, seen: GivenClass | None, item_id: str
+        self, placed: PlacedModel, row: _Row | None, cls: GivenClass | None, item_id: str
     ) -> Item | None:
-        name = NYU40_NAMES[seen.nyu40] if seen and 0 <= seen.nyu40 < len(NYU40_NAMES) else ""
+        name = NYU40_NAMES[cls.nyu40] if cls and 0 <= cls.nyu40 < len(NYU40_NAMES) else ""
         size = (row.size if row else None) or _USUAL.get(name)
         if row is None or size is None:
-            self.missing[one.model] += 1
+            self.missing[placed.model] += 1
             return None
-        world = one.world_from_scene @ one.scene_from_model
+        world = placed.world_from_scene @ placed.scene_from_model
         # The scene's axes as a model has them: to the right, up, to the front.
-        up, front = (v / np.linalg.norm(v) for v in (one.up, one.front))
+        up, front = (v / np.linalg.norm(v) for v in (placed.up, placed.front))
         columns = world[:3, :3] @ np.stack([np.cross(up, front), up, front], 1)
-        unit = float(np.linalg.norm(one.world_from_scene[:3, 0]))
+        unit = float(np.linalg.norm(placed.world_from_scene[:3, 0]))
         scale = np.linalg.norm(columns, axis=0) / unit
         width, height, depth = (float(s * k) for s, k in zip(size, scale, strict=True))
         x, y, z = (float(v) for v in world[:3, 3])
@@ -199,19 +199,19 @@ def _mesh_of_surface(s: Surface) -> Mesh:
     )
 
 
-def _scene_from_file(one: PlacedModel, meshes: list[Mesh]) -> F64:
+def _scene_from_file(placed: PlacedModel, meshes: list[Mesh]) -> F64:
     """(4, 4) the scene's axes and units <- a GLB's: aligned, scaled, then centred as its source says."""
-    up = one.up if one.asset.align.up is None else one.asset.align.up
-    front = one.front if one.asset.align.front is None else one.asset.align.front
+    up = placed.up if placed.asset.align.up is None else placed.asset.align.up
+    front = placed.front if placed.asset.align.front is None else placed.asset.align.front
     lengths = [float(np.linalg.norm(v)) for v in (up, front)]
     matrix = np.eye(4)
     if min(lengths) > 1e-9 and abs(up @ front) < 1e-3 * lengths[0] * lengths[1]:
         up, front = up / lengths[0], front / lengths[1]
-        matrix[:3, :3] = np.stack([np.cross(up, front), up, front], 1) / one.asset.scale
-    if one.asset.centre is not None:
+        matrix[:3, :3] = np.stack([np.cross(up, front), up, front], 1) / placed.asset.scale
+    if placed.asset.centre is not None:
         points = np.concatenate([m.positions for m in meshes]) @ matrix[:3, :3].T
         low, high = points.min(0), points.max(0)
-        matrix[:3, 3] = -(low + one.asset.centre * (high - low))
+        matrix[:3, 3] = -(low + placed.asset.centre * (high - low))
     return matrix
 
 

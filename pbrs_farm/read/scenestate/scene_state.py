@@ -188,11 +188,11 @@ class _Shell:
         walls = [e for e in elements if e.element.kind == "Wall"]
         self._drawn, self._standing = standing_walls(walls, areas)
 
-    def _sunk(self, one: SceneElement) -> SceneElement:
+    def _sunk(self, element: SceneElement) -> SceneElement:
         """The slab above its points; below them for a floor with items on the points."""
-        e = one.element
+        e = element.element
         if e.kind != "Floor" or e.depth_m <= 0:
-            return one
+            return element
         low = float(e.points[0][:, 1].min())
         bases = [
             float(o.world_from_scene[1] @ o.scene_from_model[:, 3]) for o in self._document.objects
@@ -201,9 +201,9 @@ class _Shell:
         at_points = sum(abs(y - low) < _ON_FLOOR_M for y in bases)
         is_down = at_points > at_top or (at_points == at_top and abs(low) < 1e-6)
         if not is_down:
-            return one
+            return element
         points = tuple(ring - [0.0, e.depth_m, 0.0] for ring in e.points)
-        return replace(one, element=replace(e, points=points))
+        return replace(element, element=replace(e, points=points))
 
     def walls(self) -> list[Item]:
         """An item for each wall."""

@@ -58,8 +58,8 @@ def standing_walls(
     return drawn, standing
 
 
-def _stand_wall(one: SceneElement, tree: Any, names: list[str]) -> StandingWall | None:
-    e = one.element
+def _stand_wall(element: SceneElement, tree: Any, names: list[str]) -> StandingWall | None:
+    e = element.element
     if e.depth_m <= 0:
         e = replace(e, depth_m=WALL_DEPTH_M)
     start, end = e.points[0]
@@ -70,13 +70,13 @@ def _stand_wall(one: SceneElement, tree: Any, names: list[str]) -> StandingWall 
     along /= length
     leftward = np.array([along[2], 0.0, -along[0]])
     sides = [_rooms_beside(start, end, sign * leftward, tree, names) for sign in (1, -1)]
-    is_own_side = [bool(set(side) & set(one.rooms)) for side in sides]
-    is_between = len(one.rooms) > 1 or all(sides)
+    is_own_side = [bool(set(side) & set(element.rooms)) for side in sides]
+    is_between = len(element.rooms) > 1 or all(sides)
     # Outward from the first room that lists it, else from the adjacent floor.
     is_left_in = (
         is_own_side[0] if is_own_side[0] != is_own_side[1] else bool(sides[0]) and not sides[1]
     )
-    first = one.rooms[:1]
+    first = element.rooms[:1]
     if is_between and first and is_own_side == [True, True]:
         is_left_in = first[0] in sides[0]
     outward = -leftward if is_left_in else leftward
@@ -84,7 +84,7 @@ def _stand_wall(one: SceneElement, tree: Any, names: list[str]) -> StandingWall 
         start = start - outward * e.depth_m / 2
     up = np.array([0.0, 1.0, 0.0])
     frame = WallFrame(start, np.stack([along, up, outward], 1), length)
-    return StandingWall(one.id, e, frame, one.rooms, is_between)
+    return StandingWall(element.id, e, frame, element.rooms, is_between)
 
 
 def _rooms_beside(start: F64, end: F64, side: F64, tree: Any, names: list[str]) -> list[str]:

@@ -129,16 +129,16 @@ def _object_model(context: ReaderContext, node: Node) -> tuple[str, ParsedModel]
 
 
 def _surfaces_and_bulbs(
-    context: ReaderContext, node: Node, model: ParsedModel, seen: ModelClass, lamp: LampMaterials
+    context: ReaderContext, node: Node, model: ParsedModel, cls: ModelClass, lamp: LampMaterials
 ) -> tuple[tuple[Surface, ...], list[int]]:
     """(surfaces in the model's order, indices of the bulbs)."""
     world_from_model = context.world_from_house @ node.house_from_model
     # Glass in a wall is a pane: panes do not refract light.
-    is_opening = seen.kind in (ItemKind.WINDOW, ItemKind.DOOR)
+    is_opening = cls.kind in (ItemKind.WINDOW, ItemKind.DOOR)
     clear = MaterialKind.PANE if is_opening else MaterialKind.GLASS
     surfaces: list[Surface] = []
     bulbs: list[int] = []
-    glass = mirror_slot(model) if seen.nyu40 == MIRROR else None
+    glass = mirror_slot(model) if cls.nyu40 == MIRROR else None
     for mesh, slot in zip(model.meshes, model.slots, strict=True):
         # Take the model's own material under what the node says of it.
         mtl = model.mtl[slot] if slot >= 0 else None
@@ -166,7 +166,7 @@ def _surfaces_and_bulbs(
 
 
 def _tags(
-    context: ReaderContext, node: Node, seen: ModelClass, *, is_known: bool
+    context: ReaderContext, node: Node, model_class: ModelClass, *, is_known: bool
 ) -> tuple[str, ...]:
     # Believe the transform: it is what places the mesh.
     mirrored = bool(np.linalg.det(node.house_from_model[:3, :3]) < 0)
@@ -175,7 +175,7 @@ def _tags(
         context.notes.add("mirrored-differs", node.place, text)
     tags = ["mirrored"] if mirrored else []
     tags += [] if is_known else ["unmapped"]
-    tags += ["structure"] if seen.structure else []
+    tags += ["structure"] if model_class.structure else []
     return tuple(tags)
 
 

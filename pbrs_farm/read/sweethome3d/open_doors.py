@@ -55,15 +55,15 @@ class Leaf:
 
 
 def shut_leaves(
-    meshes: Iterable[Mesh], matrix: F64, told: Sequence[Joint] = ()
+    meshes: Iterable[Mesh], matrix: F64, joints: Sequence[Joint] = ()
 ) -> tuple[Leaf, ...]:
     """The closed leaves of a door's model with an upright hinge.
 
     matrix: (4, 4) from the model's frame to the piece's. told: joints from the file, in the model's
     frame; they take precedence over the hinges in the model.
     """
-    if told:
-        return tuple(_told_leaves(tuple(meshes), matrix, told))
+    if joints:
+        return tuple(_told_leaves(tuple(meshes), matrix, joints))
     leaves: dict[str, list[F64]] = {}
     hinges: dict[str, list[F64]] = {}
     for mesh in meshes:
@@ -78,8 +78,8 @@ def shut_leaves(
     return tuple(leaf for leaf in leaves_found if leaf is not None)
 
 
-def _told_leaves(meshes: Sequence[Mesh], matrix: F64, told: Sequence[Joint]) -> Iterator[Leaf]:
-    for number, joint in enumerate(told, 1):
+def _told_leaves(meshes: Sequence[Mesh], matrix: F64, joints: Sequence[Joint]) -> Iterator[Leaf]:
+    for number, joint in enumerate(joints, 1):
         hung = joint.placed(matrix)
         name = f"hinge_{number}"
         parts = [

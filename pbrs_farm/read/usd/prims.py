@@ -200,8 +200,8 @@ class StageNodes:
         elif own_class.kind not in _STRUCTURE:
             self._tag(node, own_class)
 
-    def _tag(self, node: _Row, seen: NodeClass) -> None:
-        node["extras"] |= {"nyu40": seen.nyu40, "kind": seen.kind.value}
+    def _tag(self, node: _Row, node_class: NodeClass) -> None:
+        node["extras"] |= {"nyu40": node_class.nyu40, "kind": node_class.kind.value}
 
     # Shapes
 

@@ -232,10 +232,10 @@ def damaged(path: Path, error: Exception) -> BadHouse:
     return BadHouse(path, "", f"damaged: {text.strip(': ')}")
 
 
-def _note_missing(said: Any, notes: Notes) -> int:
+def _note_missing(diagnostics: Any, notes: Notes) -> int:
     """Number of references that the library could not open; a note each."""
     n = 0
-    for row in said.TakeUncoalescedDiagnostics():
+    for row in diagnostics.TakeUncoalescedDiagnostics():
         text = " ".join(str(row.commentary).split())
         match = _UNOPENED.search(text)
         n += match is not None

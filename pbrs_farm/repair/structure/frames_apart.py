@@ -186,18 +186,20 @@ def _faces_of_structure(items: Sequence[Item], low: F64, high: F64) -> _Faces:
     return _Faces(corners, unit_normals(corners))
 
 
-def _shared_planes(own: _Faces, around: _Faces) -> Iterator[tuple[F64, float]]:
+def _shared_planes(faces: _Faces, around: _Faces) -> Iterator[tuple[F64, float]]:
     """Normal and offset of every plane in which faces of both look one way and share area."""
     offsets = np.einsum("fi,fi->f", around.normals, around.corners[:, 0])
     keys = np.round(np.column_stack([around.normals * 1e3, offsets / _COINCIDE_M]))
     planes = np.sort(np.unique(keys, axis=0, return_index=True)[1])
     # Of the walls' planes those in which the piece has a face at all.
-    tree = cKDTree(_shrink(own.normals, np.einsum("fi,fi->f", own.normals, own.corners[:, 0])))
+    tree = cKDTree(
+        _shrink(faces.normals, np.einsum("fi,fi->f", faces.normals, faces.corners[:, 0]))
+    )
     near = tree.query(_shrink(around.normals[planes], offsets[planes]), p=np.inf)[0] <= 1.0
     for first in planes[near]:
         normal, offset = around.normals[first], float(offsets[first])
-        frame = _of_plane(own, normal, offset)
-        if not len(frame) or _is_met(around, own, normal, offset):
+        frame = _of_plane(faces, normal, offset)
+        if not len(frame) or _is_met(around, faces, normal, offset):
             continue
         # Compare areas in the plane.
         axes = np.linalg.svd(normal[None])[2][1:]

@@ -108,13 +108,13 @@ def _same_height(a: PlanarSurface, b: PlanarSurface) -> bool:
 def slab(
     surface: PlanarSurface,
     footprint: plan.Shape,
-    own: plan.Shape,
+    visible: plan.Shape,
     thickness_m: float,
     table: TagTable,
 ) -> list[Manifold]:
     """The surface's slab as solids that overlap: the layer with its face, and the base behind it.
 
-    own: plan area in which its face is seen; footprint: what the slab reaches under, walls too.
+    visible: plan area in which its face is seen; footprint: what the slab reaches under, walls too.
     thickness_m: away from the room. They overlap on purpose: `unite` makes one of them without a
     seam.
     """
@@ -123,7 +123,7 @@ def slab(
     solids = []
     # Stack the two layers from the face outwards.
     for area, near_m, far_m, tag in (
-        (own, 0.0, FACE_M, face),
+        (visible, 0.0, FACE_M, face),
         (footprint, BASE_BEHIND_M, thickness_m, hidden),
     ):
         near, far = surface.plane.raised(away * near_m), surface.plane.raised(away * far_m)

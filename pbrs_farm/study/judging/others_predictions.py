@@ -49,7 +49,7 @@ def others_predictions(word: str) -> OthersPredictions:
 
 
 def predictions_in(
-    others: OthersPredictions, views: JudgedViews, plan: TrainingPlan
+    predictions: OthersPredictions, views: JudgedViews, plan: TrainingPlan
 ) -> Iterator[NDArray[Any]] | None:
     """A prediction of each view at the size of its truth, in order; None if no view has a file.
 
@@ -58,13 +58,13 @@ def predictions_in(
     """
     task = task_of(plan.task)
     kind = task.file_kind(plan)
-    files = _files_of(others.folder, views.ids, kind)
+    files = _files_of(predictions.folder, views.ids, kind)
     if not any(files):
         return None
     for id, file in zip(views.ids, files, strict=True):
         if file is None:
             text = f"no prediction of {id}: {_prediction_names(id, kind)[0]} and the like"
-            raise BadInput(others.folder, "", text, hint="all pictures of a place, or none")
+            raise BadInput(predictions.folder, "", text, hint="all pictures of a place, or none")
     return (
         _cropped_to_size(_read_prediction(file, task), size)
         for file, size in zip(files, views.sizes, strict=True)

@@ -61,15 +61,15 @@ class Exposure:
         return {"shutter_s": self.shutter_s, "iso": round(self.iso, 1), "exposure": self.factor}
 
 
-def choose_exposure(wanted: float, fields: SensorFields) -> Exposure:
+def choose_exposure(target: float, fields: SensorFields) -> Exposure:
     """The exposure nearest to a wanted factor that shutter and ISO allow: the shutter opens first.
 
-    wanted: factor from radiance to the picture's scale, before the compensation of
+    target: factor from radiance to the picture's scale, before the compensation of
     `fields.compensation_ev`. The shutter opens up to its longest first, then ISO rises; where both
     are at their ends the picture comes out darker or brighter than wanted. A fixed shutter
     (shutter_s > 0) leaves ISO alone to follow.
     """
-    goal = wanted * 2**fields.compensation_ev
+    goal = target * 2**fields.compensation_ev
     # Factor on radiance of one second at ISO 1.
     unit = LM_PER_W * math.pi / 4 / fields.f_number**2 / _SATURATION_LX_S * fields.headroom
     product = goal / unit
@@ -82,12 +82,12 @@ def choose_exposure(wanted: float, fields: SensorFields) -> Exposure:
     return Exposure(shutter, iso, shutter * iso * unit)
 
 
-def lag_exposure(wanted: Sequence[float], times_s: Sequence[float], lag_s: float) -> float:
+def lag_exposure(targets: Sequence[float], times_s: Sequence[float], lag_s: float) -> float:
     """The factor of the last frame when it follows the wanted ones by a first-order filter of lag_s."""
-    level = math.log(wanted[0])
-    for k in range(1, len(wanted)):
+    level = math.log(targets[0])
+    for k in range(1, len(targets)):
         share = 1 - math.exp(-(times_s[k] - times_s[k - 1]) / lag_s) if lag_s > 0 else 1.0
-        level += share * (math.log(wanted[k]) - level)
+        level += share * (math.log(targets[k]) - level)
     return math.exp(level)
 
 
@@ -102,14 +102,14 @@ class SensorShot:
     ] = ()  # mode -> wanted factor, of earlier frames in order
     times_s: tuple[float, ...] = ()  # of those frames; this one's is 0
 
-    def exposure(self, mode: str, wanted: float) -> Exposure:
+    def exposure(self, mode: str, target: float) -> Exposure:
         """Exposure of a mode's picture, from the mode's own target factor.
 
-        wanted: the factor that tone mapping would use for the picture. Previous frames pull it along by
+        target: the factor that tone mapping would use for the picture. Previous frames pull it along by
         `fields.lag_s`, since automatic exposure lags; KeyError for a mode that the previous frames lack.
         """
         path = [frame[mode] for frame in self.before]
-        lagged = lag_exposure([*path, wanted], [*self.times_s, 0.0], self.fields.lag_s)
+        lagged = lag_exposure([*path, target], [*self.times_s, 0.0], self.fields.lag_s)
         return choose_exposure(lagged, self.fields)
 
 

@@ -220,23 +220,23 @@ def _wanted(view: SampledView) -> int:
     return view.fields.mutations_per_pixel * i.width_px * i.height_px
 
 
-def _restored(context: ChainContext, kept: Arrays) -> tuple[ChainContext, _StartedChains]:
+def _restored(context: ChainContext, stored: Arrays) -> tuple[ChainContext, _StartedChains]:
     """A run's context and chains as ChainRun.state gave them."""
     film = context.film._replace(
-        splats=device_array(mi.Float, kept["splats"]),
-        importance=device_array(mi.Float, kept["importance"]),
+        splats=device_array(mi.Float, stored["splats"]),
+        importance=device_array(mi.Float, stored["importance"]),
     )
     floats = {
-        name: device_array(mi.Float, kept[name])
+        name: device_array(mi.Float, stored[name])
         for name in ("samples", "target", "shared", "suffixes")
     }
     chains = Chains(
         **floats,
-        light=mi.Color3f(*(device_array(mi.Float, row) for row in kept["light"])),
-        pixel=device_array(mi.UInt32, kept["pixel"]),
+        light=mi.Color3f(*(device_array(mi.Float, row) for row in stored["light"])),
+        pixel=device_array(mi.UInt32, stored["pixel"]),
     )
     dr.eval(*chains)
-    target, n_paths, n_accepted, n_bad, n_steps = (float(v) for v in kept["sums"])
+    target, n_paths, n_accepted, n_bad, n_steps = (float(v) for v in stored["sums"])
     totals = _Totals(target, n_paths, n_accepted, int(n_bad), int(n_steps))
     return context._replace(film=film), (chains, totals)
 

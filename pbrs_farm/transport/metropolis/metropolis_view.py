@@ -64,13 +64,13 @@ def render_groups(
     return direct, {g: _estimate(view, runs, g) for g in Group}
 
 
-def _chain_runs(view: SampledView, kept: Arrays) -> dict[Group, ChainRun]:
+def _chain_runs(view: SampledView, stored: Arrays) -> dict[Group, ChainRun]:
     """The chains of each group that has light, started or as they were kept."""
     first = 3 if view.fields.direct_spp > 0 else 1
     runs = {}
     for k, group in enumerate(Group):
         prefix = f"{group.value}."
-        part = {n.removeprefix(prefix): a for n, a in kept.items() if n.startswith(prefix)}
+        part = {n.removeprefix(prefix): a for n, a in stored.items() if n.startswith(prefix)}
         own_view = replace(view, seed=view.seed + k)
         run = chain_run(own_view, group, min_segments=first, kept=part)
         if run is not None:
