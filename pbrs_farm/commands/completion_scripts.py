@@ -68,10 +68,8 @@ def _fish_lines(verbs: Mapping[str, argparse.ArgumentParser]) -> Iterator[str]:
         values = dict(_option_choices(parser))
         for option in _options(parser):
             # -x: nothing but these words may follow the option, no file names.
-            values_text = (
-                f" -x -a {shlex.quote(' '.join(values[option]))}" if option in values else ""
-            )
-            yield f"{of_verb} -l {option.removeprefix('--')}{values_text}"
+            words = f" -x -a {shlex.quote(' '.join(values[option]))}" if option in values else ""
+            yield f"{of_verb} -l {option.removeprefix('--')}{words}"
         if arguments := _arguments(verb, parser):
             yield f"{of_verb} -a {shlex.quote(' '.join(arguments))}"
 

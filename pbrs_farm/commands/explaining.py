@@ -89,25 +89,30 @@ def add_verbs(verb: Verb) -> None:
 def _catalogue(args: argparse.Namespace) -> int:
     from pbrs_farm.prepare.dress_catalogue import own_catalogue
 
-    lib = own_catalogue(args.libraries)
-    groups = Counter(piece.group for piece in lib.pieces)
-    kinds = Counter(note.kind for note in lib.notes)
-    is_usable = bool(lib.pieces or lib.pictures)
+    loaded = own_catalogue(args.libraries)
+    groups = Counter(piece.group for piece in loaded.pieces)
+    kinds = Counter(note.kind for note in loaded.notes)
+    is_usable = bool(loaded.pieces or loaded.pictures)
     if args.refused is not None:
-        rows = [(note.kind, note.place, note.text) for note in lib.notes]
+        rows = [(note.kind, note.place, note.text) for note in loaded.notes]
         text = io.StringIO(newline="")
         csv.writer(text).writerows([("kind", "model", "reason"), *rows])
         args.refused.write_text(text.getvalue(), encoding="utf-8")
     if args.json:
         echo_json(
-            {"pieces": len(lib.pieces), "groups": groups, "notes": kinds, "digest": lib.digest}
+            {
+                "pieces": len(loaded.pieces),
+                "groups": groups,
+                "notes": kinds,
+                "digest": loaded.digest,
+            }
         )
         return 0 if is_usable else 1
-    echo(f"{counted(len(lib.pieces), 'piece')}, {counted(len(lib.pictures), 'picture')}")
+    echo(f"{counted(len(loaded.pieces), 'piece')}, {counted(len(loaded.pictures), 'picture')}")
     for group, n in sorted(groups.items(), key=lambda pair: (-pair[1], pair[0])):
         echo(f"  {n:6} {group.replace('_', ' ')}")
     for kind, n in kinds.most_common():
-        first = next(note for note in lib.notes if note.kind == kind)
+        first = next(note for note in loaded.notes if note.kind == kind)
         echo(f"{n} {kind}: {first.place}: {first.text}{' ...' if n > 1 else ''}")
     if not is_usable:
         warn(f"{', '.join(map(str, args.libraries))}: holds nothing that can be used")

@@ -208,10 +208,8 @@ def changed_recipe(
         fields[group] = dict(values)
     for group, value in changes.items():
         preset_value = fields.get(group)
-        is_merged = isinstance(preset_value, dict) and isinstance(value, Mapping)
-        fields[group] = (
-            {**preset_value, **value} if is_merged and preset_value is not None else value
-        )
+        join = isinstance(preset_value, dict) and isinstance(value, Mapping)
+        fields[group] = {**preset_value, **value} if join and preset_value is not None else value
     for path, text in overrides.items():
         _set(fields, path, text)
     return _validated(fields)

@@ -68,10 +68,8 @@ def plane_share(view: ChosenView) -> float:
     offsets = (points * normals).sum(1)
     # The plane that most share, to about a plane's width; then all that lie on it.
     cells = np.concatenate([np.rint(normals / 0.1), np.rint(offsets / 0.1)[:, None]], axis=1)
-    _cells, cell_of_point, counts = np.unique(
-        cells, axis=0, return_inverse=True, return_counts=True
-    )
-    largest = cell_of_point.reshape(-1) == counts.argmax()
+    _cells, cell, counts = np.unique(cells, axis=0, return_inverse=True, return_counts=True)
+    largest = cell.reshape(-1) == counts.argmax()
     normal = normals[largest].mean(0)
     normal /= np.linalg.norm(normal)
     offset = float(np.median(points[largest] @ normal))

@@ -68,11 +68,9 @@ def frames_of(folder: Path) -> list[tuple[Path, Path]]:
     if not paired.any():
         text = f"no picture within {_APART_S} s of one in {_RGB_LIST}"
         raise BadInput(folder / DEPTH_LIST, "", text)
-    frames = indices[paired]
-    frames = frames[np.argsort(rgb_s[frames], kind="stable")]
-    return [
-        (rgb[k][1], depth[nearest[k]][1]) for k in frames[_apart(rgb_s[frames], _poses(folder))]
-    ]
+    ids = indices[paired]
+    ids = ids[np.argsort(rgb_s[ids], kind="stable")]
+    return [(rgb[k][1], depth[nearest[k]][1]) for k in ids[_apart(rgb_s[ids], _poses(folder))]]
 
 
 def _listed(path: Path) -> list[tuple[float, Path]]:

@@ -178,9 +178,7 @@ def _swap_set(
     # front.
     opens = any(item.joints for item in items)
     if opens:
-        candidates = [
-            candidate for candidate in candidates if candidate[0].id.startswith(GENERATED)
-        ]
+        candidates = [c for c in candidates if c[0].id.startswith(GENERATED)]
     # Keep the kind of support: hung or from below.
     candidates = [
         (piece, scale)

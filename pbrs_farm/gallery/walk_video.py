@@ -30,12 +30,12 @@ def sequences_of(views: Sequence[ViewEntry]) -> dict[str, list[ViewEntry]]:
     Frames are known by "frame" in their view.json, of a rig the first camera's count. Gaps are not filled: a
     sequence that is only partly rendered has the frames that are there.
     """
-    frames: dict[str, list[ViewEntry]] = {}
+    walks: dict[str, list[ViewEntry]] = {}
     for view in views:
         if view.facts.get("frame") is not None and not view.shot.eye:
-            frames.setdefault(view.house.id, []).append(view)
+            walks.setdefault(view.house.id, []).append(view)
     return {
-        house: sorted(rows, key=lambda v: int(v.facts["frame"])) for house, rows in frames.items()
+        house: sorted(walk, key=lambda v: int(v.facts["frame"])) for house, walk in walks.items()
     }
 
 

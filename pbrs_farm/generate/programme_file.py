@@ -136,14 +136,12 @@ def _complete(path: Path, wishes: list[RoomWish]) -> list[RoomWish]:
     if RoomType.KITCHEN not in types:
         raise BadInput(path, "", "has no kitchen", hint='add {"type": "kitchen"}')
     # A hall without a given area takes its share of the adjacent rooms.
-    other_wishes = [w for w in wishes if w.type is not RoomType.HALL]
-    share = max(
-        _ASKED_HALL_SHARE * sum(w.area for w in other_wishes), 3.0 + 0.95 * len(other_wishes)
-    )
+    rooms = [w for w in wishes if w.type is not RoomType.HALL]
+    share = max(_ASKED_HALL_SHARE * sum(w.area for w in rooms), 3.0 + 0.95 * len(rooms))
     hall_wish = next((w for w in wishes if w.type is RoomType.HALL), RoomWish(RoomType.HALL, 0.0))
     hall = RoomWish(RoomType.HALL, hall_wish.area or share, hall_wish.name)
-    other_wishes.sort(key=lambda w: w.type not in (RoomType.LIVING, RoomType.STUDIO))
-    return [*other_wishes, hall]
+    rooms.sort(key=lambda w: w.type not in (RoomType.LIVING, RoomType.STUDIO))
+    return [*rooms, hall]
 
 
 def _with_area(path: Path, area: float | None, wishes: list[RoomWish]) -> list[RoomWish]:

@@ -165,11 +165,9 @@ def _bay(plan: Plan, number: int, depth: float, spread: float) -> Plan | None:
     half = opening.width / 2 + _BESIDE_PANE_M + wall.thickness / 2
     low, high = opening.along - half - spread, opening.along + half + spread
     mouth = replace(opening, width=high - low)
-    other_openings = [
-        o for k, o in enumerate(plan.openings) if k != number and o.wall == opening.wall
-    ]
+    nearby = [o for k, o in enumerate(plan.openings) if k != number and o.wall == opening.wall]
     clear = replace(mouth, width=mouth.width + 2 * (_FROM_CORNER_M - _BESIDE_PANE_M))
-    if low < 0 or high > wall.length or not _fits(plan, clear, other_openings):
+    if low < 0 or high > wall.length or not _fits(plan, clear, nearby):
         return None
     # The side of the wall that the room is not on.
     nx, nz = wall.normal

@@ -80,10 +80,8 @@ def d_shape(
     front = [(float(-w / 2 * np.cos(a)), float(end + d * share * np.sin(a))) for a in t]
     quarter = np.pi / 2 * np.arange(4) / 3
     right = [(float(w / 2 - r + r * np.cos(a)), float(back + r - r * np.sin(a))) for a in quarter]
-    left_side = [
-        (float(-w / 2 + r - r * np.sin(a)), float(back + r - r * np.cos(a))) for a in quarter
-    ]
-    return [*front, *right, *left_side]
+    rest = [(float(-w / 2 + r - r * np.sin(a)), float(back + r - r * np.cos(a))) for a in quarter]
+    return [*front, *right, *rest]
 
 
 def rings(

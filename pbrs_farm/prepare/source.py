@@ -206,10 +206,10 @@ def _format_at(path: Path) -> Format:
     if suffix in _UNREAD_SUFFIXES:
         hint = f"export it as .glb; read are {summary()}"
         raise BadHouse(str(path), "", f"{path.suffix} files are not read", hint=hint)
-    if path.is_file() and not any(suffix in form.suffixes for form in formats()):
+    if path.is_file() and not any(suffix in home_format.suffixes for home_format in formats()):
         raise BadHouse(path, "", "is no home", hint=f"read are {summary()}")
     # A file that is not there is missing in its format's words.
-    named = (form for form in formats() if suffix in form.suffixes)
+    named = (home_format for home_format in formats() if suffix in home_format.suffixes)
     default = format_of_kind(_DEFAULT_KIND)
     assert default is not None
     return next(named, default)

@@ -63,9 +63,7 @@ def finish_root(store: Store, houses: Iterable[str]) -> None:
     for house_id in houses:
         finish_house(store, house_id)
     below = [keys.parse_house_key(key) for top in keys.FOLDERS for key in store.list(f"{top}/")]
-    merge_manifests(
-        store, [place.house for place in below if place and place.file == keys.MANIFEST]
-    )
+    merge_manifests(store, [p.house for p in below if p and p.file == keys.MANIFEST])
     write_attribution(store)
 
 

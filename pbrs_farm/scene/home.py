@@ -892,20 +892,18 @@ class Items(Table):
         """
         for key in (_ids, _words):
             # A name may contain characters of patterns: "chair [2]".
-            matches = tuple(
+            items = tuple(
                 i
                 for i in self._items
                 if any(w == pattern or fnmatchcase(w, pattern) for w in key(i))
             )
-            if matches:
-                return matches
+            if items:
+                return items
         low = pattern.lower()
-        matches = tuple(
-            i for i in self._items if any(fnmatchcase(w.lower(), low) for w in _words(i))
-        )
-        if not matches:
+        items = tuple(i for i in self._items if any(fnmatchcase(w.lower(), low) for w in _words(i)))
+        if not items:
             raise self._unknown(pattern)
-        return matches
+        return items
 
     @checked_call
     def near(self, name: str, within_m: Positive = 1.5) -> Items:

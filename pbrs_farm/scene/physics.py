@@ -109,14 +109,12 @@ def _parts_of(model: Model) -> tuple[F64, ...]:
 
 def _static_solids(house: House, surfaces: Sequence[TargetTops], size_m: float) -> list[F64]:
     """Convex solids of the home around the surfaces, (V, 3) each."""
-    points = np.concatenate(
-        [_points_of(top.support) for surface in surfaces for top in surface.tops]
-    )
+    points = np.concatenate([_points_of(top.support) for s in surfaces for top in s.tops])
     reach = np.array([_REACH_M + size_m, 0.0, _REACH_M + size_m])
     low, high = points.min(0) - reach - [0, 2, 0], points.max(0) + reach + [0, 1, 0]
     exact: list[F64] = []
     solids: list[F64] = []
-    bearing = {id(surface.target) for surface in surfaces}
+    bearing = {id(s.target) for s in surfaces}
     for item in house.items:
         a, b = item.bounds
         if not ((a <= high) & (b >= low)).all():

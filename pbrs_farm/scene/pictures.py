@@ -153,10 +153,8 @@ def film(
 
 
 def _rig_of(rig: str | Path | Mapping[str, Any]) -> dict[str, Any]:
-    rig_fields = (
-        rig_from_table(rig, "rig") if isinstance(rig, Mapping) else rig_from_toml(Path(rig))
-    )
-    return rig_fields.model_dump(exclude_unset=True)
+    table = rig_from_table(rig, "rig") if isinstance(rig, Mapping) else rig_from_toml(Path(rig))
+    return table.model_dump(exclude_unset=True)
 
 
 @contextmanager

@@ -148,8 +148,12 @@ def radiosity(
     n = len(points)
     indoor = np.full(n, ALL_EMITTERS) if lamps is None else lamps
     outdoor = np.full(n, ALL_EMITTERS if lamps is None else NO_EMITTERS)
-    which = EmitterFilter(*(device_array(mi.Int32, v.astype(np.int32)) for v in (indoor, outdoor)))
-    context = PathContext(scene, emitters, device_fields(LightFields(), max_depth=max_depth), which)
+    counted = EmitterFilter(
+        *(device_array(mi.Int32, v.astype(np.int32)) for v in (indoor, outdoor))
+    )
+    context = PathContext(
+        scene, emitters, device_fields(LightFields(), max_depth=max_depth), counted
+    )
     # Give each point a separate random stream.
     key = stream_key(dr.arange(mi.UInt32, n), dr.opaque(mi.UInt32, seed & 0xFFFFFFFF))
     p, normal = mi.Point3f(*_columns(points)), mi.Vector3f(*_columns(normals))

@@ -78,9 +78,7 @@ def label_parts(stored: Stored) -> dict[str, bytes]:
     """
     parts: dict[str, bytes] = {}
     for part in dict.fromkeys(_PARTS.values()):
-        arrays = {
-            n: stored[n] for n, array_part in _PARTS.items() if array_part == part and n in stored
-        }
+        arrays = {n: stored[n] for n, of in _PARTS.items() if of == part and n in stored}
         if arrays:
             is_npz = part.endswith(".npz")
             parts[part] = npz_of_arrays(arrays) if is_npz else png_of_rows(*arrays.values())

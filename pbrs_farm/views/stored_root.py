@@ -177,10 +177,8 @@ def finished_views(store: Store) -> frozenset[tuple[str, str]]:
     Finished is a view whose view.json is there, as that is written last. Lists the store, which
     takes long for a remote root.
     """
-    files_of_view = _files_of_views(store)
-    return frozenset(
-        (ref.house, ref.view) for ref, files in files_of_view.items() if _TABLE in files
-    )
+    views = _files_of_views(store)
+    return frozenset((ref.house, ref.view) for ref, files in views.items() if _TABLE in files)
 
 
 def copy_view(of: Store, to: Store, ref: ViewRef) -> None:

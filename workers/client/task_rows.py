@@ -33,8 +33,8 @@ def explain_tasks(
     states = ledger.unit_states(view.job_id, house)
     batches = ledger.batches(view.job_id, house)
     # The house's hash holds other fields beside its units.
-    units = {u: state for u, state in states.items() if u == WHOLE or u.isdigit() or u[:1] == "s"}
-    units = {u: state for u, state in units.items() if ":" in state}
+    units = {u: now for u, now in states.items() if u == WHOLE or u.isdigit() or u[:1] == "s"}
+    units = {u: now for u, now in units.items() if ":" in now}
     unit = rest.partition("/")[0]
     # A view names the batch that holds it.
     if states and unit and unit not in units:
@@ -43,10 +43,10 @@ def explain_tasks(
             raise BadInput(text, "", "the job has no such task or view")
         units = {holding[0]: units[holding[0]]}
     elif unit:
-        units = {u: state for u, state in units.items() if u == unit}
+        units = {u: now for u, now in units.items() if u == unit}
     rows = [
-        _row_of_task(ledger, view.job_id, house, u, state, batches)
-        for u, state in sorted(units.items())
+        _row_of_task(ledger, view.job_id, house, u, now, batches)
+        for u, now in sorted(units.items())
     ]
     for row in rows:
         if "worker" in row:

@@ -85,10 +85,8 @@ def done_steps(store: Store, houses: Sequence[str]) -> dict[str, frozenset[str]]
     """
     if isinstance(store, LaidOutStore):
         with ThreadPoolExecutor(_THREADS) as pool:
-            names_of_houses = zip(
-                houses, pool.map(partial(_names_of_house, store), houses), strict=True
-            )
-            return {house: names for house, names in names_of_houses if names}
+            pairs = zip(houses, pool.map(partial(_names_of_house, store), houses), strict=True)
+            return {house: names for house, names in pairs if names}
     return _names_of_markers(store.list(f"{keys.FOLDERS[0]}/"))
 
 
@@ -100,9 +98,7 @@ def _names_of_house(store: LaidOutStore, house: str) -> frozenset[str]:
         rows = [json.loads(line) for line in (data or b"").splitlines()]
         placed = [(row["step"], keys.parse_house_key(row["key"])) for row in rows]
         if placed:
-            return frozenset(
-                keys.marker_name(step, parsed.view) for step, parsed in placed if parsed
-            )
+            return frozenset(keys.marker_name(step, p.view) for step, p in placed if p)
     return _names_of_markers(store.list(keys.house_key(house, "done/"))).get(house, frozenset())
 
 

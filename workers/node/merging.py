@@ -53,21 +53,19 @@ def merge_job(store: Store, spec: JobSpec, on_step: OnText) -> None:
     reported as missing. Holds a shard's rows in memory, and the root's former manifest if there is one.
     """
     houses = house_ids(store, spec)
-    job_houses = set(houses)
+    ours = set(houses)
     missing: list[str] = []
     dressed: list[dict[str, str]] = []
     n_objects = 0
     # Merge two streams sorted by house, holding only a shard's rows.
     with TemporaryFile() as file:
-        for house, part in _merge_by_house(
-            store, job_houses, _new_rows(store, spec, houses, on_step)
-        ):
+        for house, part in _merge_by_house(store, ours, _new_rows(store, spec, houses, on_step)):
             if part is None:
                 missing.append(house)
             else:
                 file.write(part)
                 dressed += dressing_rows(part)
-                n_objects += part.count(b"\n") if house in job_houses else 0  # a row an object
+                n_objects += part.count(b"\n") if house in ours else 0  # a row an object
         _put_file(store, keys.MANIFEST, file)
     write_attribution_of(store, dressed)
     # List missing parts and permanent failures.

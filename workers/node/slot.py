@@ -234,7 +234,7 @@ class Slot:
         if self._clock() < self._heartbeat_at:
             return None
         self._heartbeat_at = self._clock() + self._config.heartbeat_s
-        tasks = [str(claimed.task), *(str(waiter.task) for waiter in waiting), *self._ended]
+        tasks = [str(claimed.task), *(str(queued.task) for queued in waiting), *self._ended]
         try:
             answer = self._ledger.heartbeat(claimed.job, tasks, claimed.claim.token)
         except LedgerUnavailable as error:

@@ -73,9 +73,9 @@ def dress_bed(placing: Placing, scene: SceneTriangles, index: int) -> int:
         if pillow[0].size[0] > most:
             pillow = _narrowed(pillow, most / pillow[0].size[0])
         spacing = max(0.46, (pillow[0].size[0] + 0.02) / bed.width)
-        for share in (0.5 - spacing / 2, 0.5 + spacing / 2) if is_double else (0.5,):
+        for x in (0.5 - spacing / 2, 0.5 + spacing / 2) if is_double else (0.5,):
             n += lay_down(
-                placing, scene, index, pillow, *_place_on_bed(bed, share, 0.06, pillow), bed.level
+                placing, scene, index, pillow, *_place_on_bed(bed, x, 0.06, pillow), bed.level
             )
         # Who sleeps there has a duvet, below the pillows.
         first = bed.rows[0] * bed.grid.cell_m + 0.06 + pillow[0].size[1] + 0.08
@@ -88,17 +88,17 @@ def dress_bed(placing: Placing, scene: SceneTriangles, index: int) -> int:
     if rng.random() < 0.45 * placing.share:
         # A cushion leans where the pillows end, not across the bed's middle.
         pillow = content().things["cushion"](rng, placing.style)
-        share = float(rng.uniform(0.35, 0.65))
+        x = float(rng.uniform(0.35, 0.65))
         n += lay_down(
-            placing, scene, index, pillow, *_place_on_bed(bed, share, 0.56, pillow), bed.level
+            placing, scene, index, pillow, *_place_on_bed(bed, x, 0.56, pillow), bed.level
         )
     if rng.random() < 0.65 * placing.share:
         # A folded blanket across the foot.
         pillow = content().things["folded_blanket"](rng, placing.style)
-        share = float(rng.uniform(0.35, 0.65))
+        x = float(rng.uniform(0.35, 0.65))
         from_head = bed.length - pillow[0].size[1] - float(rng.uniform(0.08, 0.25))
         n += lay_down(
-            placing, scene, index, pillow, *_place_on_bed(bed, share, from_head, pillow), bed.level
+            placing, scene, index, pillow, *_place_on_bed(bed, x, from_head, pillow), bed.level
         )
     return n
 

@@ -96,10 +96,8 @@ def window_side(
     sticks_out = 0.0
     if number is not None and len(space.points[number]):
         sticks_out = max(float(((space.points[number] - origin) @ inward).max()), 0.0)
-    candidate = WindowSide(
-        window, side, origin, along, inward, room.room.floor_y, ceiling, sticks_out
-    )
-    return None if _is_dressed(house, space, candidate) else candidate
+    view = WindowSide(window, side, origin, along, inward, room.room.floor_y, ceiling, sticks_out)
+    return None if _is_dressed(house, space, view) else view
 
 
 def _is_dressed(house: MutableHouse, space: HouseSpace, side: WindowSide) -> bool:

@@ -82,13 +82,11 @@ def write_bop(views: list[ChosenView], out: Path, _choice: Choice) -> None:
 
 def _object_numbers(models: list[str]) -> dict[str, int]:
     """Model -> its obj_id."""
-    number_of = {m: int(match[1]) for m in models if (match := _OWN_NUMBER.fullmatch(m))}
+    ids = {m: int(match[1]) for m in models if (match := _OWN_NUMBER.fullmatch(m))}
     free = (
-        k
-        for k in range(1, len(models) + max(number_of.values(), default=0) + 1)
-        if k not in number_of.values()
+        k for k in range(1, len(models) + max(ids.values(), default=0) + 1) if k not in ids.values()
     )
-    return {m: number_of[m] if m in number_of else next(free) for m in models}
+    return {m: ids[m] if m in ids else next(free) for m in models}
 
 
 def _mesh_of(item: Item, house: House) -> _ModelMesh:

@@ -79,10 +79,8 @@ def _things(view: ChosenView) -> list[_Seen]:
     camera_from_world = np.linalg.inv(pose_opencv(view))
     things = []
     for row in sorted(view.facts["instances"], key=lambda r: (-r["pixels"], r["id"])):
-        visible_fraction = row["visible_fraction"]
-        is_seen = (visible_fraction is None or visible_fraction >= LEAST_VISIBLE) and row[
-            "fraction"
-        ] >= LEAST_FRACTION
+        share = row["visible_fraction"]
+        is_seen = (share is None or share >= LEAST_VISIBLE) and row["fraction"] >= LEAST_FRACTION
         noun = noun_of(view, row) if is_seen and not _is_structure(row) else ""
         if noun:
             world = _corners(row["box3d"])
@@ -257,9 +255,9 @@ def _relation_sentences(relations: Iterable[dict[str, Any]], titles: dict[int, s
         first.setdefault(row["subject"], row)
     sentences = []
     for row in list(first.values())[:_SAID]:
-        subject, relation, base = (titles[row["subject"]], row["relation"], titles[row["object"]])
+        subject, relation, target = (titles[row["subject"]], row["relation"], titles[row["object"]])
         verb = "are" if is_plural(subject.partition(" from the left")[0]) else "is"
-        sentences.append(f"{subject[0].upper()}{subject[1:]} {verb} {relation} {base}.")
+        sentences.append(f"{subject[0].upper()}{subject[1:]} {verb} {relation} {target}.")
     return sentences
 
 

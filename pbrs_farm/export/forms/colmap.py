@@ -26,14 +26,14 @@ def write_colmap(views: list[ChosenView], out: Path, _choice: Choice) -> None:
     rigs.txt and frames.txt beside them, as COLMAP 3.12 and later read them.
     """
     for house in dict.fromkeys(view.house.id for view in views):
-        house_views = [view for view in views if view.house.id == house]
+        shots = [view for view in views if view.house.id == house]
         (out / house / "images").mkdir(parents=True)
         (out / house / "sparse/0").mkdir(parents=True)
         cameras: dict[tuple[str, str], int] = {}
         images: list[str] = []
         points: list[str] = []
         sensors: list[int] = []
-        for number, view in enumerate(house_views, start=1):
+        for number, view in enumerate(shots, start=1):
             picture = required_picture(view, "colmap")
             (out / house / "images" / f"{view.id}.png").write_bytes(view.data(picture))
             # Each camera of a rig is a sensor, even if two are alike.
@@ -54,10 +54,8 @@ def write_colmap(views: list[ChosenView], out: Path, _choice: Choice) -> None:
         _write_lines(out / house / "sparse/0/images.txt", images)
         numbered = (f"{n} {point}\n" for n, point in enumerate(points, start=1))
         _write_lines(out / house / "sparse/0/points3D.txt", numbered)
-        if any("rig" in view.facts for view in house_views):
-            for name, lines in zip(
-                ("rigs", "frames"), _rig_lines(house_views, sensors), strict=True
-            ):
+        if any("rig" in view.facts for view in shots):
+            for name, lines in zip(("rigs", "frames"), _rig_lines(shots, sensors), strict=True):
                 _write_lines(out / house / f"sparse/0/{name}.txt", lines)
 
 

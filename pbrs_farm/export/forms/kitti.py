@@ -59,16 +59,14 @@ def _labels(view: ChosenView) -> dict[str, bytes]:
         disparity = view.array("disparity")
         files["disp_occ_0/{}_10.png"] = png_from_array(disparity)
         if view.has("occlusion_stereo"):
-            is_seen = view.array("occlusion_stereo") == _SEEN
-            files["disp_noc_0/{}_10.png"] = png_from_array(
-                np.where(is_seen, disparity, np.uint16(0))
-            )
+            shown = view.array("occlusion_stereo") == _SEEN
+            files["disp_noc_0/{}_10.png"] = png_from_array(np.where(shown, disparity, np.uint16(0)))
     if view.has("flow_forward"):
         flow, has_depth = view.array("flow_forward"), view.array("depth") > 0
         files["flow_occ/{}_10.png"] = png_from_array(kitti_flow(flow, has_depth))
         if view.has("occlusion_forward"):
-            is_seen = view.array("occlusion_forward") == _SEEN
-            files["flow_noc/{}_10.png"] = png_from_array(kitti_flow(flow, is_seen))
+            shown = view.array("occlusion_forward") == _SEEN
+            files["flow_noc/{}_10.png"] = png_from_array(kitti_flow(flow, shown))
     return files
 
 

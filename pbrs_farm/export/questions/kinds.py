@@ -91,12 +91,10 @@ def _tried(
 def _counts(clip: Clip, _rng: random.Random) -> Iterator[Draft]:
     """How many there are of a noun, from two on, where nothing that looks alike is called otherwise."""
     nouns = {thing.noun for thing in clip.things}
-    for noun, things in clip.by_noun.items():
+    for noun, same in clip.by_noun.items():
         is_alike = any(noun in group and len(group & nouns) > 1 for group in _LOOK_ALIKE)
-        if len(things) > 1 and not is_alike:
-            yield Draft(
-                {"many": plural(noun)}, str(len(things)), (), tuple(t.instance for t in things)
-            )
+        if len(same) > 1 and not is_alike:
+            yield Draft({"many": plural(noun)}, str(len(same)), (), tuple(t.instance for t in same))
 
 
 def _distances(clip: Clip, rng: random.Random) -> Iterator[Draft]:

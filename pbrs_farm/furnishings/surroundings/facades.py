@@ -191,12 +191,12 @@ def tiles(rng: np.random.Generator, rgb: Rgb) -> F32:
     middles = np.arange(n) + 0.5
     row = (middles * rows / n).astype(int)
     shifted = middles[None] * columns / n + 0.5 * (row % 2)[:, None]
-    shades = rng.normal(1, 0.16, (rows, columns))[row[:, None], shifted.astype(int) % columns]
+    tone = rng.normal(1, 0.16, (rows, columns))[row[:, None], shifted.astype(int) % columns]
     along, across = (middles * rows / n % 1)[:, None], shifted % 1
     shade = (0.75 + 0.3 * np.sin(np.pi * across)) * np.where(along > 0.86, 0.4, 1.05 - 0.2 * along)
     grain = 1 + 0.08 * noise(rng, (n, n), slope=0.8)
     return np.asarray(
-        np.clip((shades * shade * grain)[..., None] * np.array(rgb), 0, 0.8), np.float32
+        np.clip((tone * shade * grain)[..., None] * np.array(rgb), 0, 0.8), np.float32
     )
 
 

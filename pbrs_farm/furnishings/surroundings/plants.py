@@ -54,21 +54,19 @@ class Leaves(NamedTuple):
 
 def leaves_of(rng: np.random.Generator, number: int) -> Leaves:
     """The looks of one of SPECIES."""
-    species = SPECIES[number]
-    spray = _spray(rng, species)
-    r, g, b = species.dark
+    tree = SPECIES[number]
+    spray = _spray(rng, tree)
+    r, g, b = tree.dark
     dark = (0.3 * r, 0.3 * g, 0.3 * b)
     return Leaves(
-        species,
-        SceneryMaterial(f"{species.name} leaves", picture=spray),
-        SceneryMaterial(f"{species.name} leaves in shade", rgb=(_SHADE,) * 3, picture=spray),
+        tree,
+        SceneryMaterial(f"{tree.name} leaves", picture=spray),
+        SceneryMaterial(f"{tree.name} leaves in shade", rgb=(_SHADE,) * 3, picture=spray),
         SceneryMaterial(
-            f"{species.name} dark",
-            picture=mottled(rng, dark, species.dark, size=64),
-            size_m=(0.7, 0.7),
+            f"{tree.name} dark", picture=mottled(rng, dark, tree.dark, size=64), size_m=(0.7, 0.7)
         ),
         SceneryMaterial(
-            f"{species.name} bark", picture=mottled(rng, *species.bark, size=64), size_m=(0.5, 0.5)
+            f"{tree.name} bark", picture=mottled(rng, *tree.bark, size=64), size_m=(0.5, 0.5)
         ),
     )
 

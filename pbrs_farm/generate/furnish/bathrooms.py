@@ -89,11 +89,9 @@ def washers(shelf: Shelf) -> tuple[Template, ...]:
 
 def small_things(shelf: Shelf) -> tuple[Template, ...]:
     """Bins, baskets, a bidet, narrow shelves."""
-    templates = [single(p, before=0.0, corner=0.5) for p in shelf.of("bin", height=(0.2, 0.6))[:2]]
-    templates += [
-        single(p, before=0.0, corner=0.5) for p in shelf.of("basket", width=(0.3, 0.6))[:2]
-    ]
-    return tuple(templates)
+    items = [single(p, before=0.0, corner=0.5) for p in shelf.of("bin", height=(0.2, 0.6))[:2]]
+    items += [single(p, before=0.0, corner=0.5) for p in shelf.of("basket", width=(0.3, 0.6))[:2]]
+    return tuple(items)
 
 
 def narrow_shelves(shelf: Shelf) -> tuple[Template, ...]:

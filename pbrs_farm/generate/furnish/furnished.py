@@ -53,14 +53,12 @@ def furnished(
         room_rng = np.random.default_rng(int(seeds[number]))
         taken = list((standing or {}).get(number, ()))
         space = with_bodies(room_space(plan, number), taken)
-        standing_grounds = [
+        bodies = [
             ground(p) for pieces in pieces_of_room.values() for p in pieces if p.elevation < 0.4
         ]
         brief = brief_of(plan, space, shelf, room_rng, (uses or {}).get(number))
         brief = brief.without((present or {}).get(number, ()))
-        placed = arrangement_of(
-            brief, space, [*standing_grounds, *taken], room_rng, n_standing=len(taken)
-        )
+        placed = arrangement_of(brief, space, [*bodies, *taken], room_rng, n_standing=len(taken))
         # A low ceiling makes tall pieces lower.
         pieces = [
             replace(p, height=min(p.height, round(plan.height - p.elevation - 0.02, 4)))

@@ -78,13 +78,11 @@ def furnish_report(
 def missing(type_: RoomType, pieces: list[PlacedPiece], catalogue: Catalogue) -> list[str]:
     """The groups that a room of that type lacks."""
     has = {p.piece.group for p in pieces}
-    required = MUST_HAVES.get(type_, ())
+    needed = MUST_HAVES.get(type_, ())
     if type_ not in (RoomType.BALCONY, RoomType.STAIRS):
-        required = (*required, ("ceiling_lamp", "floor_lamp"))
+        needed = (*needed, ("ceiling_lamp", "floor_lamp"))
     return [
-        " or ".join(groups)
-        for groups in required
-        if not has & set(groups) and catalogue.of(*groups)
+        " or ".join(groups) for groups in needed if not has & set(groups) and catalogue.of(*groups)
     ]
 
 
@@ -111,13 +109,11 @@ def _overlapping_pieces(pieces: tuple[PlacedPiece, ...], grounds: list[Rect]) ->
     for (a, ra), (b, rb) in combinations(zip(pieces, grounds, strict=True), 2):
         if a.room != b.room or not _meet(ra, rb):
             continue
-        shared_height = min(a.elevation + a.height, b.elevation + b.height) - max(
-            a.elevation, b.elevation
-        )
+        depth = min(a.elevation + a.height, b.elevation + b.height) - max(a.elevation, b.elevation)
         pair = frozenset((a.piece.group, b.piece.group))
-        if shared_height > _DEEP_M and pair not in _MAY_OVERLAP:
+        if depth > _DEEP_M and pair not in _MAY_OVERLAP:
             # Allow a television inside the edge of its cabinet, and taps below wall cabinets.
-            if "tv" in pair and shared_height < 0.3:
+            if "tv" in pair and depth < 0.3:
                 continue
             faults.append(f"{a.piece.name} and {b.piece.name} overlap")
     return faults

@@ -297,7 +297,7 @@ def _hung(
     modules: list[_Module], units: Units, arms: tuple[Arm, ...], space: FurnishSpace
 ) -> list[PieceSlot]:
     """The hood and the wall cabinets, and no two of them before each other's fronts."""
-    slots_of_modules: list[tuple[_Module, PieceSlot]] = []
+    slots: list[tuple[_Module, PieceSlot]] = []
     for number, module in enumerate(modules):
         slot = _above(module, units, arms, space, number)
         if slot is None:
@@ -311,15 +311,13 @@ def _hung(
             right = _STRIP if module.kind == "corner" else right
             module = replace(module, low=module.low + left, width=module.width - left - right)
             slot = replace(slot, width=module.width)
-        slots_of_modules.append((module, slot))
+        slots.append((module, slot))
     # In a corner the main arm's cabinet opens before where the side arm's would hang.
     reach = UPPER_DEPTH_M + CORNER_M + PULL_M
-    is_cooked_there = any(
-        m.kind == "cooker" and m.arm == 1 and m.low < reach for m, _ in slots_of_modules
-    )
+    is_cooked_there = any(m.kind == "cooker" and m.arm == 1 and m.low < reach for m, _ in slots)
     free_slots = [
         (m, s)
-        for m, s in slots_of_modules
+        for m, s in slots
         if not (m.kind == "corner" and is_cooked_there)
         and not (m.kind != "cooker" and m.arm == 1 and m.low < reach and not is_cooked_there)
     ]

@@ -93,14 +93,12 @@ def plan_of_rows(path: Path, apartment: str = "") -> ParsedPlan:
         (apartment,) = floors
     if apartment not in floors:
         some = ", ".join(list(floors)[:_NAMED]) + (", ..." if len(floors) > _NAMED else "")
-        problem = (
-            f"has no apartment {apartment!r}" if apartment else f"has {len(floors)} apartments"
-        )
+        text = f"has no apartment {apartment!r}" if apartment else f"has {len(floors)} apartments"
         first = next(iter(floors))
         raise BadInput(
             path,
             "apartment_id",
-            f"{problem}: {some}",
+            f"{text}: {some}",
             hint=f"--apartment {first}, or the word {path.name}#apartment={first} of run",
         )
     left_out = LeftOut()

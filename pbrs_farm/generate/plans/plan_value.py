@@ -103,11 +103,9 @@ def plan_of_value(
 
     tops: upper edges of its walls where some are sloped. Raises BadInput, naming the room or opening.
     """
-    plan_fields = checked(_PlanFields, value, path, hint='{"rooms": [...], "doors": [...]}')
+    plan = checked(_PlanFields, value, path, hint='{"rooms": [...], "doors": [...]}')
     # Build walls between the drawn rooms; openings are then assigned to walls.
-    fields = [
-        checked(_RoomFields, row, path, f"room {k}") for k, row in enumerate(plan_fields.rooms, 1)
-    ]
+    fields = [checked(_RoomFields, row, path, f"room {k}") for k, row in enumerate(plan.rooms, 1)]
     _check_unit(path, fields)
     drawn = [
         room
@@ -126,11 +124,9 @@ def plan_of_value(
         if len(built.polygon) < 3 and left_out is None:
             raise BadInput(path, f"{room.place} ({room.name})", "has no floor beside its walls")
     rooms = tuple(room for room in rooms if len(room.polygon) >= 3)
-    builder = _Openings(path, walls, rooms, plan_fields.height, is_of_machine=left_out is not None)
-    openings = [(f"door {k}", row, OpeningKind.DOOR) for k, row in enumerate(plan_fields.doors, 1)]
-    openings += [
-        (f"window {k}", row, OpeningKind.WINDOW) for k, row in enumerate(plan_fields.windows, 1)
-    ]
+    builder = _Openings(path, walls, rooms, plan.height, is_of_machine=left_out is not None)
+    openings = [(f"door {k}", row, OpeningKind.DOOR) for k, row in enumerate(plan.doors, 1)]
+    openings += [(f"window {k}", row, OpeningKind.WINDOW) for k, row in enumerate(plan.windows, 1)]
     for place, row, kind in openings:
         try:
             builder.add(place, row, kind)
@@ -138,8 +134,8 @@ def plan_of_value(
             if left_out is None:
                 raise
             left_out.add(f"an opening {error.text}", place)
-    more = [_wall_of_row(path, k, row) for k, row in enumerate(plan_fields.walls, 1)]
-    return Plan(rooms, (*walls, *more), tuple(builder.found), plan_fields.height)
+    more = [_wall_of_row(path, k, row) for k, row in enumerate(plan.walls, 1)]
+    return Plan(rooms, (*walls, *more), tuple(builder.found), plan.height)
 
 
 def _wall_of_row(path: Path, number: int, row: object) -> PlanWall:
@@ -213,7 +209,7 @@ def _check_apart(path: Path, drawn: list[DrawnRoom]) -> None:
 def _apart(drawn: list[DrawnRoom], left_out: LeftOut) -> list[DrawnRoom]:
     """The rooms without what they share: the smaller one of two keeps it."""
     order = sorted(range(len(drawn)), key=lambda k: (drawn[k].shape.area, k))
-    remaining: dict[int, DrawnRoom] = {}
+    rest: dict[int, DrawnRoom] = {}
     taken: BaseGeometry = Polygon()
     for k in order:
         room = drawn[k]
@@ -227,17 +223,15 @@ def _apart(drawn: list[DrawnRoom], left_out: LeftOut) -> list[DrawnRoom]:
             if shape.interiors:
                 # A room inside a room: the outer one keeps its outline, and the inner one goes.
                 inner = [
-                    j
-                    for j, r in remaining.items()
-                    if Polygon(shape.exterior).contains(r.shape.centroid)
+                    j for j, r in rest.items() if Polygon(shape.exterior).contains(r.shape.centroid)
                 ]
                 for j in inner:
-                    del remaining[j]
+                    del rest[j]
                     left_out.add("a room lies inside another", drawn[j].place)
             room = room._replace(shape=Polygon(corners(Polygon(shape.exterior).simplify(1e-3))))
-        remaining[k] = room
+        rest[k] = room
         taken = unary_union([taken, room.shape])
-    return [remaining[k] for k in sorted(remaining)]
+    return [rest[k] for k in sorted(rest)]
 
 
 @dataclass

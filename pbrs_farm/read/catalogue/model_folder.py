@@ -229,17 +229,15 @@ def _bounds_of_glb(path: Path) -> Any:
     for _ in range(_MOST_NODES):
         if not waiting:
             break
-        k, offset, scale = waiting.pop()
+        k, move, scale = waiting.pop()
         node = nodes[k]
-        offset = offset + scale * np.array(node.get("translation", (0, 0, 0)), float)
+        move = move + scale * np.array(node.get("translation", (0, 0, 0)), float)
         scale = scale * np.array(node.get("scale", (1, 1, 1)), float)
-        waiting += [(child, offset, scale) for child in node.get("children", ())]
+        waiting += [(child, move, scale) for child in node.get("children", ())]
         if "mesh" in node:
             for primitive in scene["meshes"][node["mesh"]]["primitives"]:
                 accessor = scene["accessors"][primitive["attributes"]["POSITION"]]
-                corners += [
-                    offset + scale * np.array(accessor[end], float) for end in ("min", "max")
-                ]
+                corners += [move + scale * np.array(accessor[end], float) for end in ("min", "max")]
     is_whole = corners and not waiting
     return np.array([np.min(corners, 0), np.max(corners, 0)]) if is_whole else None
 
@@ -275,9 +273,7 @@ def _read_index(file: Path) -> tuple[str, tuple[_Indexed, ...], tuple[Note, ...]
     """Read the file of _write_index; None if it is missing or damaged."""
     try:
         row = json.loads(file.read_bytes())
-        pieces = tuple(
-            _Indexed(**{**fields, "size": tuple(fields["size"])}) for fields in row["pieces"]
-        )
+        pieces = tuple(_Indexed(**{**p, "size": tuple(p["size"])}) for p in row["pieces"])
         return str(row["digest"]), pieces, tuple(Note(*note) for note in row["notes"])
     except (OSError, ValueError, KeyError, TypeError):
         return None

@@ -217,17 +217,15 @@ def _objathor(path: Path, name: str, notes: LibraryNotes) -> ModelTable:
     if not isinstance(rows, dict):
         raise ValueError("holds no annotations by id")
     models, pickles = {}, 0
-    for model_id, row in rows.items():
-        if not (_is_plain(model_id) and isinstance(row, dict)):
+    for uid, row in rows.items():
+        if not (_is_plain(uid) and isinstance(row, dict)):
             continue
         ways = [
-            f"{folder}{model_id}{end}"
-            for folder in ("", "assets/")
-            for end in (".glb", f"/{model_id}.glb")
+            f"{folder}{uid}{end}" for folder in ("", "assets/") for end in (".glb", f"/{uid}.glb")
         ]
         file = next((w for w in ways if (path / w).is_file()), "")
         if not file:
-            packed = [f"{folder}{model_id}/{model_id}.pkl.gz" for folder in ("", "assets/")]
+            packed = [f"{folder}{uid}/{uid}.pkl.gz" for folder in ("", "assets/")]
             pickles += any((path / w).is_file() for w in packed)
         words = str(row.get("category") or row.get("ref_category") or "").replace("_", " ")
         label_class = given_class("ai2thor", words)

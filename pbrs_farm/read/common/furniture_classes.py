@@ -336,25 +336,25 @@ def class_of_piece(
     A bare box, cylinder or triangle is classified by name, else by group: people build furniture from
     them. The class must fit the place, if given; a table 5 cm high is rejected.
     """
-    by_cat = _classes_of_catalogue_ids().get(catalogue_id)
+    listed = _classes_of_catalogue_ids().get(catalogue_id)
     inner = catalogue_id.partition("#")[2]
     if catalogue_id in _PRIMITIVES:
         is_named = name.lower() not in _PRIMITIVE_NAMES
         name_class = _by_words(name, place, "name") if is_named else PieceClass(None, "none")
         if name_class.nyu40 is None and name_class.rule == "none":
             name_class = _by_words(group, place, "group")
-        return name_class if name_class.nyu40 is not None else PieceClass(by_cat, "catalogue")
+        return name_class if name_class.nyu40 is not None else PieceClass(listed, "catalogue")
     # The catalogue is the surest, as long as the size agrees.
-    is_fit = by_cat is not None and _fits_its_size(NYU40_NAMES[by_cat], place)
-    if by_cat is not None and is_fit and not _is_a_bench_alone(NYU40_NAMES[by_cat], place):
+    is_fit = listed is not None and _fits_its_size(NYU40_NAMES[listed], place)
+    if listed is not None and is_fit and not _is_a_bench_alone(NYU40_NAMES[listed], place):
         word = next((c.label for c in (*_candidates(inner), *_candidates(name))), "")
-        return PieceClass(by_cat, "catalogue", word)
+        return PieceClass(listed, "catalogue", word)
     name_class = _by_words(name, place, "name")
     if name_class.nyu40 is not None:
         return name_class
     by_id = _by_words(inner, place, "id")
     # Say "size" where a class was found and refused, "none" where there was none.
-    misfit = by_cat is not None or "size" in (name_class.rule, by_id.rule)
+    misfit = listed is not None or "size" in (name_class.rule, by_id.rule)
     return by_id if by_id.nyu40 is not None else PieceClass(None, "size" if misfit else "none")
 
 

@@ -191,16 +191,16 @@ def _frames(item: Item) -> list[_WallFrame]:
     degree = np.rint(np.degrees(np.arctan2(n[:, 2], n[:, 0]))).astype(int) % 180
     wall_frames = []
     for d in np.unique(degree):
-        is_facing = degree == d
-        if area[is_facing].sum() < _LEAST_SHARE * area.sum():
+        mine = degree == d
+        if area[mine].sum() < _LEAST_SHARE * area.sum():
             continue
         # Take the direction of the largest face of the group.
-        best = n[is_facing][area[is_facing].argmax()] * [1, 0, 1]
-        points = np.unique(corners[is_facing].reshape(-1, 3), axis=0)
+        best = n[mine][area[mine].argmax()] * [1, 0, 1]
+        points = np.unique(corners[mine].reshape(-1, 3), axis=0)
         normal = best / np.linalg.norm(best)
-        area_m2 = float(area[is_facing].sum())
+        area_m2 = float(area[mine].sum())
         wall_frames.append(
-            _WallFrame(item.id, item.level_id, normal, points, corners[is_facing], area_m2)
+            _WallFrame(item.id, item.level_id, normal, points, corners[mine], area_m2)
         )
     return wall_frames
 

@@ -66,11 +66,10 @@ def covered_share(surface: Surface, polygon: F64) -> float:
     In [0, 1], 0 for a polygon without area. Overlapping faces count once.
     """
     # A planar ceiling may look either way.
-    level_faces = np.concatenate([_faces_looking([surface], 1), _faces_looking([surface], -1)])
+    flat = np.concatenate([_faces_looking([surface], 1), _faces_looking([surface], -1)])
     area: Any = shapely.Polygon(polygon)
     return float(
-        shapely.area(shapely.intersection(_outline_from_above(level_faces), area))
-        / max(area.area, 1e-9)
+        shapely.area(shapely.intersection(_outline_from_above(flat), area)) / max(area.area, 1e-9)
     )
 
 

@@ -435,12 +435,10 @@ def note_unread(gltf: Gltf, notes: Notes) -> None:
     primitives = [
         _object_rows(mesh.get("primitives")) for mesh in _object_rows(gltf.document.get("meshes"))
     ]
-    for feature, has in _PRIMITIVES.items():
+    for part, has in _PRIMITIVES.items():
         n = sum(any(map(has, rows)) for rows in primitives)
         if n:
-            notes.add(
-                UNREAD, "meshes", f"{n} of {len(primitives)} have {feature}, which are not read"
-            )
+            notes.add(UNREAD, "meshes", f"{n} of {len(primitives)} have {part}, which are not read")
     n = sum("skin" in node for node in _object_rows(gltf.document.get("nodes")))
     if n:
         notes.add(UNREAD, "nodes", f"{n} have a skin, which is not read: they stand as modelled")

@@ -190,10 +190,8 @@ class SceneMaterials:
         return texture_layout(self._gltf, first) == texture_layout(self._gltf, other)
 
     def _specular_factor(self, glossy: dict[str, Any], place: str) -> F64:
-        factors = numbers(
-            self._gltf, glossy.get("specularFactor", [1] * 3), 3, f"{place}: specular"
-        )
-        return np.clip(factors, 0, 1)
+        rgb = numbers(self._gltf, glossy.get("specularFactor", [1] * 3), 3, f"{place}: specular")
+        return np.clip(rgb, 0, 1)
 
     def _metal(self, fields_json: dict[str, Any], place: str) -> tuple[float, float]:
         """(metallic, roughness) by the factors; what says nothing of its surface is no metal."""
@@ -216,13 +214,11 @@ class SceneMaterials:
         if glossy := specular_glossiness(fields_json):
             return self._specular_factor(glossy, place)
         extensions = object_at(fields_json, "extensions")
-        ior, specular = (
-            object_at(extensions, f"KHR_materials_{key}") for key in ("ior", "specular")
-        )
+        ior, spec = (object_at(extensions, f"KHR_materials_{key}") for key in ("ior", "specular"))
         (index,) = numbers(self._gltf, [ior.get("ior", 1.5)], 1, f"{place}: ior")
-        colour_factor = specular.get("specularColorFactor", [1] * 3)
+        colour_factor = spec.get("specularColorFactor", [1] * 3)
         tint = np.maximum(numbers(self._gltf, colour_factor, 3, f"{place}: specular colour"), 0)
-        strength = self._fraction(specular, "specularFactor", 1.0, place)
+        strength = self._fraction(spec, "specularFactor", 1.0, place)
         f0 = ((index - 1) / (index + 1)) ** 2 if "ior" in ior and index >= 0 else F0
         return np.asarray(np.minimum(f0 * tint, 1) * strength)
 

@@ -154,11 +154,11 @@ def _gather_things(gltf: Gltf, mapping: Mapping) -> list[_Thing]:
         extras = object_at(fields_json, "extras")
         above = owner.get(node.path[:-1])
         materials = material_names(gltf, fields_json)
-        own_class = class_of_node(name, extras, mapping, materials)
+        cls = class_of_node(name, extras, mapping, materials)
         inherited = members.get(node.path[:-1])
-        if own_class and inherited and not own_class.is_tagged and _is_shown(own_class, inherited):
-            own_class = None
-        effective = own_class or inherited
+        if cls and inherited and not cls.is_tagged and _is_shown(cls, inherited):
+            cls = None
+        effective = cls or inherited
         # A group named by a collective noun is not an item.
         if extras.get("group") is True:
             effective = None
@@ -173,9 +173,7 @@ def _gather_things(gltf: Gltf, mapping: Mapping) -> list[_Thing]:
         has_part = "mesh" in fields_json or has_light or extras.get("one") is True
         # Begin an item at the outermost node of a class, and at tagged ones below it.
         if (effective and (above is None or effective.is_tagged)) or (above is None and has_part):
-            is_by_name = own_class is not None and (
-                not own_class.is_tagged or extras.get("by_name") is True
-            )
+            is_by_name = cls is not None and (not cls.is_tagged or extras.get("by_name") is True)
             above = _Thing(node, name, effective or _UNMAPPED, extras, materials, is_by_name)
             things.append(above)
         if above is not None:

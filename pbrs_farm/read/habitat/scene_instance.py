@@ -265,14 +265,12 @@ class _Built:
         return self.assets[name]
 
     def _added(self, gltf: Gltf, dataset: _Dataset, at: str) -> list[int]:
-        document = gltf.document
+        doc = gltf.document
         start = {key: len(self.document.setdefault(key, [])) for key in _ARRAYS}
-        document = {k: document.get(k, []) for k in _ARRAYS} | {
-            "scenes": document.get("scenes", [])
-        }
-        if not all(isinstance(document[k], list) for k in document):
+        doc = {k: doc.get(k, []) for k in _ARRAYS} | {"scenes": doc.get("scenes", [])}
+        if not all(isinstance(doc[k], list) for k in doc):
             raise BadHouse(gltf.file, "", "has lists that are none")
-        copy = json.loads(json.dumps(document))
+        copy = json.loads(json.dumps(doc))
         _shifted(copy, start)
         self._add_lights(gltf, copy["nodes"])
         for image in copy["images"]:

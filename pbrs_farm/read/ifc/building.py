@@ -150,24 +150,22 @@ class _Building:
         voids = list(
             voids_of_walls(self._model, self._meshes, self._world, by_id, builder.level_of)
         )
-        of_void = openings_of_voids(builder.items, voids)
+        cut = openings_of_voids(builder.items, voids)
         # Build doors and windows without a shape to the size of their hole.
         for void in voids:
-            if not void.undrawn or (opening := of_void.get(void.id)) is None:
+            if not void.undrawn or (opening := cut.get(void.id)) is None:
                 continue
             hole = hole_of_undrawn(opening, self._model.by_guid(void.undrawn))
             room_id = builder.room_at(hole.centre)
             item = fill_hole(hole, self._library, opening.level_id, room_id)
             if item is not None:
                 builder.items.append(item)
-                of_void[void.id] = replace(opening, item_id=item.id)
-        filled = {o.item_id for o in of_void.values()}
+                cut[void.id] = replace(opening, item_id=item.id)
+        filled = {o.item_id for o in cut.values()}
         rest = [i for i in builder.items if i.id not in filled]
-        of_item = {
-            o.item_id: o for o in (*of_void.values(), *openings(rest)) if o.item_id is not None
-        }
+        of_item = {o.item_id: o for o in (*cut.values(), *openings(rest)) if o.item_id is not None}
         own_openings = [of_item[i.id] for i in builder.items if i.id in of_item]
-        return own_openings + [o for o in of_void.values() if o.item_id is None]
+        return own_openings + [o for o in cut.values() if o.item_id is None]
 
     def _note_failed(self, products: Sequence[Any]) -> None:
         for product in products:

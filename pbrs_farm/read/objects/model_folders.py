@@ -67,13 +67,11 @@ def pick_models(
     no model has it. The choice depends on seed and ids alone: more models do not reorder the others.
     """
     # Refuse a category that no model has: a slip would give nothing, silently.
-    chosen_categories = [c.strip().lower() for c in categories if c.strip()]
-    for category in chosen_categories:
+    names = [c.strip().lower() for c in categories if c.strip()]
+    for category in names:
         if not any(_is_of(model, category) for model in models):
             raise BadInput("models", category, "no model of this category")
-    chosen = [
-        m for m in models if not chosen_categories or any(_is_of(m, c) for c in chosen_categories)
-    ]
+    chosen = [m for m in models if not names or any(_is_of(m, c) for c in names)]
     # Sort by a hash of seed and id: a random order, independent of the other models.
     chosen.sort(key=lambda m: hashlib.sha256(f"{seed}/{m.id}".encode()).digest())
     return chosen[:count]

@@ -70,14 +70,12 @@ def _stand_wall(element: SceneElement, tree: Any, names: list[str]) -> StandingW
     along /= length
     leftward = np.array([along[2], 0.0, -along[0]])
     sides = [_rooms_beside(start, end, sign * leftward, tree, names) for sign in (1, -1)]
-    is_own_side = [bool(set(side) & set(element.rooms)) for side in sides]
+    is_own = [bool(set(side) & set(element.rooms)) for side in sides]
     is_between = len(element.rooms) > 1 or all(sides)
     # Outward from the first room that lists it, else from the adjacent floor.
-    is_left_in = (
-        is_own_side[0] if is_own_side[0] != is_own_side[1] else bool(sides[0]) and not sides[1]
-    )
+    is_left_in = is_own[0] if is_own[0] != is_own[1] else bool(sides[0]) and not sides[1]
     first = element.rooms[:1]
-    if is_between and first and is_own_side == [True, True]:
+    if is_between and first and is_own == [True, True]:
         is_left_in = first[0] in sides[0]
     outward = -leftward if is_left_in else leftward
     if is_between:
@@ -132,15 +130,13 @@ def _united(
             runs[-1] = (runs[-1][0], high, on_span)
         else:
             runs.append((low, high, on_span))
-    pieces_of_wall = []
+    parts = []
     for k in on_line:
         runs = pieces[k]
         # A wall listed by one room only keeps its id and its ends.
         whole = len(runs) == 1 and runs[0][2] == (k,)
-        pieces_of_wall.append(
-            (k, [drawn[k]] if whole else _cut_at_crossings(drawn, k, runs, origin, axis))
-        )
-    return pieces_of_wall
+        parts.append((k, [drawn[k]] if whole else _cut_at_crossings(drawn, k, runs, origin, axis)))
+    return parts
 
 
 def _span(wall: StandingWall, origin: F64, axis: F64) -> tuple[float, float]:

@@ -55,24 +55,21 @@ def piece_item(
     points = [m.positions @ matrix[:3, :3].T + matrix[:3, 3] for m in model.meshes]
     frame = frame_of(piece, level, np.concatenate(points) if points else None)
     # Keep the meshes that the home shows, with their materials.
-    materials_of_mesh = [piece_material(piece, mesh, model, materials) for mesh in model.meshes]
+    paint = [piece_material(piece, mesh, model, materials) for mesh in model.meshes]
     joints = piece_joints(piece, models.meshes(piece.model), matrix, frame)
     shown = [
-        (m, p, positions, joints[on].part if on in joints else "")
-        for m, p, positions, on in zip(
-            model.meshes, materials_of_mesh, points, model.hangers, strict=True
-        )
+        (m, p, xyz, joints[on].part if on in joints else "")
+        for m, p, xyz, on in zip(model.meshes, paint, points, model.hangers, strict=True)
         if p
     ]
     surfaces = [
-        replace(placed_surface(m, p, frame, positions, matrix), part=part)
-        for m, p, positions, part in shown
+        replace(placed_surface(m, p, frame, xyz, matrix), part=part) for m, p, xyz, part in shown
     ]
     emitting = [k for k, (_, p, _, _) in enumerate(shown) if p.emits]
     # Where the home hides a part, as the television of its bench, the rest is judged.
     height = piece.size[2]
-    if shown and len(shown) < len(materials_of_mesh):
-        height = float(np.ptp(np.concatenate([positions[:, 1] for _, _, positions, _ in shown])))
+    if shown and len(shown) < len(paint):
+        height = float(np.ptp(np.concatenate([xyz[:, 1] for _, _, xyz, _ in shown])))
     by_rule = _piece_class(piece, height)
     nyu40, tags = _label_of_piece(piece, by_rule, model, materials)
     lights = light_parts(piece, frame, tuple(emitting))

@@ -412,10 +412,8 @@ def _holders(stage: Any) -> set[str]:
         parent = prim.GetParent()
         if not parent or str(parent.GetPath()) in holders or _is_no_place(prim):
             continue
-        name_class = class_of_node_name(prim.GetName()) if prim.IsA(UsdGeom.Gprim) else None
-        is_building = name_class is not None and (
-            name_class.kind in _STRUCTURE or name_class.kind is ItemKind.GROUND
-        )
+        cls = class_of_node_name(prim.GetName()) if prim.IsA(UsdGeom.Gprim) else None
+        is_building = cls is not None and (cls.kind in _STRUCTURE or cls.kind is ItemKind.GROUND)
         is_light = prim.IsA(UsdLux.BoundableLightBase)
         if is_building or is_light or _is_component(prim) or _own_label(prim):
             while parent and str(parent.GetPath()) not in holders:

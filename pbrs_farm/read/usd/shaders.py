@@ -463,16 +463,14 @@ class Shaders:
     def _mdl_opacity(self, shader: Any, colour: _Row | None) -> tuple[_Row | None, bool]:
         """(the picture of the colour with opacity as its alpha, whether a picture says it)."""
         is_on = self._input(shader, "enable_opacity_texture", False)[0]
-        opacity_picture = self._mdl_picture(shader, "opacity_texture") if is_on else None
-        if opacity_picture is None:
+        alpha = self._mdl_picture(shader, "opacity_texture") if is_on else None
+        if alpha is None:
             return colour, False
         mode = self._input(shader, "opacity_mode", 1)[0]
         colour_asset = self._asset(colour) if colour else None
         # Mode 0 is the alpha; the others are means and the like of the colours.
-        mask = _Masked(
-            colour_asset, self._asset(opacity_picture), "a" if mode == 0 else "l", 1.0, 0.0
-        )
-        return self._with_image(colour or opacity_picture, self._masked_image(mask)), True
+        mask = _Masked(colour_asset, self._asset(alpha), "a" if mode == 0 else "l", 1.0, 0.0)
+        return self._with_image(colour or alpha, self._masked_image(mask)), True
 
     def _mdl_picture(self, shader: Any, name: str) -> _Row | None:
         asset = self._input(shader, name, None)[0]

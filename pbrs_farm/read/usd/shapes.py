@@ -98,16 +98,14 @@ def _ints(value: Any) -> I64:
 
 def _texture_coordinates(prim: Any, time: Any, uv_name: str) -> tuple[F64 | None, str]:
     """(values, interpolation) of the texture coordinates of that name, else those called st before others."""
-    primvars = [p for p in UsdGeom.PrimvarsAPI(prim).GetPrimvarsWithValues() if _is_pair(p)]
+    pairs = [p for p in UsdGeom.PrimvarsAPI(prim).GetPrimvarsWithValues() if _is_pair(p)]
     names = (uv_name, "st", "UVMap", "st0", "st_0", "uv", "map1", "Texture_uv")
     order = {name: k for k, name in reversed(list(enumerate(names)))}
-    primvars.sort(key=lambda p: order.get(p.GetPrimvarName(), len(names)))
-    if not primvars:
+    pairs.sort(key=lambda p: order.get(p.GetPrimvarName(), len(names)))
+    if not pairs:
         return None, ""
-    values = primvars[0].ComputeFlattened(time)
-    return (
-        (None, "") if values is None else (_float_rows(values, 2), primvars[0].GetInterpolation())
-    )
+    values = pairs[0].ComputeFlattened(time)
+    return (None, "") if values is None else (_float_rows(values, 2), pairs[0].GetInterpolation())
 
 
 def _is_pair(primvar: Any) -> bool:

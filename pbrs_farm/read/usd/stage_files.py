@@ -264,16 +264,14 @@ def _check_size(folder: StageFolder, names: list[str]) -> int:
         for key in ("referenceList", "payloadList"):
             arcs = getattr(spec, key)
             for arc in (*arcs.explicitItems, *arcs.prependedItems, *arcs.appendedItems):
-                other_layer = layer
+                owner = layer
                 if arc.assetPath:
                     where = layer.ComputeAbsolutePath(arc.assetPath)
-                    other_layer = by_path.get(where) or by_path.get(str(real_path(Path(where))))
+                    owner = by_path.get(where) or by_path.get(str(real_path(Path(where))))
                 target = (
-                    str(arc.primPath)
-                    if arc.primPath
-                    else f"/{getattr(other_layer, 'defaultPrim', '')}"
+                    str(arc.primPath) if arc.primPath else f"/{getattr(owner, 'defaultPrim', '')}"
                 )
-                targets.append((other_layer, target))
+                targets.append((owner, target))
         return targets
 
     def below(spec: Any) -> Iterator[Any]:
@@ -286,22 +284,20 @@ def _check_size(folder: StageFolder, names: list[str]) -> int:
     for layer in by_path.values():
         stack = [(layer, spec, False) for spec in layer.rootPrims]
         while stack:
-            visited_layer, spec, is_done = stack.pop()
-            key = (visited_layer.identifier, str(spec.path))
+            node, spec, is_done = stack.pop()
+            key = (node.identifier, str(spec.path))
             if key in counted and not is_done:
                 continue
-            arcs = references(visited_layer, spec) if spec.hasReferences or spec.hasPayloads else []
+            arcs = references(node, spec) if spec.hasReferences or spec.hasPayloads else []
             targets = [(o, s) for o, t in arcs if o is not None and (s := o.GetPrimAtPath(t))]
             if not is_done:
                 n_references += len(arcs)
                 counted[key] = 1  # also what a cycle sees
-                stack.append((visited_layer, spec, True))
+                stack.append((node, spec, True))
                 stack += [(o, s, False) for o, s in targets]
-                stack += [(visited_layer, child, False) for child in below(spec)]
+                stack += [(node, child, False) for child in below(spec)]
                 continue
-            n = 1 + sum(
-                counted.get((visited_layer.identifier, str(c.path)), 1) for c in below(spec)
-            )
+            n = 1 + sum(counted.get((node.identifier, str(c.path)), 1) for c in below(spec))
             n += sum(counted.get((o.identifier, str(s.path)), 1) for o, s in targets)
             counted[key] = n
             if n > MOST_PRIMS:

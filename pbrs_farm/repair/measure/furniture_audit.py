@@ -52,10 +52,8 @@ def _is_furniture(item: Item) -> bool:
 def _pairs_of_boxes(boxes: F64, by_m: float) -> Iterator[tuple[int, int]]:
     """Indices i < j of boxes (N, 2, 3) that meet when grown by by_m together."""
     for i in range(len(boxes)):
-        is_apart = (boxes[i + 1 :, 0] > boxes[i, 1] + by_m) | (
-            boxes[i + 1 :, 1] < boxes[i, 0] - by_m
-        )
-        for j in np.flatnonzero(~is_apart.any(1)):
+        clear = (boxes[i + 1 :, 0] > boxes[i, 1] + by_m) | (boxes[i + 1 :, 1] < boxes[i, 0] - by_m)
+        for j in np.flatnonzero(~clear.any(1)):
             yield i, i + 1 + int(j)
 
 

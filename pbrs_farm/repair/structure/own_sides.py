@@ -60,10 +60,10 @@ def with_own_sides_visible(
 
 def _volume_in_plan(room_id: str, owner_id: str, areas: dict[str, plan.Shape]) -> plan.Shape:
     # Give what two outlines share to the smaller room: a bathroom drawn inside a living room.
-    area, base = areas[room_id], areas.get(owner_id)
-    if base is None or base.area >= area.area or plan.common(area, base).area < _OVERLAP_M2:
+    area, owner = areas[room_id], areas.get(owner_id)
+    if owner is None or owner.area >= area.area or plan.common(area, owner).area < _OVERLAP_M2:
         return area
-    return plan.without(area, base)
+    return plan.without(area, owner)
 
 
 def _rim(footprint: plan.Shape, reach: plan.Shape) -> plan.Shape:

@@ -44,7 +44,7 @@ def volumes_of_rooms(rooms: Sequence[Room], surfaces: Sequence[PlanarSurface]) -
     volumes = []
     for room in rooms:
         area = plan.polygon_of_room(room.polygon)
-        bounding = frozenset(s.item for s in _bounding(room, surfaces, spans))
+        items = frozenset(s.item for s in _bounding(room, surfaces, spans))
         # Stand a part below each plane of the ceiling, one below the nominal height elsewhere.
         ceilings = [s for s in surfaces if s.is_ceiling and s.room_id == room.id]
         floor = level_plane(room.floor_y - margin)
@@ -53,9 +53,7 @@ def volumes_of_rooms(rooms: Sequence[Room], surfaces: Sequence[PlanarSurface]) -
         parts.append((bare, level_plane(room.ceiling_y + margin)))
         for shape, high in parts:
             wide = plan.grown(shape, margin)
-            volumes += [
-                _volume(p, floor, high, bounding) for p in polygons_of(wide, min_area_m2=1e-3)
-            ]
+            volumes += [_volume(p, floor, high, items) for p in polygons_of(wide, min_area_m2=1e-3)]
     return volumes
 
 

@@ -149,9 +149,8 @@ class ChainRun:
         """These sets of prefixes, traced unless the last launch had them all."""
         prefixes = self._prefixes
         if prefixes is None or sets.start < prefixes.sets.start or sets.stop > prefixes.sets.stop:
-            self._prefixes = prefixes = (
-                None  # a set of a large picture is a gigabyte: never keep both
-            )
+            # A set of a large picture is a gigabyte: never keep both.
+            self._prefixes = prefixes = None
             prefixes = trace_prefixes(self._context, self._n_pixels, sets, self._seed)
         self._prefixes = prefixes
         return prefixes

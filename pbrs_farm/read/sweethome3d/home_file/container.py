@@ -70,10 +70,8 @@ def _parse_xml(xml: bytes, file: str, entry: str) -> Element:
     try:
         root: Element = fromstring(xml, forbid_dtd=False, forbid_entities=True)
     except DefusedXmlException as error:
-        error_name = type(error).__name__
-        raise BadHouse(
-            file, entry, f"XML with entity definitions is refused ({error_name})"
-        ) from None
+        kind = type(error).__name__
+        raise BadHouse(file, entry, f"XML with entity definitions is refused ({kind})") from None
     except ParseError as error:
         raise BadHouse(file, entry, f"XML is not well-formed: {error}", hint=RESAVE) from None
     except (ValueError, LookupError, RecursionError):
