@@ -10,7 +10,6 @@ import importlib
 import pkgutil
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any, Literal
 
 Subject = Literal["root", "files", "house", "camera", "view", "views"]
@@ -41,8 +40,10 @@ def checks(of: Subject) -> tuple[Check, ...]:
 
 def all_checks() -> tuple[Check, ...]:
     """Every entry of the table, cheap ones first."""
-    folder = str(Path(__file__).parent)
-    names = sorted(m.name for m in pkgutil.iter_modules([folder]) if m.name.endswith("_checks"))
+    package = importlib.import_module(__package__)
+    names = sorted(
+        m.name for m in pkgutil.iter_modules(package.__path__) if m.name.endswith("_checks")
+    )
     return _entries(tuple(names))
 
 

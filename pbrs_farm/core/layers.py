@@ -5,15 +5,15 @@ Effect: reads layers.csv. The table of docs/formats/layers.md is printed from it
 
 from __future__ import annotations
 
+import csv
 import sys
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final, Literal, TypeAlias
+from typing import Any, Final, Literal, TypeAlias
 
 from pbrs_farm.core.errors import MachineFailed
 from pbrs_farm.core.plugins import plugins
-from pbrs_farm.core.record import Several, read_csv
 
 # How pages and films draw a layer. "picture": unchanged. "classes": NYU40's colours. "ids": a
 # colour per id. "mask": light on dark. "depth": a ramp of depth in mm, "depth_m" in metres,
@@ -59,7 +59,7 @@ class Layer:
     # Its pixels show the albedo, which the recipe's materials hold to a limit.
     shows_albedo: bool = False
     # Layers that are written with it, and without which it is useless.
-    beside: Several[str] = ()
+    beside: tuple[str, ...] = ()
 
     @property
     def is_label(self) -> bool:
@@ -135,7 +135,27 @@ def optional_layer(
     )
 
 
-OWN_LAYERS: Final = read_csv(Path(__file__).with_name("layers.csv"), Layer)
+def _layer_of_row(row: dict[str, str]) -> Layer:
+    # An empty cell takes the field's default.
+    values: dict[str, Any] = {name: cell for name, cell in row.items() if cell}
+    values.update(
+        (name, values[name] == "true") for name in ("optional", "shows_albedo") if name in values
+    )
+    if "version" in values:
+        values["version"] = int(values["version"])
+    if "beside" in values:
+        values["beside"] = tuple(values["beside"].split("|"))
+    return Layer(**values)
+
+
+def _read_layers() -> tuple[Layer, ...]:
+    # Without core/record.py, which needs pydantic: packed shards are read where numpy alone is installed.
+    lines = Path(__file__).with_name("layers.csv").read_text("utf-8").splitlines()
+    rows = csv.DictReader(line for line in lines if not line.startswith("#"))
+    return tuple(_layer_of_row(row) for row in rows)
+
+
+OWN_LAYERS: Final = _read_layers()
 """The layers of the package; optional ones are written when --layers names them."""
 
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import pytest
+from pydantic import TypeAdapter
 
 from pbrs_farm.core import layers
-from pbrs_farm.core.layers import LAYER, layers_in_digest
+from pbrs_farm.core.layers import LAYER, OWN_LAYERS, Layer, layers_in_digest
 from tests.scene.homes import SMALL
 
 REPO = Path(__file__).parents[2]
@@ -62,6 +63,12 @@ def test_a_file_is_all_that_a_new_layer_takes(tmp_path: Path) -> None:
     assert "degrees from level" in said("-m", "pbrs_farm.cli", "layers")
     assert "slope.png (1): hash, size and type alone" in said("-m", "pbrs_farm.cli", "verify", "o")
     assert said("-c", SHOW).split() == ["Slope", "244"]
+
+
+def test_each_cell_of_the_table_is_a_value_of_its_field():
+    # layers.py reads the table without pydantic, so a wrong word in a cell would pass unnoticed.
+    rows = [TypeAdapter(Layer).validate_python(asdict(layer)) for layer in OWN_LAYERS]
+    assert rows == list(OWN_LAYERS)
 
 
 def test_a_digest_knows_the_version_of_a_layer_and_the_limit_of_its_albedo(

@@ -35,9 +35,9 @@ def test_the_pilot_of_very_many_emitters_is_smaller(n_emitters: int) -> None:
     assert width * 3 == height * 4
 
 
-@pytest.mark.parametrize(("bright", "pays"), [("outdoor", False), ("indoor", True)])
+@pytest.mark.parametrize(("bright", "is_guided"), [("outdoor", False), ("indoor", True)])
 def test_a_firefly_that_guided_rays_lack_chooses_them_unless_it_is_daylight(
-    bright: str, pays: bool
+    bright: str, is_guided: bool
 ) -> None:
     from pbrs_farm.transport.path_tracer import SampleSums
     from pbrs_farm.transport.pilot import pays
@@ -57,4 +57,4 @@ def test_a_firefly_that_guided_rays_lack_chooses_them_unless_it_is_daylight(
         )
 
     assert not chosen("")
-    assert chosen(bright) is pays
+    assert chosen(bright) is is_guided
