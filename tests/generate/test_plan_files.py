@@ -229,6 +229,32 @@ def test_a_traced_home_has_its_openings_by_their_outlines_and_its_scale_is_an_ar
         assert (hole.along, hole.width, hole.sill) == pytest.approx(sizes, abs=1e-3)
 
 
+@pytest.mark.parametrize("unit_m", [1.0, 0.01])
+def test_outlines_of_areas_in_another_unit_than_the_vertices_are_as_large_as_the_lines(
+    tmp_path: Path, unit_m: float
+) -> None:
+    path = write_react_planner(tmp_path)
+    drawn = plan_from_file(path).plan
+    value = traced(json.loads(path.read_text()), 1.18)
+    for area in value["layers"]["layer-1"]["areas"].values():
+        (ring,) = area["coords"]
+        area["coords"] = [[[x / 118 / unit_m, y / 118 / unit_m] for x, y in ring]]
+    rooms = plan_from_file(_written(path, value)).plan.rooms
+    for room, other in zip(rooms, drawn.rooms, strict=True):
+        assert (room.type, room.name) == (other.type, other.name)
+        np.testing.assert_allclose(room.polygon, other.polygon, atol=1e-3)
+
+
+def test_areas_without_an_inside_leave_the_rooms_to_the_lines(tmp_path: Path) -> None:
+    path = write_react_planner(tmp_path)
+    value = json.loads(path.read_text())
+    for area in value["layers"]["layer-1"]["areas"].values():
+        area.pop("vertices")
+        area["coords"] = [[0, 0], [0, 0], [0, 0]]
+    plan = plan_from_file(_written(path, value)).plan
+    assert len(plan.rooms) == len(ROOMS)
+
+
 def test_a_hole_without_a_place_is_a_guess_and_a_note(tmp_path: Path) -> None:
     path = write_react_planner(tmp_path)
     value = json.loads(path.read_text())

@@ -31,6 +31,7 @@ from pbrs_farm.generate.plans.usual_sizes import usual_size
 
 _METRES: Final = {"mm": 0.001, "cm": 0.01, "m": 1.0, "in": 0.0254, "ft": 0.3048, "mi": 1609.344}
 _MOST: Final = 5_000
+_LEAST_M2: Final = 1.0  # of all areas together: smaller ones enclose no room
 
 
 class _Layer(BaseModel):
@@ -114,12 +115,13 @@ class _Drawing:
 
     def _areas(self, lines: dict[str, Line], left_out: LeftOut) -> list[DrawnArea]:
         areas = []
+        scale = self._scale_of_outlines()
         for key, row in self.layer.areas.items():
             names = row.get("vertices") if isinstance(row, dict) else None
             points = [self._vertex(n) for n in names] if isinstance(names, list) else []
             ring = [p for p in points if p is not None]
             if not points and isinstance(row, dict):
-                ring = self._ring(row.get("coords")) or self._ring(row.get("coordinates"))
+                ring = [(x * scale, z * scale) for x, z in self._outline(row)]
             if len(ring) < 3 or len(ring) < len(points):
                 left_out.add("an area names no three corners", f"{self.place}.areas.{key}"[:80])
                 continue
@@ -127,9 +129,29 @@ class _Drawing:
             areas.append(
                 DrawnArea(Polygon(ring), "", "" if name.lower().startswith("area") else name)
             )
-        if areas:
+        if sum(area.shape.area for area in areas) > _LEAST_M2:
             return areas
         return [DrawnArea(p, "") for p in closed_rings(self.path, list(lines.values()))]
+
+    def _outline(self, row: Any) -> list[tuple[float, float]]:
+        if not isinstance(row, dict):
+            return []
+        return self._ring(row.get("coords")) or self._ring(row.get("coordinates"))
+
+    def _scale_of_outlines(self) -> float:
+        """By what to multiply the outlines of areas, which some files give in metres.
+
+        Files of traced plans have the vertices in pixels and the areas' coords in metres. The unit is the one
+        in which the areas are as large as the lines: that of the vertices, metres, or the file's unit.
+        """
+        corners = [p for row in self.layer.areas.values() for p in self._outline(row)]
+        vertices = [p for name in self.layer.vertices if (p := self._vertex(name)) is not None]
+        if min(_extent(corners), _extent(vertices)) <= 0:
+            return 1.0
+        drawn = self.metres * self.scale
+        scales = (1.0, 1 / drawn, self.metres / drawn)
+        ratio = _extent(vertices) / _extent(corners)
+        return min(scales, key=lambda scale: abs(math.log(scale / ratio)))
 
     def _line(self, key: str, row: Any) -> Line | None:
         if not isinstance(row, dict):
@@ -254,6 +276,12 @@ class _Drawing:
             max(self._length(row, "height", size[1]), 0.05),
             math.radians(float(turn)) if _is_number(turn) else 0.0,
         )
+
+
+def _extent(points: list[tuple[float, float]]) -> float:
+    """The longer side of the points' box; 0 without points."""
+    axes = list(zip(*points, strict=True))
+    return max((max(axis) - min(axis) for axis in axes), default=0.0)
 
 
 def _is_number(value: object) -> TypeGuard[int | float]:
