@@ -44,7 +44,7 @@ _STRUCTURE: Final = ("wall", "floor", "ceiling", "door", "window", "otherstructu
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """The exported layers, modes, size and classes. Raises BadInput for a name that is no layer or mode.
+    """The exported layers, modes, size and classes. Raises BadInput for an unknown layer or mode.
 
     layers: names of core/layers.py without the modes; None for all but radiance. modes: None for all.
     size: (width, height), None as rendered. classes: None for NYU40. options: those of the form, None

@@ -67,9 +67,10 @@ def _write_home(home: ExportedHome, folder: Path, form: HomeForm) -> None:
 
 
 def house_folders(folder: Path) -> list[Path]:
-    """Folders that hold house.glb and house.json: folder itself, or those below its houses.
+    """Folders with house.glb and house.json: folder itself, or the subfolders of its houses.
 
-    Sorted by name. BadInput if there are none; houses that lack one of the files are left out.
+    Sorted by name. Raises BadInput if there are no such folders; a house without one of the files is
+    left out.
     """
     below = folder / "houses"
     folders = sorted(below.iterdir()) if below.is_dir() else [folder]
@@ -81,9 +82,9 @@ def house_folders(folder: Path) -> list[Path]:
 
 
 def stored_house(folder: Path) -> House:
-    """The house of a folder's house.glb and house.json, which needs no recipe or manifest beside them.
+    """The house of a folder's house.glb and house.json; needs no recipe or manifest.
 
-    BadInput for files that are damaged, not regular, or larger than a scene may be.
+    Raises BadInput if a file is damaged, not regular, or larger than the limit for scenes.
     """
     try:
         data = {

@@ -105,8 +105,8 @@ def export_frames(
 ) -> Path:
     """Write frames to the new folder out in the form of that name, as `Views.export`; returns out.
 
-    Frames that are in no folder are saved into one first. Raises BadInput as `export`, and for
-    frames of shards.
+    Frames without a folder are saved into one first. Raises BadInput as `export`, and for frames of
+    shards.
     """
     choice = Choice(
         layers=None if layers is None else as_words(layers),
@@ -169,9 +169,9 @@ def _selected(folder: Path, run: str) -> set[tuple[str, str]]:
 
 
 def remarks_of(out: Path) -> list[str]:
-    """Remarks for the user of an export: comments of data.yaml, remarks, views that are left out.
+    """Remarks for the user of an export: comments of data.yaml, remarks, omitted views.
 
-    They are read from the files of the export, so an earlier one has them too.
+    They are read from the files of the export, so they are also available for an earlier export.
     """
     files = [out / "data.yaml", out / LEFT_OUT, *(out / split / LEFT_OUT for split in SPLITS)]
     lines = [

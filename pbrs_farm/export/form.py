@@ -69,9 +69,9 @@ class ViewForm:
     val and test. help: the files, in Markdown. options: a Record whose fields are options
     (`core/options.py`), None for a form without. The command line, `Views.export` and the tables of a
     set's file take them from there; write reads them as `choice.of(WordOptions)`. has_classes: True if
-    classes of the user's can replace NYU40's. finish: called once after all splits with the whole
-    folder, the names of the splits (() without) and the Choice. convention: None if the form has no
-    pixels, axes or depth of its own.
+    user-defined classes can replace NYU40's. finish: called once after all splits with the whole
+    folder, the names of the splits (() without) and the Choice. convention: None if the form defines no
+    pixels, axes or depth.
     """
 
     of: ClassVar[str] = "views"

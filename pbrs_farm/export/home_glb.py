@@ -36,7 +36,7 @@ def glb_of_pieces(
     """A GLB of some of the pieces with their materials alone.
 
     with_lamps: as KHR_lights_punctual, candela. in_place False: one piece in its own frame, without the
-    item's name, so that equal things have equal bytes.
+    item's name, so that equal items have equal bytes.
     """
     writer = GlbWriter()
     # Number the used materials and textures.

@@ -1,7 +1,7 @@
 """A home for the forms of homes: its items as pieces; no effects.
 
-Each piece has a frame, meshes, a class, collision parts, mass, lamps and a name that is valid in files;
-the home has the outlines of its walkable floor.
+Each piece has a frame, meshes, a class, collision parts, mass, lamps and a valid file name; the home has
+the outlines of its walkable floor.
 """
 
 from __future__ import annotations
@@ -182,7 +182,7 @@ class ExportedHome:
 
     @cached_property
     def navigable(self) -> dict[str, list[F64]]:
-        """Room id -> outlines (N, 2) in plan of the floor that is free for a disc of WALKER_M.
+        """Room id -> outlines (N, 2) in plan of the floor area free for a disc of WALKER_M.
 
         Metres, world x and z. Outer outlines only, without holes for a table in the middle of a room. A room
         without free floor has []. Obstacles are boxes of items, and doors do not join rooms.
@@ -199,8 +199,8 @@ class ExportedHome:
 def exported_home(house: House, options: Record | None = None) -> ExportedHome:
     """The home in the frames of its items, without the outdoors and removed items.
 
-    Each item becomes a piece: local meshes, a unique name that is valid in files, lamps in lumen, fixed or
-    loose. Collision parts, masses and the walkable floor are computed at first use.
+    Each item becomes a piece: local meshes, a unique valid file name, lamps in lumen, fixed or loose.
+    Collision parts, masses and the walkable floor are computed at first use.
     """
     numbered = [
         (number, item)
@@ -218,7 +218,7 @@ def exported_home(house: House, options: Record | None = None) -> ExportedHome:
 
 
 def _unique_names(items: Iterable[Item]) -> list[str]:
-    """A name for each item that is valid in all file systems and scene formats."""
+    """A name for each item, valid in all file systems and scene formats."""
     taken: set[str] = set()
     names = []
     for item in items:

@@ -13,9 +13,9 @@ from pbrs_farm.export.chosen_view import ChosenView
 def intrinsic_parts(view: ChosenView) -> tuple[F32, F32, F32] | None:
     """(albedo, shading, residual), (H, W, 3) float32 linear, none of them negative; None without the layers.
 
-    Of the light that the picture shows. Albedo x shading + residual is its radiance. Where albedo x
-    shading alone would be more (a coat that is seen at a slant, an edge within the pixel), shading is
-    less: Marigold's preparation of Hypersim refuses frames with a negative residual.
+    The decomposition of the picture's radiance: albedo x shading + residual. If albedo x shading alone
+    would exceed it (a coat at a slant, an edge within the pixel), shading is reduced: Marigold's
+    preparation of Hypersim refuses frames with a negative residual.
     """
     groups = GROUPS_OF_MODE[Mode(view.picture)] if view.picture else ()
     ending = "_outdoor" if groups == (Group.OUTDOOR,) else ""

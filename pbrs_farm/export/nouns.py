@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from pbrs_farm.export.chosen_view import ChosenView
 
-# Classes of NYU40 whose names are no countable nouns, and what of each is counted.
+# NYU40 classes with uncountable or plural names -> countable nouns.
 _COUNTED: Final = {
     "shelves": "set of shelves",
     "blinds": "blind",
@@ -19,14 +19,14 @@ _COUNTED: Final = {
     "night stand": "nightstand",
 }
 
-# Classes of no class in particular, and what is said where the thing's name says nothing.
+# Unspecific classes -> nouns for items whose name does not help.
 _VAGUE: Final = {
     "otherprop": "object",
     "otherfurniture": "piece of furniture",
     "otherstructure": "part of the building",
     "none": "",
 }
-# Classes that hold things which nobody calls so: a word of such a thing's own name -> what it is called.
+# Classes with members of other common names: class -> word in the item's name -> noun.
 _OWN_WORDS: Final = {
     "chair": {word: word for word in ("bench", "stool", "ottoman", "pouf")},
     "curtain": {"curtains": "set of curtains"},
@@ -43,10 +43,10 @@ _NUMBERS: Final = (
 
 
 def noun_of(view: ChosenView, row: dict[str, Any]) -> str:
-    """What a thing is called; "" for one without a class.
+    """Noun for an item; "" for an item without a class.
 
-    row is one of facts' instances. Where NYU40's class says little, as otherprop, the kind or the
-    thing's own short name is taken; a bench of the class chair is a bench.
+    row: an instance of the view's facts. Where NYU40's class is unspecific, as otherprop, the noun is the
+    item's kind or short name; a bench of the class chair is a bench.
     """
     if view.choice.classes is not None:
         return str(row["own_class_name"])
@@ -57,13 +57,13 @@ def noun_of(view: ChosenView, row: dict[str, Any]) -> str:
         return next(matches, _COUNTED.get(name, name))
     if row["kind"] in _NOUNS_OF_KINDS:
         return _NOUNS_OF_KINDS[row["kind"]]
-    # A thing of no class is what it is called, where that is one word or two.
+    # An item of an unspecific class is called by its name if that has one or two words.
     item_name = str(row["name"]).strip(" 0123456789")
     return item_name.lower() if _VAGUE[name] and _PLAIN_NAME.fullmatch(item_name) else _VAGUE[name]
 
 
 def is_plural(noun: str) -> bool:
-    """It names many already, as a thing of the name Plates does.
+    """True if the noun is already a plural, as an item's name may be.
 
     >>> [is_plural(noun) for noun in ("plates", "glass", "set of shelves")]
     [True, False, False]
@@ -73,7 +73,7 @@ def is_plural(noun: str) -> bool:
 
 
 def plural(noun: str) -> str:
-    """Many of a noun: "chairs", "boxes", "sets of shelves", "people".
+    """Plural of a noun: "chairs", "boxes", "sets of shelves", "people".
 
     English, for the nouns that captions use; only the last word before "of" changes.
     """

@@ -33,8 +33,8 @@ End: TypeAlias = tuple[int, str]  # of a pair: the piece's number and its part
 def passing_pairs(home: ExportedHome) -> tuple[tuple[End, End], ...]:
     """Pairs of bodies, one of them a part, that pass through each other; each pair once.
 
-    A part and its body always. A part and another part of its item, or a fixed body, if the part touches
-    it in its pose, or along its way as far as `geometry.opened.free_value` is free.
+    A part and its body are always a pair. A part is also paired with another part of its item, or a fixed
+    body, if it touches that in its pose or along its free way (`geometry.opened.free_value`).
     """
     scene = SceneTriangles(home.house.items)
     pairs: dict[tuple[End, End], None] = {}

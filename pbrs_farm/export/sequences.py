@@ -24,7 +24,7 @@ class SequenceFrame:
 
     @property
     def time_s(self) -> float | None:
-        """None of a view that is no frame."""
+        """None for a view outside a walk."""
         time = self.first.facts.get("time_s")
         return None if time is None else float(time)
 

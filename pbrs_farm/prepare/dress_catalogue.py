@@ -39,9 +39,9 @@ def fetch_packages(words: str) -> None:
 
 
 def catalogue_of_words(words: str) -> Catalogue:
-    """The catalogue of dress.catalogue: the packages', then the given paths, with ":" between.
+    """The catalogue for dress.catalogue: the packages, then the given paths, separated by ":".
 
-    A missing package is a note of the kind NO_FURNITURE. BadInput for a path that is no catalogue.
+    A missing package adds a note of the kind NO_FURNITURE. Raises BadInput if a path is not a catalogue.
     """
     paths = [word for word in words.split(":") if word]
     stamps = tuple((Path(word), _stamp(Path(word))) for word in paths if word != GENERATED)
@@ -53,7 +53,7 @@ def catalogue_of_words(words: str) -> Catalogue:
 def own_catalogue(paths: Sequence[Path]) -> Catalogue:
     """Index the user's libraries and folders alone, once; the result may hold nothing but notes.
 
-    Raises BadInput for a path that is no library.
+    Raises BadInput if a path is not a library.
     """
     from pbrs_farm.read.catalogue.read_catalogue import catalogue_from
 
@@ -118,7 +118,7 @@ def catalogue_of(fields: DressFields) -> Catalogue:
 def fetch_catalogue(fields: DressFields) -> None:
     """Download the missing packages of a recipe's catalogue.
 
-    Raises MachineFailed, with the command to type, if apt cannot provide them, and BadInput for a user's
-    path that is no library.
+    Raises MachineFailed, with the command to type, if apt cannot provide them, and BadInput if a user's
+    path is not a library.
     """
     fetch_packages(fields.catalogue)

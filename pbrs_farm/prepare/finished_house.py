@@ -58,7 +58,7 @@ def finished_house(
     """Read, furnish, dress, repair and edit the house of a source, as the recipe says.
 
     Equal arguments give equal bits. tell_share: called with the finished share of dressing and repair.
-    before_edits: cache for the house without its edits. Raises BadHouse for a file that is no house or
+    before_edits: cache for the house without its edits. Raises BadHouse if the file is not a house or
     has changed, BadInput, BadRecipe, MachineFailed.
 
         >>> house, report, dressing = finished_house(resolve("builtin"), Recipe())

@@ -1,9 +1,9 @@
-"""Furnish the empty rooms of a home that was read, as made homes are; no effects but the catalogue's.
+"""Furnish the empty rooms of an imported home like those of generated homes. Effects: reads the catalogue.
 
 A room is empty if furniture covers less than 3 % of its floor, and sparse below 20 %: for `sparse`, such
 a room keeps its furniture and gets the rest of its brief. Its use follows from its name and its furniture;
-a room without a telling name gets the use that the home lacks. A garage, and a dark room of unknown use,
-remains as it is, with a note.
+if its name says nothing, the room gets the use that the home lacks. A garage, and a dark room of unknown
+use, remains unchanged, with a note.
 """
 
 from __future__ import annotations

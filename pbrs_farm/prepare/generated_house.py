@@ -43,7 +43,7 @@ def _model_of_shape(shape: Shape, max_triangles: int) -> ObjModel | None:
 
 def _mesh_of_surface(surface: WrittenSurface) -> Mesh | None:
     """The mesh of a surface; None where it loses a triangle."""
-    # A corner's position, uv and normal share one index, -1 where the surface has none.
+    # A corner's position, uv and normal share one index, -1 for an attribute the surface lacks.
     corner = surface.faces.reshape(-1).astype(np.int64)
     none = np.full(len(corner), -1, np.int64)
     uvs, normals = surface.uvs, surface.normals

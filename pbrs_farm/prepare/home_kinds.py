@@ -163,7 +163,7 @@ def _plugin_source(word: str, _files: SourceFiles) -> SourceRef:
 def _finish_plugin(source: SourceRef, recipe: Recipe, finish: Finish) -> FinishedHouse:
     """The finished house of the Home that a plugin gives for a seed, under the source's own id.
 
-    The Home may set recipe fields of its own for reading, dressing and repair; BadInput for fields
+    The Home may set its own recipe fields for reading, dressing and repair; BadInput for fields
     that belong to the run, and for a source with a seed of dressing.
     """
     if source.dress_seed:
@@ -235,7 +235,7 @@ HOME_KINDS: Final = (
         # Its JSON; a file's name may begin with a brace, too.
         read=_read_object, is_word=lambda word: word.startswith('{"'), is_home=False,
     ),
-    # A word that is neither another kind nor a path: `resolve` names it.
+    # A word that matches neither another kind nor a path: `resolve` names it.
     HomeKind(name="example", source=_example_source, read=_read_example, is_of_package=True),
 )
 # fmt: on

@@ -1,4 +1,4 @@
-"""Open doors and drawers of a finished home, as far as no obstacle stops them; no effects."""
+"""Open doors and drawers of a finished home until an obstacle stops them; no effects."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ _NEAR: Final = 1e-3  # tolerance of a stopped joint, radians or metres
 def opened(house: House, index: int, part: str, share: float) -> House:
     """Open a part of items[index] by a share of its joint's range, 0..1.
 
-    A wall or item in the way stops it earlier, with a note. A joint that is open further is closed to
-    that share.
+    A wall or item in the way stops it earlier, with a note. A joint already open beyond that share is
+    closed to it.
     """
     value, notes = _reach(house, index, part, share)
     item = item_at(house.items[index], part, value)

@@ -61,7 +61,7 @@ class Preparation:
 
     @property
     def house(self) -> House:
-        """The house after the last pass; the first pass has none yet."""
+        """The house after the last pass; not available to the first pass."""
         assert self.current is not None
         return self.current
 
@@ -80,9 +80,9 @@ _Depends: TypeAlias = Callable[[SourceRef, Recipe], Sequence[object]]
 class Pass:
     """One pass of a house.
 
-    version: raised when the pass makes another house of the same input; all that was made with the
-    former one is made anew. depends: other inputs of its result, as JSON values. groups: recipe
-    groups that it reads and that do not name the step `house`.
+    version: raised when the pass makes another house of the same input, which invalidates all results of
+    the former version. depends: other inputs of its result, as JSON values. groups: recipe groups that
+    it reads and that do not name the step `house`.
     """
 
     name: str
@@ -228,7 +228,7 @@ def _furnish(work: Preparation) -> Preparation:
 def _dress(work: Preparation) -> Preparation:
     """Add surfaces, parts, lamps, textiles and clutter, by the source's seed.
 
-    Raises BadRecipe for an unknown style, BadInput for a path that is no library, MachineFailed if the
+    Raises BadRecipe for an unknown style, BadInput if a path is not a library, MachineFailed if the
     furniture package is not available.
     """
     from pbrs_farm.dress.dressing import dressed_house
@@ -249,10 +249,10 @@ def _dress(work: Preparation) -> Preparation:
 
 
 def _repair(work: Preparation) -> Preparation:
-    """Close walls, cut openings, find lamps; hang pictures of a lost wall anew.
+    """Close walls, cut openings, find lamps; rehang pictures that lost their wall.
 
-    The gates of dressing apply to the house as it is rendered: an item that loses its wall to repair is
-    hung on the remaining wall or removed, and the house is repaired again.
+    The gates of dressing apply to the rendered house: an item that loses its wall to repair is hung on
+    the remaining wall or removed, and the house is repaired again.
     """
     from pbrs_farm.dress.dressing import refit_after_repair
     from pbrs_farm.raycast.caster import Caster

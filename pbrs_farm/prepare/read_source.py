@@ -47,7 +47,7 @@ def _house_of(source: SourceRef, fields: ReadFields) -> House:
 
 
 def _with_far_noted(house: House, fields: ReadFields) -> House:
-    """Add a note for each item that is far from every room."""
+    """Add a note for each item far from every room."""
     if not house.rooms:
         return house
     notes = Notes(house.source.file, strict=fields.strict)

@@ -189,7 +189,7 @@ def _of_saved_home(path: Path, files: SourceFiles | None) -> SourceRef:
 
 
 def _format_at(path: Path) -> Format:
-    """The format of a path; raises BadHouse for a folder or a model that is no home."""
+    """The format of a path; raises BadHouse if a folder or a model is not a home."""
     entry = format_of_file(path)
     if entry is not None:
         return entry
@@ -261,7 +261,7 @@ def _source_of(kind: str, location: str, files: SourceFiles, models: str, part: 
 def suncg_list(root: Path, list_file: Path) -> list[str]:
     """The words `ROOT/house/<id>` for every id in a list file, without blank and # lines.
 
-    Raises BadHouse, with the line, for an id that is too long for a folder's name. The houses need not exist.
+    Raises BadHouse, with the line, for an id too long for a folder's name. The houses need not exist.
     """
     ids = [line.strip() for line in text_given(list_file, error=BadHouse).splitlines()]
     for number, house in enumerate(ids, 1):
@@ -295,7 +295,7 @@ def check_unchanged(source: SourceRef) -> None:
 
 
 def _of_folder(folder: Path) -> tuple[str, str]:
-    """The problem of a folder that is no home, and a hint."""
+    """The reason why a folder is not a home, and a hint."""
     n = len(_homes_in(folder))
     if n:
         return (

@@ -40,13 +40,13 @@ class SourceRef(Record):
 
     @property
     def given(self) -> GivenFile:
-        """The file, or the folder, of a source that is one."""
+        """The file or folder of a file-based source."""
         path = self.location.partition(":")[2] if self.kind == "reader" else self.location
         return GivenFile(Path(path), self.models, self.part)
 
     @property
     def fingerprint(self) -> str:
-        """Digest of every file the source reads; without companions that of its own file."""
+        """Digest of every file the source reads; without companions, the digest of the source file."""
         return "+".join(filter(None, (self.sha256, self.companions, edits_digest(self.edits))))
 
     @property

@@ -29,7 +29,7 @@ class Shard:
 
 @dataclass(frozen=True, slots=True)
 class Dataset:
-    """What shards hold: the part of dataset.json that a reader needs."""
+    """The part of dataset.json that a reader of shards needs."""
 
     size: Size | None  # None: each view as large as it was rendered
     modes: tuple[str, ...]

@@ -54,7 +54,7 @@ class HypersimFolder:
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
-        self._poses: dict[tuple[str, str], tuple[F64, F64]] = {}  # of trajectories that were read
+        self._poses: dict[tuple[str, str], tuple[F64, F64]] = {}  # by trajectory, filled on demand
 
     @property
     def url(self) -> str:
@@ -87,12 +87,12 @@ class HypersimFolder:
 
     @property
     def refs(self) -> tuple[ViewRef, ...]:
-        """All frames that are released, as far as the folder's table says, and that a pin-hole saw."""
+        """All released frames of pinhole cameras, according to the folder's table."""
         return tuple(ref for ref in self._frames if ref.id not in self.unfit)
 
     @cached_property
     def unfit(self) -> dict[str, str]:
-        """id -> why, of frames that are no views."""
+        """id -> reason, for frames excluded from refs."""
         tilted = {name for name, row in self._rows.items() if _intrinsics(row) is None}
         reasons = {ref.id: _TILTED for ref in self._frames if ref.house in tilted}
         for ref, row in self._splits.items():
@@ -241,7 +241,7 @@ class HypersimFolder:
 
 
 def _row(number: int, mask: NDArray[np.bool_], class40: NDArray[Any]) -> dict[str, Any]:
-    """A row of view.json's instances, as far as pictures tell: its class is that of most of its pixels."""
+    """A row of view.json's instances from the pictures alone: its class is the commonest among its pixels."""
     nyu40 = int(np.bincount(class40[mask]).argmax())
     y, x = np.nonzero(mask.any(1))[0], np.nonzero(mask.any(0))[0]
     pixels = int(mask.sum())
@@ -299,7 +299,7 @@ def _position(stored: NDArray[Any], _i: Intrinsics, metres: float) -> NDArray[np
 
 
 def _unit(stored: NDArray[Any], i: Intrinsics) -> F64:
-    """(H, W, 3) unit normals towards the camera, (0, 0, 0) where there is none."""
+    """(H, W, 3) unit normals towards the camera, (0, 0, 0) for pixels without a normal."""
     normal = np.nan_to_num(stored.astype(np.float64))
     x, y = np.meshgrid(np.arange(i.width_px) + 0.5, np.arange(i.height_px) + 0.5)
     rays = np.stack([(x - i.cx) / i.fx, -(y - i.cy) / i.fy, -np.ones_like(x)], axis=-1)

@@ -121,7 +121,7 @@ def _png_parts(png: bytes, place: str) -> tuple[int, int, int, int, int, bytes]:
 def _inflated(
     data: bytes, n_lines: int, n_line: int, n_strip: int, place: str
 ) -> Iterator[NDArray[np.uint8]]:
-    """(1, n_line) bytes, whose filter tells most, then (n_strip, n_line) as long as there are lines."""
+    """Yield the first row alone, since its filter usually decides, then strips of n_strip rows of bytes."""
     inflate = inflating.decompressobj()
     for first in range(1 - n_strip, n_lines, n_strip):
         n = min(n_strip, n_lines - first) if first > 0 else 1

@@ -31,10 +31,10 @@ def flip(sample: Sample) -> Sample:
 
 
 def crop(sample: Sample, left: int, top: int, width: int, height: int) -> Sample:
-    """The part of width x height pixels at (left, top); K's principal point moves. Raises BadInput.
+    """Crop width x height pixels at (left, top); K's principal point moves.
 
-    The arrays are copies. BadInput for a part that is empty or not wholly inside. Boxes and masks
-    made from the whole sample do not follow.
+    The arrays are copies. Raises BadInput for an empty rectangle, or one not wholly inside. Boxes and
+    masks made from the whole sample do not follow.
     """
     full_width, full_height = sample.size
     fits = 0 <= left <= full_width - width and 0 <= top <= full_height - height

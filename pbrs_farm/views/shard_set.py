@@ -30,7 +30,7 @@ from pbrs_farm.views.stored_layers import (
 from pbrs_farm.views.view_sample import Sample, SampleRequest
 from pbrs_farm.views.views import ViewRef, Views
 
-_N_OPEN: Final = 8  # shards that are kept open
+_N_OPEN: Final = 8  # maximum number of open shards
 
 
 class ShardSet:
@@ -58,7 +58,7 @@ class ShardSet:
         return self._place
 
     def shards_of(self, split: str | None) -> tuple[Shard, ...]:
-        """The shards of a split, all for None; BadInput where there is none of that name."""
+        """The shards of a split, all for None; raises BadInput for an unknown split."""
         shards = tuple(s for s in self.dataset.shards if split is None or s.split == split)
         if not shards:
             splits = dict.fromkeys(s.split for s in self.dataset.shards)

@@ -82,7 +82,7 @@ class OpenShard:
         self.views: list[Parts] = []  # in the tar's order
         key = None
         for member in members_of_tar(tar, place):
-            # The parts of a view stand together; its key ends at the first dot.
+            # The parts of a view are adjacent members; the key ends at the first dot.
             stem, _, part = member.name.partition(".")
             if stem != key:
                 self.views.append({})
@@ -90,7 +90,7 @@ class OpenShard:
             self.views[-1][part] = member
 
     def bytes_of(self, view: int, part: str) -> bytes:
-        """The bytes of a part of the view at that place; BadInput where it has none."""
+        """The bytes of a part of the view with that index; raises BadInput if it lacks the part."""
         member = self.views[view].get(part)
         if member is None:
             raise BadInput(self.place, f"view {view}", f"has no {part}")

@@ -1,7 +1,7 @@
-"""A view's layers as they are stored (whole numbers) and as a Sample's arrays; no effects.
+"""A view's layers as stored (whole numbers) and as a Sample's arrays; no effects.
 
-Sizes change while the numbers are whole, so that what is read from a folder and resized has the
-same bits as what was packed at that size.
+Resizing works on the whole numbers, so a view read from a folder and resized has the same bits as
+one packed at that size.
 """
 
 from __future__ import annotations
@@ -128,10 +128,10 @@ def _were_8_bits(array: NDArray[np.uint16]) -> bool:
 
 
 def resize_stored(stored: Stored, size: Size) -> Stored:
-    """The arrays on another grid: colour by area, boundaries where any is, all others nearest.
+    """Resample the arrays: colour by area, boundaries if the cell contains any, all others nearest.
 
-    size is (width, height). Labels are never mixed, so a class that is thinner than a pixel may
-    vanish; boundaries do not.
+    size is (width, height). Labels are never mixed, so a class thinner than a pixel may vanish;
+    boundaries do not.
     """
     return {name: _resized(name, array, *size) for name, array in stored.items()}
 

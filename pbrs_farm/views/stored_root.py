@@ -46,7 +46,7 @@ class StoredRoot:
         self._store = store
         # A folder is named in messages as people write it.
         self._place = str(store.root) if isinstance(store, FolderStore) else store.url
-        self._facts: dict[ViewRef, ViewFacts] = {}  # of views that were read
+        self._facts: dict[ViewRef, ViewFacts] = {}  # filled on demand
         self._files = _files_of_views(store)
 
     @property
@@ -89,10 +89,10 @@ class StoredRoot:
         return sample_of_stored(self.facts(ref), self.arrays(ref, request), request)
 
     def arrays(self, ref: ViewRef, request: SampleRequest) -> dict[str, NDArray[Any]]:
-        """The arrays of a request as they are stored, at their own size.
+        """The stored arrays of a request, at their original size.
 
-        Whole numbers as in the files: depth in mm, normals in 0..65535. BadInput for one that is
-        damaged, or of another size than the view's.
+        Whole numbers as in the files: depth in mm, normals in 0..65535. Raises BadInput if a file is
+        damaged, or has another size than the view.
         """
         size = self.facts(ref).size
         arrays = {}
@@ -135,14 +135,14 @@ class StoredRoot:
         one file.
         """
         lines = [attribution(self._store, house) for house in houses]
-        # Dressed homes have their credits in a file of its own.
+        # Dressed homes have their credits in a separate file.
         with suppress(ObjectMissing):
             lines += self._get(keys.ATTRIBUTION).decode("utf-8", "replace").splitlines()
         return tuple(dict.fromkeys(line for line in lines if line))
 
     @property
     def recipe(self) -> Recipe | None:
-        """What it was made by; None where the root does not hold it."""
+        """The recipe of the views; None if recipe.json is missing."""
         try:
             return recipe_from_json(self._get(keys.RECIPE), f"{self.url}: {keys.RECIPE}")
         except ObjectMissing:
@@ -172,10 +172,10 @@ class StoredRoot:
 
 
 def finished_views(store: Store) -> frozenset[tuple[str, str]]:
-    """(house, view) of every finished view of a store, none where it is empty.
+    """(house, view) of every finished view of a store; empty for an empty store.
 
-    Finished is a view whose view.json is there, as that is written last. Lists the store, which
-    takes long for a remote root.
+    A view is finished if it has view.json, which is written last. Lists the store, which takes long for
+    a remote root.
     """
     views = _files_of_views(store)
     return frozenset((ref.house, ref.view) for ref, files in views.items() if _TABLE in files)
@@ -184,7 +184,7 @@ def finished_views(store: Store) -> frozenset[tuple[str, str]]:
 def copy_view(of: Store, to: Store, ref: ViewRef) -> None:
     """Copy a view with the files of its house and the markers of both.
 
-    Of a view that is there already, pictures and layers of both stay.
+    If the view exists at the target, the pictures and layers of both are kept.
     """
     if to.head(keys.marker_key(ref.house, "view", ref.view)) is not None:
         _merge_view(of, to, ref)
@@ -201,7 +201,7 @@ def copy_view(of: Store, to: Store, ref: ViewRef) -> None:
 
 
 def _merge_view(of: Store, to: Store, ref: ViewRef) -> None:
-    """Put a view's pictures beside those that are there, and make labels and table of both."""
+    """Add a view's pictures to those at the target, and merge the labels and tables."""
     from pbrs_farm.run.house_cache import HouseCache
     from pbrs_farm.run.plan import STEPS
     from pbrs_farm.run.step_cache import Work
@@ -227,7 +227,7 @@ def _merge_view(of: Store, to: Store, ref: ViewRef) -> None:
 
 
 def _copy_cameras(of: Store, to: Store, house: str) -> None:
-    """cameras.json and its marker; cameras from Python stand beside those that are there."""
+    """Copy cameras.json and its marker; cameras from Python are added to those at the target."""
     key, marker_key = keys.house_key(house, _CAMERAS), keys.marker_key(house, "cameras")
     data, marker = of.get(key), read_marker(of, marker_key)
     stored = to.get(key) if to.head(key) is not None else data

@@ -1,4 +1,4 @@
-"""A view's arrays as they are trained on, and what is asked of a view; frozen values, no effects."""
+"""A view's arrays in the form used for training, and requests for them; frozen values, no effects."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.lighting import Mode
 from pbrs_farm.views.normal_axes import AXES
 
-# What can be asked of a view. "normal" brings "valid" along.
+# Layers of a request. "normal" brings "valid" along.
 LAYERS: Final = ("colour", "normal", "depth", "class40", "instance", "boundary")
 MODES: Final = tuple(str(mode) for mode in Mode)
 Size = tuple[int, int]  # width, height in pixels
@@ -23,8 +23,8 @@ Size = tuple[int, int]  # width, height in pixels
 class Sample:
     """One view in one lighting mode: all arrays are (H, W, ...); a layer not asked for is None.
 
-    Pixel (row 0, column 0) is top left and its centre lies at (0.5, 0.5). K maps
-    (x right, y down, z forward) to pixels, whatever the axes of the normals.
+    Pixel (row 0, column 0) is top left, with its centre at (0.5, 0.5). K maps (x right, y down,
+    z forward) to pixels, whatever the axes of the normals.
     """
 
     id: str  # <house>/<view>
@@ -58,7 +58,7 @@ class Sample:
 
 @dataclass(frozen=True, slots=True)
 class SampleRequest:
-    """What to read of a view. Raises BadInput for a layer, mode, axes or size that cannot be.
+    """The layers to read of a view. Raises BadInput for an invalid layer, mode, axes or size.
 
     mode: of colour. axes: of normals. size: (width, height) to resize to, None as stored.
     """

@@ -46,11 +46,11 @@ class ViewSource(Protocol):
 
     @property
     def url(self) -> str:
-        """What was opened."""
+        """The URL of the source."""
         ...
 
     def lacks(self, ref: ViewRef, request: SampleRequest) -> str:
-        """The first file of what is asked for that the view has not; "" where it has all."""
+        """The first requested file missing from the view; "" if it has all."""
         ...
 
     def modes(self, ref: ViewRef) -> tuple[str, ...]:
@@ -62,7 +62,7 @@ class ViewSource(Protocol):
         ...
 
     def table(self, ref: ViewRef) -> dict[str, Any]:
-        """view.json as it is stored (docs/formats/view_json.md); of shards the part that was packed."""
+        """The stored view.json (docs/formats/view_json.md); for shards, the packed part."""
         ...
 
     def read(self, ref: ViewRef, request: SampleRequest) -> Sample:
@@ -74,7 +74,7 @@ class ViewSource(Protocol):
         ...
 
     def layer(self, ref: ViewRef, name: str) -> NDArray[Any]:
-        """A layer as it is stored; BadInput where there is none."""
+        """A layer as stored; raises BadInput if the view lacks it."""
         ...
 
     def kept_by(self, run: str) -> frozenset[ViewRef]:
@@ -86,7 +86,7 @@ class ViewSource(Protocol):
         ...
 
     def save(self, refs: Sequence[ViewRef], place: str | Path) -> None:
-        """Write views as an output root has them; BadInput where the source is none."""
+        """Write views in the layout of an output root; raises BadInput if the source is not one."""
         ...
 
 
@@ -179,7 +179,7 @@ class Frame:
 
     @checked_call
     def layer(self, name: str) -> NDArray[Any]:
-        """A layer as it is stored, (H, W) or (H, W, C): "depth" in mm, "position" in metres, ...
+        """A layer as stored, (H, W) or (H, W, C): "depth" in mm, "position" in metres, ...
 
         >>> frame.layer("depth").dtype
         dtype('uint16')
@@ -251,10 +251,10 @@ class Frame:
 
     @checked_call
     def classes_by(self, table: str | Path | ClassMap) -> NDArray[np.uint16]:
-        """(H, W) classes of your own, 0 = none: a CSV file with columns from,id,name (docs/formats/export.md).
+        """(H, W) user-defined classes, 0 = none: a CSV file with columns from,id,name (docs/formats/export.md).
 
-        Raises BadInput for a table that is wrong, naming its line, and for a frame of shards, which
-        have no table of instances.
+        Raises BadInput for an invalid table, naming its line, and for a frame of shards, which has no table
+        of instances.
 
             >>> set(np.unique(frame.classes_by("mine.csv"))) <= {0, 1, 2}
             True
@@ -272,7 +272,7 @@ class Frame:
 
     @property
     def instances(self) -> Table:
-        """What is seen, a row an instance: class, pixels, boxes, and the pose of placed models.
+        """The visible instances, one row each: class, pixels, boxes, and the pose of placed models.
 
         >>> sum(row["pixels"] for row in frame.instances) <= 48 * 64
         True
@@ -282,10 +282,10 @@ class Frame:
 
     @checked_call
     def mask(self, thing: str | int | Item) -> NDArray[np.bool_]:
-        """(H, W) bool: where a thing is seen, or several.
+        """(H, W) bool mask of the visible pixels of one or several items.
 
-        thing: an item, its id ("mug 1") or that of a row of `instances`; or a name or class, "chair*"
-        for instance: all that match. Raises BadInput where none of it is in sight.
+        thing: an item, its id ("mug 1") or the id of a row of `instances`; or a name or class, for instance
+        "chair*": all that match. Raises BadInput if no match is in sight.
 
             >>> frame.mask(frame.instances[0]["item"]).sum() == frame.instances[0]["pixels"]
             np.True_
@@ -312,7 +312,7 @@ class Frame:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What is wrong but recoverable: a dark room, a camera in no room.
+        """Recoverable problems: a dark room, a camera in no room.
 
         >>> frame.warnings
         ()
@@ -430,7 +430,7 @@ class Views(Sequence[Frame]):
         """Write the frames into the new folder out in a form of other tools; returns out.
 
         to: coco, yolo, kitti, bop and the other forms of views of docs/formats/export.md. layers and modes: one
-        or several, None = all; size: (width, height), None = as rendered; classes: a CSV file of your own
+        or several, None = all; size: (width, height), None = as rendered; classes: a CSV file of user-defined
         classes; shares: a folder a split. options: of the form, as `scanner="vlp16"` of lidar. Raises BadInput
         for an unknown form or option, views that the form cannot hold, an out that is not empty, and frames of
         shards.
@@ -455,9 +455,9 @@ class Views(Sequence[Frame]):
     def questions(self) -> list[dict[str, Any]]:
         """Questions about space: a dict with question_type, question, ground_truth, options, instances.
 
-        The kinds and columns are those of VSI-Bench (docs/formats/export.md, form `questions`). Frames of a walk
-        are asked about as one film, every other frame by itself; of one that shows too little there
-        are none. Raises BadInput for frames of shards.
+        The kinds and columns are those of VSI-Bench (docs/formats/export.md, form `questions`). The frames of a
+        walk are asked about as one film, all other frames separately; a frame with too few items has no
+        questions. Raises BadInput for frames of shards.
 
             >>> [row["question_type"] for row in views.questions()][:1]
             ['object_counting']

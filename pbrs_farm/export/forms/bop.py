@@ -54,9 +54,8 @@ class _ModelMesh:
 def write_bop(views: list[ChosenView], out: Path, _choice: Choice) -> None:
     """The layout above of views of homes with placed models.
 
-    A model called obj_<number> or obj-<number> keeps its number, others follow in the order of their names.
-    Raises BadInput where no house of the views holds a placed model, and for a lens that is no
-    pin-hole.
+    A model called obj_<number> or obj-<number> keeps its number; others follow in the order of their names.
+    Raises BadInput if no house of the views has a placed model, and for a lens other than a pinhole.
     """
     folders = {view.house.id: view.entry.folder.parent.parent for view in views}
     houses = {house: stored_house(folder) for house, folder in folders.items()}
@@ -225,7 +224,7 @@ def _mask_facts(alone: NDArray[Any], visible: NDArray[Any], valid: NDArray[Any])
 
 
 def _box(mask: NDArray[Any]) -> list[int]:
-    """x, y, width, height of the mask's pixels; -1 of none, as BOP has it."""
+    """x, y, width, height of the mask's pixels; -1 for an empty mask, as in BOP."""
     rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
     if not len(rows):
         return [-1, -1, -1, -1]

@@ -1,9 +1,9 @@
-"""Captions: what a view shows, in plain English made from its labels.
+"""Captions: a description of each view in plain English, made from its labels.
 
     captions.jsonl  images/<house>/<view>.png
 
-Effects: reads views, writes files. The words are a function of the labels alone: which room is seen, which
-things and how many, and where the largest of them are to each other.
+Effects: reads views, writes files. The text is a function of the labels alone: the visible room, the
+kinds and numbers of objects, and the spatial relations of the largest.
 """
 
 from __future__ import annotations
@@ -29,16 +29,16 @@ from pbrs_farm.formats.output_folder import RoomOutline
 from pbrs_farm.home.room_use import RoomKind, named_kind
 
 LEAST_VISIBLE: Final = 0.3
-"""Share of a thing's own pixels that are seen, from which it counts."""
+"""Minimum visible share of an object's pixels."""
 LEAST_FRACTION: Final = 0.003
-"""Share of the picture's pixels from which a thing counts."""
-_RELATED: Final = 6  # largest things that relations are given of
-_SAID: Final = 4  # relations in the text
+"""Minimum share of the picture's pixels of an object."""
+_RELATED: Final = 6  # number of largest objects with relations
+_SAID: Final = 4  # maximum number of relations in the text
 _ORDINALS: Final = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth")
-_TOUCH_M: Final = 0.05  # between a thing and what it stands on
-_BEFORE_M: Final = 0.1  # a surface, where it is asked which room is seen
-_POINTS: Final = 20_000  # of a view, about, that tell its room
-_SLACK_M: Final = 0.02  # by which things that stand apart may overlap
+_TOUCH_M: Final = 0.05  # maximum gap between an object and its support
+_BEFORE_M: Final = 0.1  # distance in front of a surface, for finding its room
+_POINTS: Final = 20_000  # approximate number of sampled points of a view, for finding its room
+_SLACK_M: Final = 0.02  # maximum overlap of separate objects
 _ROOMS: Final = {
     RoomKind.LIVING: "living room",
     RoomKind.BEDROOM: "bedroom",
@@ -54,7 +54,7 @@ _ROOMS: Final = {
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Seen:
-    """A thing that counts, with its box in the axes of the camera."""
+    """A described object, with its box in the axes of the camera."""
 
     row: dict[str, Any]  # of view.json's instances
     noun: str
@@ -75,7 +75,7 @@ class _Seen:
 
 
 def _things(view: ChosenView) -> list[_Seen]:
-    """The things that count, those with most pixels first."""
+    """The described objects, in descending order of pixels."""
     camera_from_world = np.linalg.inv(pose_opencv(view))
     things = []
     for row in sorted(view.facts["instances"], key=lambda r: (-r["pixels"], r["id"])):
@@ -102,7 +102,7 @@ def _corners(box: dict[str, Any]) -> F64:
 
 
 def _titles(things: Sequence[_Seen]) -> dict[int, str]:
-    """Instance -> what tells it from the others: "the sofa", "the left chair", "the third lamp from the left"."""
+    """Instance -> a unique phrase: "the sofa", "the left chair", "the third lamp from the left"."""
     titles = {}
     for noun in dict.fromkeys(thing.noun for thing in things):
         same_noun = sorted((t for t in things if t.noun == noun), key=lambda t: (t.column, t.id))
@@ -119,7 +119,7 @@ def _titles(things: Sequence[_Seen]) -> dict[int, str]:
 
 
 def _relation(a: _Seen, b: _Seen, *, by_axes: bool) -> str:
-    """Where the first is to the second; "" where no word fits. by_axes: the camera looks one way."""
+    """Position of a relative to b; "" if no word fits. by_axes: the camera looks one way."""
     if _is_on(a, b):
         return "on top of"
     if not by_axes or _is_on(b, a):
@@ -134,14 +134,14 @@ def _relation(a: _Seen, b: _Seen, *, by_axes: bool) -> str:
 
 
 def _is_on(a: _Seen, b: _Seen) -> bool:
-    """The first stands on the second: at the height of its top, its middle above it."""
+    """True if b supports a: a's bottom is at the height of b's top, and a's centre is above b."""
     middle = (a.low_world + a.high_world) / 2
     over = (b.low_world <= middle) & (middle <= b.high_world)
     return bool(abs(a.low_world[1] - b.high_world[1]) <= _TOUCH_M and over[0] and over[2])
 
 
 def _relations(view: ChosenView, things: Sequence[_Seen]) -> list[dict[str, Any]]:
-    """Of each two of the largest things, the smaller first: what stands on what, then by size."""
+    """Relations of each pair of the largest objects, smaller first: "on top of" first, then by size."""
     by_axes = intrinsics_of(view.facts).lens.depth_is_planar
     rows = []
     for larger, smaller in combinations(things[:_RELATED], 2):
@@ -155,12 +155,12 @@ def _relations(view: ChosenView, things: Sequence[_Seen]) -> list[dict[str, Any]
 
 
 def write_captions(views: list[ChosenView], out: Path, _choice: Choice) -> None:
-    """captions.jsonl, a line a view, and images/<house>/<view>.png.
+    """Write captions.jsonl, a line a view, and images/<house>/<view>.png.
 
-    A line has file_name, text, objects (id, noun, box2d of each thing that counts, the largest
-    first) and relations (subject, relation, object by id, among the largest six). A thing counts
-    where LEAST_VISIBLE of it is seen on LEAST_FRACTION of the picture; walls, floors and ceilings do
-    not. Nouns are NYU40's, or the names of the user's classes. Views without a picture are left out.
+    A line has file_name, text, objects (id, noun, box2d, the largest first) and relations (subject,
+    relation, object by id, among the largest six). An object is listed if LEAST_VISIBLE of it is
+    visible on LEAST_FRACTION of the picture; walls, floors and ceilings are not listed. Nouns are
+    NYU40's, or the names of the user's classes. Views without a picture are left out.
     """
     lines = []
     for view in views:
@@ -176,8 +176,8 @@ def write_captions(views: list[ChosenView], out: Path, _choice: Choice) -> None:
 def caption(view: ChosenView) -> dict[str, Any]:
     """text, objects and relations of a view, as write_captions says.
 
-    Wholly from labels, so the same view gives the same words. Objects carry box2d as view.json has
-    it; relations name them by id.
+    Depends on the labels alone, so the same view gives the same words. Objects carry box2d as view.json
+    has it; relations name them by id.
     """
     things = _things(view)
     relations = _relations(view, things)
@@ -197,7 +197,7 @@ def _first_sentence(view: ChosenView, things: Sequence[_Seen]) -> str:
 
 
 def _room(view: ChosenView) -> str:
-    """What the room that is seen is for, else what it is called; "" for a model without context."""
+    """The visible room by its use, else by its name; "" for a model without context."""
     if view.house.id.startswith("object_"):
         return ""
     room_id = seen_room(view)
@@ -213,10 +213,10 @@ def _room(view: ChosenView) -> str:
 
 
 def seen_room(view: ChosenView) -> str:
-    """The room of most of the points that are seen; the eye's where none lies in a room.
+    """The room with most of the visible points; the camera's room if no point is in a room.
 
-    A point is of the room whose floor it is above, a hand's breadth before the surface, so that a
-    wall is of the room that it is seen from.
+    Points are moved 0.1 m in front of their surface, so that a wall counts for the room on the camera's
+    side. A point belongs to the room with the highest floor below it.
     """
     outlines = view.house.outlines
     points = _seen_points(view) if outlines else np.zeros((0, 3))
@@ -249,7 +249,7 @@ def _seen_points(view: ChosenView) -> F64:
 
 
 def _relation_sentences(relations: Iterable[dict[str, Any]], titles: dict[int, str]) -> list[str]:
-    """A sentence for each of the first relations; of one thing, one."""
+    """Sentences for the first relations, at most one per subject."""
     first: dict[int, dict[str, Any]] = {}
     for row in relations:
         first.setdefault(row["subject"], row)

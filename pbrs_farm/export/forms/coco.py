@@ -118,7 +118,8 @@ def _write_panoptic(
         file.write_bytes(png_from_array(_segment_ids(view.array("instance"), rows)))
         segments = [_segment(row, view.class_of(row)) for row in rows]
         annotations.append({"image_id": image["id"], "file_name": name, "segments_info": segments})
-    # Furniture and the like are things; walls, floors, doors and other structure are stuff.
+    # Furniture and other items are COCO "things"; walls, floors, doors and other structure are
+    # "stuff".
     document = {
         "images": images,
         "annotations": annotations,

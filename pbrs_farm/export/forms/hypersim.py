@@ -57,9 +57,9 @@ _SPLIT_FIELDS: Final = (
 def write_hypersim(views: list[ChosenView], out: Path, choice: Choice) -> None:
     """Write the layout above.
 
-    A scene is a home as one pin-hole sees it, a camera a walk's eye or the views that are no frames.
-    A unit is a metre, the world has z up. `depth_meters` is the distance along the ray, NaN where
-    there is nothing. BadInput for another lens than a pin-hole and a size that is not the views' own.
+    A scene is a home seen by one pinhole; a camera has the frames of a walk, or all single views, by eye.
+    A unit is a metre, the world has z up. `depth_meters` is the distance along the ray, NaN for pixels
+    without a surface. Raises BadInput for a lens other than a pinhole, and for a size other than the views'.
     """
     if choice.size is not None:
         raise BadInput("--size", "", "hypersim holds light, which is not resized")

@@ -1,8 +1,8 @@
-"""A home as a model of MuJoCo (MJCF): joints, convex parts, masses, loose things as free bodies. Effects: writes files.
+"""A home as a model of MuJoCo (MJCF): joints, convex parts, masses, loose items as free bodies. Effects: writes files.
 
-Metres, z up. Doors and drawers have limits, damping and friction. Bodies that a part only touches along
-its way do not collide with it, since clearances are smaller than the margin of convex parts. Loose
-items fall first, and are written where they came to rest (`mujoco_rest`).
+Metres, z up. Doors and drawers have limits, damping and friction. A part does not collide with bodies
+that it only touches along its way, since clearances are smaller than the margin of convex parts. Loose
+items are dropped first and written in their rest pose (`mujoco_rest`).
 """
 
 from __future__ import annotations

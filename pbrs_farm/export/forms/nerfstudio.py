@@ -27,7 +27,7 @@ _MODELS: Final = {
     "fisheye": "OPENCV_FISHEYE",
     "equirect": "EQUIRECTANGULAR",
 }
-"""What nerfstudio calls each lens model; a transforms.json has one."""
+"""Names of the lens models in nerfstudio; a transforms.json has one."""
 
 
 def write_nerfstudio(views: list[ChosenView], out: Path, _choice: Choice) -> None:

@@ -25,11 +25,11 @@ _TYPES: Final = {"float32": "float", "uint8": "uchar", "uint16": "ushort"}  # PL
 
 
 def write_ply(views: list[ChosenView], out: Path, choice: Choice) -> None:
-    """<house>/<view>.ply of every view.
+    """Write <house>/<view>.ply of every view.
 
-    Points are those of the layer `position` where the view has it, else of `depth` and K. label is
-    the NYU40 class, or that of choice.classes; comments name the classes. Raises BadInput for a
-    view without `position` through a lens that is no pin-hole.
+    Points are those of the layer `position` if the view has it, else of `depth` and K. label is the NYU40
+    class, or that of choice.classes; comments name the classes. Raises BadInput for a view without
+    `position` whose lens is not a pinhole.
     """
     for view in views:
         (out / view.house.id).mkdir(exist_ok=True)

@@ -63,7 +63,7 @@ def _write_file(target: Path, data: bytes) -> None:
 def camera_line(view: ChosenView) -> str:
     """`vx vy vz  tx ty tz  ux uy uz  xf yf  value`: eye, towards, up, half angles in rad, score.
 
-    BadInput for a lens that is no pinhole, as the format has no place for it. A view without a
+    Raises BadInput for a lens other than a pinhole, as the format has no place for it. A view without a
     score has 0. World axes and metres as in view.json.
     """
     require_lens(view, "released")

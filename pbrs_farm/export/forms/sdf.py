@@ -1,7 +1,7 @@
 """A home as a world of Gazebo, SDF 1.9. Effects: writes files.
 
-Metres, z up, gravity; a static model for the building, a model a thing with visual, convex collision
-parts, mass and lamps. Meshes are y up, as glTF asks and Gazebo reads them; their poses turn them.
+Metres, z up, gravity; a static model for the building, and a model per item with visual, convex
+collision parts, mass and lamps. Meshes are y up, as in glTF and Gazebo; their poses turn them.
 Pieces that open have a link and a joint for each part, and are closed: a world has no state of joints.
 """
 
@@ -39,7 +39,8 @@ _BRIGHT_CD: Final = 100.0  # candela of intensity 1, since Gazebo's pictures hav
 _FAINT: Final = 0.01  # share of intensity 1 at a metre at which a light ends
 _LEAST_RANGE_M: Final = 1.0
 _BUILDING: Final = "building"
-# bits of collisions: fixed bodies meet all but opening parts, which meet loose things alone
+# collision bitmasks: fixed bodies collide with all but opening parts, which collide with loose
+# items only
 _STILL, _MOVING = 1, 2
 _RESERVED: Final = (_BUILDING, "world")
 

@@ -24,11 +24,11 @@ _PROTOCOL: Final = 4
 
 
 def write_tapvid(views: list[ChosenView], out: Path, _choice: Choice) -> None:
-    """tapvid.pkl: house id -> "video", "points" and "occluded", as readers of TAP-Vid's DAVIS file take it.
+    """tapvid.pkl: house id -> "video", "points" and "occluded", for readers of TAP-Vid's DAVIS file.
 
     video (T, H, W, 3) uint8; points (N, T, 2) float32, x and y as shares of the picture's width and
-    height from its upper left corner; occluded (N, T) bool. Frames that are exported alone; points that
-    none of them sees are left out. BadInput for a house without tracks.npz.
+    height from its upper left corner; occluded (N, T) bool. Contains the exported frames only, and only
+    points visible in at least one of them. Raises BadInput for a house without tracks.npz.
     """
     videos: dict[str, dict[str, Any]] = {}
     stills: list[ChosenView] = []

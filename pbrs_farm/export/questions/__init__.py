@@ -1,1 +1,1 @@
-"""Questions about space and their answers, and phrases that name one thing, made from labels and meshes."""
+"""Questions about space and referring expressions, made from labels and meshes."""

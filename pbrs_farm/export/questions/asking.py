@@ -1,4 +1,4 @@
-"""Questions of clips, balanced so that a guesser who sees nothing gains little, and that guesser's score; no effects."""
+"""Questions of clips, balanced against blind guessing, and the score of a blind guesser; no effects."""
 
 from __future__ import annotations
 
@@ -15,21 +15,23 @@ from pbrs_farm.export.questions.clips import Clip
 from pbrs_farm.export.questions.kinds import KINDS, Draft, QuestionKind
 
 DATASET: Final = "pbrs_farm"
-_OF_A_PICTURE: Final = 2  # questions of a kind
+_OF_A_PICTURE: Final = 2  # questions of a kind about a picture
 _OF_A_WALK: Final = 8
-_MOST_APART: Final = 2  # how often one answer is right more often than another, or than all others
+_MOST_APART: Final = (
+    2  # maximum lead of one answer's count over another's, or over all others together
+)
 _LETTERS: Final = "ABCD"
 
 
 @dataclass(frozen=True, slots=True)
 class Question:
-    """A question with its answer, as a row of VSI-Bench, and the instances that it is about."""
+    """A question with its answer, as a row of VSI-Bench, and its instances."""
 
     clip: str
     kind: str
     text: str
     ground_truth: str  # a number, or the letter of an option
-    options: tuple[str, ...]  # "A. left", ...; () where the answer is a number
+    options: tuple[str, ...]  # "A. left", ...; () for a number
     about: tuple[int, ...]
 
     @property
@@ -53,7 +55,7 @@ class Question:
 
 
 class Asker:
-    """Asks clip after clip, and keeps count of the answers so that none becomes the usual one.
+    """Asks about clip after clip, and counts the answers so that no answer becomes the usual one.
 
     >>> from pbrs_farm.export.questions.asking import Asker
     >>> Asker().asked([])
@@ -88,9 +90,8 @@ class Asker:
     def _take_rarest(self, kind: QuestionKind, drafts: Sequence[Draft]) -> Draft | None:
         """Take the first draft with the rarest answer, and count that answer.
 
-        Returns None, and counts nothing, if that answer would become the usual one: of a kind with few
-        answers, two more often right than another; of any other kind, two more often than all others
-        together.
+        Returns None, and counts nothing, if that answer's count already leads by two: over any other answer
+        for a kind with few answers, else over all other answers together.
         """
         count = self._answers[kind.name]
         draft = min(drafts, key=lambda d: count[d.answer])
@@ -106,7 +107,7 @@ class Asker:
         style = rng.choice(kind.styles)
         truth, options = draft.answer, list(draft.options)
         if options:
-            # Put the answer at the letter that was right least often, the others in a drawn order.
+            # Give the answer the letter with the fewest right answers; shuffle the other options.
             wrong = [o for o in options if o != draft.answer]
             rng.shuffle(wrong)
             count = self._letters[kind.name]
@@ -130,9 +131,9 @@ def mean_relative_accuracy(guess: float, truth: float) -> float:
 
 
 def blind_scores(questions: Sequence[Question]) -> dict[str, tuple[int, float]]:
-    """Kind -> how many questions, and the score of the best answer that is the same for all of them.
+    """Kind -> number of questions, and the score of the best constant answer.
 
-    Of choices, the larger of the most frequent letter's share and the most frequent answer's share; of
+    For choices, the larger of the most frequent letter's share and the most frequent answer's share; for
     numbers, the best constant's mean relative accuracy.
     """
     by_kind: dict[str, list[Question]] = defaultdict(list)

@@ -25,38 +25,37 @@ from pbrs_farm.export.sequences import frames_by_house, pose_opencv
 from pbrs_farm.geometry.surface_points import item_triangles, surface_points
 
 LEAST_FRACTION: Final = 0.003
-"""Share of a picture's pixels from which a thing is seen."""
+"""Minimum share of a picture's pixels of a visible item."""
 LEAST_VISIBLE: Final = 0.3
-"""Share of a thing from which it is seen: neither hidden by others nor beyond the picture's edges."""
+"""Minimum visible share of an item: neither occluded nor outside the picture."""
 WHOLE: Final = 0.7
-"""Share of a thing from which its size can be judged."""
+"""Minimum visible share of an item for questions about its size."""
 _GLIMPSED: Final = 1e-4  # minimum share of a picture's pixels of a noticeable item
-_SPACING_M: Final = 0.03  # of the points that find the nearest places of two things
-_POINTS_ALONG: Final = (
-    16  # the longest side of a thing, where it is asked how much of it a picture holds
-)
-_STARTS: Final = 4  # pairs of points from which the nearest places are sought
-_STEPS: Final = 24  # from one thing to the other and back
+_SPACING_M: Final = 0.03  # spacing of points, for the gap between two items
+_POINTS_ALONG: Final = 16  # points along an item's longest side, for its share within a picture
+_STARTS: Final = 4  # initial pairs of points in the search for the gap
+_STEPS: Final = 24  # maximum iterations from one item to the other and back
 _BY_FLOOR_M: Final = 0.3  # maximum gap between the floor and an item on it
-_WAY_M: Final = 0.5  # the width of a way between things
+_WAY_M: Final = 0.5  # width of a path between items
 _STEPPED_OVER_M: Final = 0.1
 _HEAD_M: Final = 1.8
-_LEAST_STOOD_BY_M: Final = 0.4  # the longest side of a thing that one stands by
-# Nouns that say nothing, and words of what is hard to tell from two of it: a row of books, a sheet of paper.
+_LEAST_STOOD_BY_M: Final = 0.4  # minimum longest side of an item as a viewpoint
+# Nouns without meaning, and first words of nouns whose number is unclear: a row of books, a sheet
+# of paper.
 _VAGUE: Final = frozenset({"object", "part of the building", "person", "food"})
 _UNCOUNTED: Final = ("piece", "row", "sheet")
 
 
 @dataclass(eq=False)
 class Thing:
-    """An instance of a clip and when it is seen; frames count from 0 and are 0 in a picture."""
+    """An instance of a clip and its first frames; frames count from 0 and are 0 in a picture."""
 
     instance: int
     noun: str
     item: Item
-    first_glimpsed: int  # the first frame in which some pixels of it are there
-    first_seen: int | None = None  # the first frame in which it counts as seen; None = never
-    most_visible: float = 0.0  # the largest share of it in a frame
+    first_glimpsed: int  # first frame with some of its pixels
+    first_seen: int | None = None  # first frame in which it is visible; None = never
+    most_visible: float = 0.0  # its largest visible share in a frame
 
     @cached_property
     def triangles(self) -> F64:
@@ -65,21 +64,21 @@ class Thing:
 
     @cached_property
     def points(self) -> cKDTree:
-        """Points on its surface, corners of its triangles among them."""
+        """Points on its surface, including the corners of its triangles."""
         corners = self.triangles.reshape(-1, 3)
         return cKDTree(np.concatenate([corners, surface_points(self.triangles, _SPACING_M)]))
 
     def share_within(self, view: ChosenView) -> float:
-        """The share of its surface that lies within the picture's edges, whether hidden or not."""
+        """The share of its surface within the picture's edges, occluded or not."""
         facts, pose = view.facts, pose_opencv(view)
         x, y = intrinsics_of(facts).pixels((self._sparse_points - pose[:3, 3]) @ pose[:3, :3]).T
-        # NaN, what the lens does not see, is not within.
+        # NaN (outside the lens) compares false.
         within = (x >= 0) & (x <= facts["width_px"]) & (y >= 0) & (y <= facts["height_px"])
         return float(within.mean()) if len(within) else 0.0
 
     @cached_property
     def _sparse_points(self) -> F64:
-        """(N, 3) points on its surface, the longer its sides the farther apart."""
+        """(N, 3) points on its surface, spaced in proportion to its longest side."""
         return surface_points(self.triangles, max(self.longest_m / _POINTS_ALONG, _SPACING_M / 4))
 
     @cached_property
@@ -104,24 +103,24 @@ def _plan(item: Item) -> Any:
 
 @dataclass(eq=False)
 class Clip:
-    """A picture or a walk, and what is seen in it. Walks show one home, so questions may ask for rooms."""
+    """A picture or a walk, and its visible items. A walk shows one home, so questions may ask for rooms."""
 
     name: str  # unique in the export, and a file name
     views: Sequence[ChosenView]  # one, or the frames of a walk in their order
     house: House
-    things: Sequence[Thing]  # all that may be noticed, by instance
+    things: Sequence[Thing]  # all noticeable items, by instance
 
     _gaps: dict[tuple[int, int], float] = field(default_factory=dict, init=False, repr=False)
     _ways: dict[tuple[int, int], bool] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def is_walk(self) -> bool:
-        """Several frames of a moving camera."""
+        """True for several frames of a moving camera."""
         return len(self.views) > 1
 
     @cached_property
     def by_noun(self) -> dict[str, list[Thing]]:
-        """Noun -> all of its things, for nouns whose things are all seen: others cannot be counted."""
+        """Noun -> its items, for countable nouns with all items visible."""
         groups: dict[str, list[Thing]] = defaultdict(list)
         for thing in self.things:
             groups[thing.noun].append(thing)
@@ -133,9 +132,9 @@ class Clip:
 
     @cached_property
     def single(self) -> list[Thing]:
-        """The things that their noun names without doubt: the only one of it that may be noticed.
+        """The items with an unambiguous noun: the only noticeable item of that noun.
 
-        Nor is there another of the same own name: a coat rack that is furniture, and one of clothes.
+        No item of another noun has the same name: a coat rack may be labelled furniture or clothes.
         """
         names = Counter(thing.item.name for thing in self.things)
         alone = (things[0] for things in self.by_noun.values() if len(things) == 1)
@@ -143,7 +142,7 @@ class Clip:
 
     @cached_property
     def footprints(self) -> dict[str, list[tuple[Item, Any]]]:
-        """Room id -> what a walker would meet there between the floor and head height, seen from above."""
+        """Room id -> obstacles of a walker, between the floor and head height, with their plans."""
         obstacles: dict[str, list[tuple[Item, Any]]] = defaultdict(list)
         floors = {room.id: room.floor_y for room in self.house.rooms}
         for item in self.house.items:
@@ -157,7 +156,7 @@ class Clip:
 
     @cached_property
     def rooms_entered(self) -> list[Room]:
-        """The rooms in which the camera stands in some frame, in the house's order."""
+        """The rooms entered by the camera, in the house's order."""
         eyes = np.array([pose_opencv(view)[:3, 3] for view in self.views])
         return [
             room
@@ -170,14 +169,14 @@ class Clip:
         ]
 
     def stands_on_floor(self, thing: Thing) -> bool:
-        """It stands on the floor of its room, large enough to be a place to go to."""
+        """True if the item is on the floor of its room and large enough to be a destination."""
         floor_y = next((r.floor_y for r in self.house.rooms if r.id == thing.item.room_id), None)
         low = float(thing.item.bounds[0, 1])
         is_by_floor = floor_y is not None and low - floor_y <= _BY_FLOOR_M
         return is_by_floor and thing.longest_m >= _LEAST_STOOD_BY_M
 
     def is_way_free(self, a: Thing, b: Thing) -> bool:
-        """A person can walk straight from one thing to the other, within one room; kept."""
+        """True if a person can walk straight from a to b, within one room; cached."""
         key = (min(a.instance, b.instance), max(a.instance, b.instance))
         if key not in self._ways:
             self._ways[key] = self._is_free(a, b)
@@ -195,10 +194,10 @@ class Clip:
         return not any(plan.intersects(way) for plan in obstacles)
 
     def gap_m(self, a: Thing, b: Thing) -> float:
-        """Metres between the nearest places of two things' surfaces; kept.
+        """Gap between two items' surfaces, metres; cached.
 
-        From the nearest points of a cloud on each, walks from surface to surface to the nearest place
-        until it stays: exact where the things are convex about there.
+        Starts at the nearest points of a cloud on each item, and alternates between the nearest points of the
+        two surfaces until they converge: exact where the items are locally convex.
         """
         key = (min(a.instance, b.instance), max(a.instance, b.instance))
         if key not in self._gaps:
@@ -207,7 +206,7 @@ class Clip:
 
 
 def is_countable(noun: str) -> bool:
-    """One of it is told from two, and the word is of one thing.
+    """True for a singular noun whose items can be counted in a picture.
 
     >>> [is_countable(noun) for noun in ("chair", "glass", "set of shelves", "row of books", "plates")]
     [True, True, True, False, False]
@@ -233,8 +232,8 @@ def _gap_m(a: Thing, b: Thing) -> float:
 
 
 def _nearest_place(triangles: F64, place: F64) -> tuple[F64, float]:
-    """The place of a mesh that is nearest to one in the world, and how far."""
-    # Look only at triangles whose box is as near as the nearest corner.
+    """The point of a mesh nearest to a point in the world, and the distance."""
+    # Test only triangles whose box is as near as the nearest corner.
     low, high = triangles.min(1), triangles.max(1)
     to_box = np.linalg.norm(np.maximum(np.maximum(low - place, place - high), 0.0), axis=1)
     to_corner = np.linalg.norm(triangles.reshape(-1, 3) - place, axis=1).min()
@@ -246,10 +245,10 @@ def _nearest_place(triangles: F64, place: F64) -> tuple[F64, float]:
 
 
 def clips_of(views: Sequence[ChosenView]) -> Iterator[Clip]:
-    """A clip for each view, and one for each walk: its frames in order, of a rig the first camera's.
+    """A clip for each view, and one for each walk: the first camera's frames of a rig, in order.
 
-    Views of models without a home are left out: they have no room to ask about. One house is read at a
-    time. Raises BadInput for a house that is damaged.
+    Views of models without a home are left out: they have no room to ask about. Holds one house at a
+    time. Raises BadInput for a damaged house.
     """
     for house_id, frames in frames_by_house(views).items():
         firsts = [frame.first for frame in frames]
@@ -284,7 +283,7 @@ def _clip(name: str, views: Sequence[ChosenView], house: House) -> Clip:
 def _noticed(
     view: ChosenView, items: dict[str, Item]
 ) -> Iterable[tuple[dict[str, Any], str, Item]]:
-    """Rows of a view with a noun and enough pixels to be noticed; not the building, nothing outside."""
+    """Rows of noticeable items of a view with a noun, without the building and the outdoors."""
     for row in view.facts["instances"]:
         item = items.get(str(row["item"]))
         if item is None or item.is_outside or item.kind.is_structure or not item.surfaces:

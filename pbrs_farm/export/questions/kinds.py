@@ -1,8 +1,8 @@
-"""The kinds of questions about space: what each asks, how it is worded, and its answers; no effects.
+"""The kinds of questions about space: their subjects, wording and answers; no effects.
 
 The kinds and their names are those of VSI-Bench (Yang et al. 2025, "Thinking in Space"). A kind's
-`drafts` gives what can be asked of a clip without doubt: things with one name, seen well, with answers
-that are no matter of a hand's breadth.
+`drafts` gives the unambiguous questions about a clip: items with a unique name, clearly visible, and
+answers that do not depend on small distances.
 """
 
 from __future__ import annotations
@@ -20,15 +20,17 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.export.nouns import plural
 from pbrs_farm.export.questions.clips import WHOLE, Clip, Thing
 
-_MOST_TRIED: Final = 60  # combinations of things that are looked at, of a clip and kind
-_MOST_WAYS: Final = 600  # that are looked at, since few are free
-_LEAST_GAP_M: Final = 0.3  # of a distance that is asked for
-_CLEARLY: Final = 1.25  # the second nearest is so much farther than the nearest ...
-_CLEARLY_M: Final = 0.25  # ... and by so many metres
-_STEP_APART_M: Final = 0.7  # between the middles of things that a direction is asked of
-_MARGIN_DEG: Final = 15.0  # that a direction keeps from the border to the next one
-_LATER_FRAMES: Final = 5  # a thing that comes later is not even noticed so many frames before
-# Nouns that some would count together.
+_MOST_TRIED: Final = 60  # maximum combinations of items tried, per clip and kind
+_MOST_WAYS: Final = 600  # the same for routes, since few are free
+_LEAST_GAP_M: Final = 0.3  # minimum distance in a question
+_CLEARLY: Final = 1.25  # minimum ratio of the second nearest distance to the nearest ...
+_CLEARLY_M: Final = 0.25  # ... and minimum difference, metres
+_STEP_APART_M: Final = 0.7  # minimum distance between the centres of items in a direction question
+_MARGIN_DEG: Final = 15.0  # minimum angle between a direction and the boundary to the next one
+_LATER_FRAMES: Final = (
+    5  # minimum frames from the first view of an item to the first pixel of the next
+)
+# Nouns that some people would count together.
 _LOOK_ALIKE: Final = (
     frozenset({"bookshelf", "set of shelves"}),
     frozenset({"table", "desk", "counter"}),
@@ -36,7 +38,7 @@ _LOOK_ALIKE: Final = (
     frozenset({"chair", "stool", "bench"}),
     frozenset({"bag", "basket", "box"}),
 )
-# Nouns of which one means the whole, another a part: a sink's bowl or its cabinet, one curtain or both.
+# Nouns with an ambiguous extent: a sink's bowl or its cabinet, one curtain or both.
 _UNMEASURED: Final = frozenset({"sink", "curtain", "set of curtains"})
 _SIDES: Final = ("left", "right")
 _SIDES_OR_BACK: Final = ("left", "right", "back")
@@ -45,11 +47,11 @@ _QUADRANTS: Final = ("front-left", "front-right", "back-left", "back-right")
 
 @dataclass(frozen=True, slots=True)
 class Draft:
-    """A question that may be asked: the words of its template, its answer, and what it is about."""
+    """A possible question: the words of its template, its answer, and its instances."""
 
     words: dict[str, str]
     answer: str  # a number, or one of options
-    options: tuple[str, ...]  # () where the answer is a number
+    options: tuple[str, ...]  # () for a number
     about: tuple[int, ...]  # instances, in the order of the words
 
 
@@ -57,8 +59,8 @@ class Draft:
 class QuestionKind:
     """name: of VSI-Bench. styles: templates with the fields of Draft.words and {here}.
 
-    answers: all that there are, where they are the same few for each question: how often they are right
-    differs by two at most.
+    answers: all possible answers, if every question has the same few; the counts of right answers then
+    differ by two at most.
     """
 
     name: str
@@ -71,7 +73,7 @@ class QuestionKind:
 def _tried(
     rng: random.Random, things: Sequence[Thing], n: int, most: int = _MOST_TRIED
 ) -> Iterator[tuple[Thing, ...]]:
-    """Ordered choices of n things, each at most once, in a drawn order."""
+    """Distinct ordered choices of n items, in random order."""
     done: set[tuple[int, ...]] = set()
     if len(things) < n:
         return
@@ -89,7 +91,7 @@ def _tried(
 
 
 def _counts(clip: Clip, _rng: random.Random) -> Iterator[Draft]:
-    """How many there are of a noun, from two on, where nothing that looks alike is called otherwise."""
+    """Number of items of a noun, at least two, unless the clip has look-alikes of another noun."""
     nouns = {thing.noun for thing in clip.things}
     for noun, same in clip.by_noun.items():
         is_alike = any(noun in group and len(group & nouns) > 1 for group in _LOOK_ALIKE)
@@ -98,7 +100,7 @@ def _counts(clip: Clip, _rng: random.Random) -> Iterator[Draft]:
 
 
 def _distances(clip: Clip, rng: random.Random) -> Iterator[Draft]:
-    """Metres between the nearest places of two things."""
+    """Gap between two items, metres."""
     for a, b in _tried(rng, clip.single, 2):
         gap = clip.gap_m(a, b)
         if gap >= _LEAST_GAP_M:
@@ -107,7 +109,7 @@ def _distances(clip: Clip, rng: random.Random) -> Iterator[Draft]:
 
 
 def _sizes(clip: Clip, _rng: random.Random) -> Iterator[Draft]:
-    """Centimetres of the longest side of a thing that is seen nearly whole."""
+    """Longest side of an almost fully visible item, centimetres."""
     for thing in clip.single:
         if thing.noun in _UNMEASURED:
             continue
@@ -116,14 +118,14 @@ def _sizes(clip: Clip, _rng: random.Random) -> Iterator[Draft]:
 
 
 def _room_sizes(clip: Clip, _rng: random.Random) -> Iterator[Draft]:
-    """Square metres of floor of the rooms that the camera enters."""
+    """Floor area of the rooms entered by the camera, square metres."""
     area = sum(float(shapely.Polygon(room.polygon).area) for room in clip.rooms_entered)
     if area > 0:
         yield Draft({}, f"{area:.1f}", (), ())
 
 
 def _nearest(clip: Clip, rng: random.Random) -> Iterator[Draft]:
-    """Which of four things is nearest to a fifth."""
+    """The nearest of four items to a fifth."""
     for target, *candidates in _tried(rng, clip.single, 5):
         gaps = sorted((clip.gap_m(target, candidate), candidate.noun) for candidate in candidates)
         nearest, second = gaps[0][0], gaps[1][0]
@@ -137,9 +139,9 @@ def _nearest(clip: Clip, rng: random.Random) -> Iterator[Draft]:
 
 
 def bearing_deg(stand: F64, face: F64, to: F64) -> float:
-    """Degrees, in plan, from the way that one faces to a place: 0 ahead, 90 right, -90 left.
+    """Bearing of `to` in plan, degrees, seen from `stand` in the direction of `face`: 0 ahead, 90 right.
 
-    stand, face, to: (2,) x and z in metres; world y is up and right-handed.
+    stand, face, to: (2,) x and z in metres; world y is up and right-handed. Left is negative.
     """
     ahead, aim = face - stand, to - stand
     right = np.array([-ahead[1], ahead[0]])
@@ -151,7 +153,7 @@ def _side(bearing: float) -> str:
 
 
 def _left_or_right(bearing: float, margin_deg: float) -> str:
-    """ "" where it is too near to straight ahead or straight back."""
+    """left or right; "" if too close to straight ahead or straight back."""
     return _side(bearing) if margin_deg <= abs(bearing) <= 180 - margin_deg else ""
 
 
@@ -170,10 +172,9 @@ def _quadrant(bearing: float, margin_deg: float) -> str:
 def _directions(
     answer_of: Callable[[float, float], str], options: tuple[str, ...]
 ) -> Callable[[Clip, random.Random], Iterator[Draft]]:
-    """Where a third thing is for one who stands by a first and faces a second.
+    """Direction of a third item, for a person next to the first who faces the second.
 
-    The answer is the same wherever by the first one stands: at its middle, by a margin, and at each of
-    its corners.
+    The answer holds at the first item's centre, by a margin, and at each of its corners.
     """
 
     def drafts(clip: Clip, rng: random.Random) -> Iterator[Draft]:
@@ -196,7 +197,7 @@ def _directions(
 
 
 def _turn(before: Thing, at: Thing, after: Thing) -> str:
-    """The turn at a thing on the way from one to the next; "" where no word fits."""
+    """The turn at an item between two others; "" if no word fits."""
     way = at.middle - before.middle
     bearing = bearing_deg(at.middle, at.middle + way, after.middle)
     if abs(bearing) >= 180 - 2 * _MARGIN_DEG:
@@ -206,7 +207,7 @@ def _turn(before: Thing, at: Thing, after: Thing) -> str:
 
 
 def _routes(clip: Clip, rng: random.Random) -> Iterator[Draft]:
-    """The turns of a way over one or two things to a last one."""
+    """The turns of a route over one or two items to a last one."""
     turns = ("turn left", "turn right", "turn back")
     places = [thing for thing in clip.single if clip.stands_on_floor(thing)]
     for n in (3, 4):
@@ -238,7 +239,7 @@ def _four_of(rng: random.Random, answer: str, turns: tuple[str, ...]) -> list[st
 
 
 def _orders(clip: Clip, rng: random.Random) -> Iterator[Draft]:
-    """In which order four things come into view first."""
+    """Order of the first appearance of four items."""
     for chosen in _tried(rng, clip.single, 4):
         by_time = sorted(chosen, key=lambda t: t.first_seen or 0)
         if any(

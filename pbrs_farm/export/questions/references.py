@@ -1,6 +1,6 @@
-"""Referring expressions: phrases that fit exactly one thing of a picture.
+"""Referring expressions: phrases that fit exactly one item of a picture.
 
-Effects: reads the view's albedo and depth, where it has them.
+Effects: reads the view's albedo and depth, if present.
 """
 
 from __future__ import annotations
@@ -22,17 +22,15 @@ from pbrs_farm.core.house import Material, MaterialKind
 from pbrs_farm.core.mesh import face_areas, triangle_corners
 from pbrs_farm.export.questions.clips import Clip, Thing, is_countable
 
-_APART: Final = (
-    0.05  # of the picture's width: things beside each other have their middles so far apart
-)
+_APART: Final = 0.05  # minimum horizontal distance between centres of items side by side, share of the picture's width
 _NEARER_M: Final = 0.3
-_ON_M: Final = 0.05  # between a thing's bottom and the top of what it stands on
-_OF_COLOUR: Final = 0.7  # share of a thing's pixels from which it has that colour
-_OF_ANOTHER: Final = 0.3  # another thing of its name has less of that colour
-_COLOURS_APART: Final = (
-    60.0  # of 255, between the mean colours of things of a name that colours tell apart
+_ON_M: Final = 0.05  # maximum gap between an item and its support
+_OF_COLOUR: Final = 0.7  # minimum share of an item's pixels for a colour
+_OF_ANOTHER: Final = 0.3  # maximum share of that colour in another item of the same noun
+_COLOURS_APART: Final = 60.0  # of 255, minimum distance between the mean colours of items of a noun
+_OF_NO_COLOUR: Final = (
+    0.3  # minimum share of metal, mirror or glass in the surface of an item without a colour
 )
-_OF_NO_COLOUR: Final = 0.3  # share of a thing's surface that is metal, mirror or glass, from which no albedo is its colour
 _ORDINALS: Final = ("first", "second", "third", "fourth", "fifth", "sixth")
 
 
@@ -45,7 +43,7 @@ class Reference:
 
 
 class _Picture:
-    """What phrases are made of: the things of a picture, where they stand in it, colours, depths."""
+    """Input of the phrases: the items of a picture, with positions, colours and depths."""
 
     def __init__(self, clip: Clip) -> None:
         self.clip = clip
@@ -58,7 +56,7 @@ class _Picture:
 
     @cached_property
     def depth_m(self) -> F64 | None:
-        """(H, W) metres along the axis, NaN where there is none; None without the layer."""
+        """(H, W) metres along the axis, NaN for unknown depth; None without the layer."""
         if self.view.entry.file("depth.png") is None:
             return None
         depth = self.view.array("depth").astype(np.float64) / 1000
@@ -72,12 +70,12 @@ class _Picture:
         return _colour_words(self.view.array("albedo")[..., :3])
 
     def column(self, thing: Thing) -> float:
-        """The middle of its box in the picture, as a share of the width."""
+        """Centre of an item's box in the picture, as a share of the width."""
         box = self.rows[thing.instance]["box2d"]
         return float(box[0] + box[2]) / 2 / float(self.view.facts["width_px"])
 
     def distance_m(self, thing: Thing) -> float:
-        """The median depth of its pixels; NaN where it has none."""
+        """Median depth of an item's pixels; NaN if unknown."""
         if self.depth_m is None:
             return float("nan")
         depths = self.depth_m[self.instance == thing.instance]
@@ -85,7 +83,7 @@ class _Picture:
         return float(np.median(depths)) if len(depths) else float("nan")
 
     def colour_shares(self, thing: Thing) -> Counter[str]:
-        """Colour -> share of its pixels; none of what shows its surroundings or shines as a metal."""
+        """Colour -> share of an item's pixels; empty for mirrors, glass and metals."""
         if self.colour_words is None or self._mirrors(thing):
             return Counter()
         words = self.colour_words[self.instance == thing.instance]
@@ -93,12 +91,12 @@ class _Picture:
         return Counter({name: float(counts[k]) for k, name in enumerate(_COLOURS)})
 
     def mean_colour(self, thing: Thing) -> F64:
-        """(3,) sRGB of 8 bits, the mean of its albedo."""
+        """(3,) 8-bit sRGB, the mean of an item's albedo."""
         albedo = self.view.array("albedo")[..., :3]
         return np.asarray(albedo[self.instance == thing.instance].mean(0), np.float64)
 
     def _mirrors(self, thing: Thing) -> bool:
-        """Much of its surface is metal, mirror or glass, whose albedo is not what one sees."""
+        """True if much of its surface is metal, mirror or glass, whose albedo is not the visible colour."""
         materials = self.clip.house.materials
         areas = [
             (
@@ -156,11 +154,10 @@ def _colour_word(*cell: int) -> str:
 
 
 def references_of(clip: Clip) -> list[Reference]:
-    """Phrases for the things of a picture that are seen well, each true of one thing alone.
+    """Phrases for the clearly visible items of a picture, each true of one item only.
 
-    By class alone where there is one of it, by colour, by side and order, by what it stands on, and by
-    nearness to the camera. Things of the same name that are hardly seen take part: a phrase is given
-    only where none of them fits it.
+    By noun if it is unique, by colour, by side and order, by support, and by distance from the camera.
+    Hardly visible items of the same noun are considered: a phrase must not fit any of them.
     """
     picture = _Picture(clip)
     groups: dict[str, list[Thing]] = {}
@@ -230,7 +227,7 @@ def _by_colour(
 
 
 def _is_of_another_colour(picture: _Picture, thing: Thing, namesakes: Sequence[Thing]) -> bool:
-    """Than all others of its name, so that no two shades beside a border of two words tell them apart."""
+    """True if its mean colour differs clearly from all namesakes', not just by a shade at a word's boundary."""
     mean = picture.mean_colour(thing)
     other_colours = (picture.mean_colour(t) for t in namesakes if t is not thing)
     return all(np.linalg.norm(colour - mean) >= _COLOURS_APART for colour in other_colours)
@@ -243,12 +240,12 @@ def _by_support(
         if support.instance not in singles or support.noun == noun:
             continue
         on = [t for t in namesakes if _stands_on(t, support)]
-        # All that may stand on it are known: one, and the others do not.
+        # Every item that could be on the support is in namesakes, and only one is.
         if len(on) == 1 and len(namesakes) > 1:
             yield f"the {noun} on the {support.noun}", on[0]
 
 
 def _stands_on(a: Thing, b: Thing) -> bool:
-    """The first's bottom is at the height of the second's top, or within it, its middle above it."""
+    """True if b supports a: a's bottom is at the height of b's top, and a's centre is above b."""
     low, top = float(a.item.bounds[0, 1]), float(b.item.bounds[1, 1])
     return abs(low - top) <= _ON_M and bool(b.plan.contains(shapely.Point(*a.middle)))

@@ -1,4 +1,4 @@
-"""What packed views say of themselves: README.md, croissant.json, the rest of dataset.json.
+"""Metadata of packed views: README.md, croissant.json, the rest of dataset.json.
 
 Effects: reads the table of each view and the source of each home.
 """
@@ -38,7 +38,7 @@ class HomeFacts:
 
 @dataclass(frozen=True, slots=True)
 class RootFacts:
-    """What is true of the packed views of an output root."""
+    """Facts about the packed views of an output root."""
 
     homes: tuple[HomeFacts, ...]
     credits: tuple[str, ...]  # lines that every product must carry

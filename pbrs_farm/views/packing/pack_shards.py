@@ -29,7 +29,7 @@ from pbrs_farm.views.views import Views
 
 @dataclass(frozen=True, slots=True)
 class Packed:
-    """What was packed."""
+    """The result of packing."""
 
     n_views: dict[str, int]  # split -> views
     n_files: int
@@ -46,10 +46,10 @@ def pack(
     form: str = "shards",
     tell: Callable[[str], None] = lambda _line: None,
 ) -> Packed:
-    """Write the views of an output root that have all that packing asks for to the new folder out.
+    """Write the views of an output root that have all requested layers to the new folder out.
 
-    tell: called with a line as each shard is written. Raises BadInput for a root that cannot be
-    packed, a view that is damaged, or an out that holds something.
+    tell: called with a line as each shard is written. Raises BadInput if the root cannot be packed, a
+    view is damaged, or out is not empty.
 
     >>> frame.save("out/batch")
     >>> packing = pf.Packing(layers=("colour", "depth"), modes=("opengl_dl",))

@@ -1,4 +1,4 @@
-"""The parts of a view as they are packed: JSON, colour of each mode, labels. Effects: reads the view."""
+"""The packed parts of a view: JSON, colour of each mode, labels. Effects: reads the view."""
 
 from __future__ import annotations
 

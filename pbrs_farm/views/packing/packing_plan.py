@@ -41,7 +41,7 @@ class Packing:
             object.__setattr__(self, name, as_words(getattr(self, name)))
         check_fields(self)
         for mode in self.modes:
-            SampleRequest(self.layers, mode, size=self.size)  # says what is wrong
+            SampleRequest(self.layers, mode, size=self.size)  # raises BadInput for invalid values
         if self.colour not in COLOURS:
             raise BadInput("colour", self.colour, "no such form", hint=f"of {', '.join(COLOURS)}")
         if self.views_per_shard < 1 or not 1 <= self.quality <= 100:

@@ -107,7 +107,7 @@ def _array_column(stack: NDArray[Any]) -> pa.Array:
 
 
 def croissant_kind(column: pa.DataType) -> str:
-    """What a column holds, in Croissant's words."""
+    """The Croissant data type of a column."""
     if column == PICTURE:
         return "sc:ImageObject"
     return "sc:Integer" if pa.types.is_list(column) else "sc:Text"

@@ -17,7 +17,7 @@ _MOST_HOMES: Final = 100  # rows of the card
 
 
 def card(views: Views, packing: Packing, facts: RootFacts, *, form: str) -> str:
-    """README.md: front matter that Hugging Face reads, what is in it, how to load it, its limits."""
+    """README.md: front matter for Hugging Face, contents, how to load them, limits."""
     size = "x".join(map(str, packing.size)) if packing.size else "the size it was rendered in"
     arrays = [
         f"| {n} | {STORED[n].dtype} | {STORED[n].unit} |" for n in array_names(packing.layers)
