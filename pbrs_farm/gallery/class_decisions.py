@@ -15,22 +15,23 @@ from pbrs_farm.core.record import Record
 from pbrs_farm.core.shown_text import shown
 from pbrs_farm.read.common.furniture_classes import CLASS_TAG
 
-_RULES: Final = ("source", "catalogue", "element", "name", "group", "id", "inner-word")  # by trust
-_STRUCTURE: Final = frozenset({"wall", "floor", "ceiling", "ground"})  # kinds, always the source's
+# Most reliable first.
+_RULES: Final = ("source", "catalogue", "element", "name", "group", "id", "inner-word")
+_STRUCTURE: Final = frozenset({"wall", "floor", "ceiling", "ground"})  # classified by the source
 
 
 class ClassDecision(Record):
-    """What one rule made of all items of one name."""
+    """The class that one rule assigned to all items of one name."""
 
-    rule: str  # of _RULES, or size or none
-    name: str  # NYU40
-    item: str  # the item's name
+    rule: str  # one of _RULES, or size or none
+    name: str  # name of the NYU40 class
+    item: str
     source_class: str
     n_items: int
 
 
 def class_decisions(items: Iterable[Mapping[str, Any]]) -> tuple[ClassDecision, ...]:
-    """The decisions behind the items' classes, the least sure first; walls and floors left out.
+    """The decisions behind the items' classes, least reliable first, without walls and floors.
 
     items: rows as in house.json.
     """
@@ -54,10 +55,10 @@ def class_decisions(items: Iterable[Mapping[str, Any]]) -> tuple[ClassDecision, 
 
 
 def decisions_text(decisions: tuple[ClassDecision, ...]) -> str:
-    """The decisions as a Markdown table, and how many items each rule decided.
+    """The decisions as a Markdown table, with the number of items per rule.
 
-    In the order given. What ends as otherprop is counted in the last line, since a name that should
-    have a class of its own shows there.
+    Rows keep their order. The last line counts the items of class otherprop, since some of their names
+    may deserve a better class.
     """
     by_rule = Counter[str]()
     for d in decisions:
@@ -68,7 +69,7 @@ def decisions_text(decisions: tuple[ClassDecision, ...]) -> str:
         for d in decisions
     ]
     n_items = sum(by_rule.values())
-    # Otherprop is where things without a class of their own end up.
+    # Otherprop is the class of items that match no other class.
     n_prop = sum(d.n_items for d in decisions if d.name == "otherprop")
     rules = ", ".join(f"{n} by {rule}" for rule, n in by_rule.most_common())
     return "\n".join([*lines, "", f"{n_items} items: {rules}; {n_prop} are otherprop"])

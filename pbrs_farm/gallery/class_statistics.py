@@ -1,4 +1,4 @@
-"""How often each class is seen in an output folder, and what has no class. Effects: reads files."""
+"""Frequency of each class in an output folder, and unmapped source classes. Effects: reads files."""
 
 from __future__ import annotations
 
@@ -19,28 +19,28 @@ from pbrs_farm.regular_files import read_regular
 
 
 class ClassRow(Record):
-    """How often one NYU40 class is seen."""
+    """Frequency of one NYU40 class."""
 
     nyu40: int
     name: str
-    pixel_share: float  # of the pixels of all images
-    n_images: int  # that see the class
-    n_instances: int  # in all images
+    pixel_share: float  # share of the pixels of all images
+    n_images: int  # number of images that contain the class
+    n_instances: int  # number of instances in all images
 
 
 class ClassStatistics(Record):
-    """Classes by pixel share, largest first; id 0 is what has no class or is nothing."""
+    """Classes by pixel share, largest first; id 0 means no class or no surface."""
 
     n_views: int
     classes_per_image: float  # mean, id 0 not counted
     rows: tuple[ClassRow, ...]
     unmapped: tuple[str, ...]  # "house: source class (items)" that became otherprop, as shown
-    decisions: tuple[ClassDecision, ...] = ()  # by which rule, over all houses
+    decisions: tuple[ClassDecision, ...] = ()  # decisions over all houses
 
     def text(self) -> str:
         """The statistics as a Markdown table and a list.
 
-        Sections for unmapped names and decisions are there only where there are some.
+        Sections for unmapped names and decisions are left out if empty.
         """
         lines = [
             f"{self.n_views} views, {self.classes_per_image:.1f} classes a view",
@@ -78,7 +78,7 @@ def class_statistics(folder: Path) -> ClassStatistics:
         for row in view.facts["instances"]:
             instances[int(row["nyu40"])] += 1
     total = pixels.sum()
-    # Read what the homes say of their items.
+    # Read the item tables of the homes.
     items = {
         house: json_object(folder / keys.house_key(house, "house.json")).get("items", [])
         for house in sorted({v.house.id for v in views})

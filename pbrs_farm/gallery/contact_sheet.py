@@ -23,16 +23,16 @@ from pbrs_farm.gallery.gallery_page import attributions, best_first
 from pbrs_farm.gallery.sheet_text import Font, draw_line
 from pbrs_farm.gallery.view_tiles import NOT_RENDERED, TILES, Tile, tiles_of
 
-TILE_PX: Final = 224  # longer edge
+TILE_PX: Final = 224  # longer edge of a tile
 _GAP_PX: Final = 6
 _MARGIN_PX: Final = 28
 PAPER: Final = (16, 18, 23)  # background, sRGB
 INK: Final = (236, 238, 242)  # text
-_FAINT: Final = (142, 149, 163)  # text of less weight
-_EMPTY: Final = (29, 32, 40)  # a tile that is missing
-_Chip = tuple[int, int]  # of the legend: left edge in px, NYU40 id
+_FAINT: Final = (142, 149, 163)  # secondary text
+_EMPTY: Final = (29, 32, 40)  # placeholder for a missing tile
+_Chip = tuple[int, int]  # legend entry: left edge in px, NYU40 id
 _BETWEEN_PX: Final = 8
-_LINE_PX: Final = 16  # of the caption
+_LINE_PX: Final = 16  # line height of the caption
 _MOST_LINES: Final = 6
 
 
@@ -41,10 +41,9 @@ def contact_sheet(
 ) -> bytes:
     """PNG bytes: a row of tiles for each of at most max_views views of an output folder.
 
-    made: view folder -> tiles of at most TILE_PX that are there already.
-    The views are spread over houses, then rooms, the best first. A tile that is missing says so; a
-    column that no view has is left out. Raises BadInput
-    if folder is no output folder or holds no view.
+    made: view folder -> existing tiles of at most TILE_PX.
+    The views are spread over houses, then rooms, the best first. A missing tile shows the reason;
+    empty columns are left out. Raises BadInput if folder is not an output folder or has no view.
     """
     # Choose the views and make their tiles.
     everything = best_first(views_of(folder))
@@ -53,7 +52,7 @@ def contact_sheet(
     views = spread_views(everything, max_views)
     tiles_of_view = made or {}
     rows = [(view, tiles_of_view.get(view.folder) or tiles_of(view, TILE_PX)) for view in views]
-    # A damaged layer is there, too: its tile says so.
+    # A damaged layer keeps its column: its tile shows the reason.
     rendered = {t.kind for _view, tiles in rows for t in tiles if t.missing != NOT_RENDERED}
     kinds = [kind for kind in TILES if kind in rendered]
     rows = [(view, [t for t in tiles if t.kind in rendered]) for view, tiles in rows]
@@ -84,17 +83,17 @@ def contact_sheet(
 
 
 def spread_views(views: Sequence[ViewEntry], max_views: int) -> list[ViewEntry]:
-    """At most max_views of views, taken in turn from each house and there from each room.
+    """Choose at most max_views of views, in turn from each house and, within it, from each room.
 
-    The result keeps the order of views. With fewer rooms than max_views several of a room are
-    taken; equal input gives equal choice, nothing is drawn.
+    The result keeps the order of views. With fewer rooms than max_views, several views of a room are
+    taken. The choice is deterministic.
     """
     # Group by house and room.
     rooms: dict[str, dict[str, list[ViewEntry]]] = defaultdict(lambda: defaultdict(list))
     for view in views:
         rooms[view.house.id][view.room_id].append(view)
     turns = {house: _in_turn(of_room.values()) for house, of_room in rooms.items()}
-    # Take in turn, then go back to the order they came in.
+    # Take in turn, then restore the original order.
     chosen = _in_turn(turns.values())[: max(max_views, 0)]
     places = {id(view): i for i, view in enumerate(views)}
     return sorted(chosen, key=lambda view: places[id(view)])
@@ -102,7 +101,7 @@ def spread_views(views: Sequence[ViewEntry], max_views: int) -> list[ViewEntry]:
 
 def _in_turn(lists: Iterable[Sequence[ViewEntry]]) -> list[ViewEntry]:
     """The first of each list, then the second of each, and so on."""
-    # Deal by position: a list that has ended is passed over.
+    # Interleave by position, skipping exhausted lists.
     columns = [list(x) for x in lists]
     longest = max((len(x) for x in columns), default=0)
     return [x[i] for i in range(longest) for x in columns if i < len(x)]
@@ -133,7 +132,7 @@ def _font(size: int) -> Font:
 def _draw_header(
     draw: ImageDraw.ImageDraw, views: Sequence[ViewEntry], n_shown: int, kinds: Sequence[Layer]
 ) -> None:
-    # Write what the sheet shows, then a title over each column.
+    # Write the summary, then a title over each column.
     n_houses = len({view.house.id for view in views})
     draw.text((_MARGIN_PX, 22), "pbrs_farm", INK, _font(30))
     part = "" if n_shown == len(views) else f"{n_shown} of "
@@ -147,7 +146,7 @@ def _draw_header(
 
 
 def modes_text(kinds: Sequence[Layer]) -> str:
-    """ "two lighting modes, " of the columns; "" where there is none."""
+    """ "two lighting modes, " for the columns' modes; "" without any."""
     n_modes = sum(kind.name in {mode.value for mode in ALL_MODES} for kind in kinds)
     number = ("", "one", "two", "three", "four")[n_modes]
     return f"{number} lighting mode{'s'[: n_modes != 1]}, " if n_modes else ""
@@ -170,14 +169,14 @@ def _draw_row(
 def _draw_tile(
     sheet: Image.Image, draw: ImageDraw.ImageDraw, at: tuple[int, int], tile: Tile
 ) -> None:
-    # Say in an empty frame why a tile is missing.
+    # Write the reason into the frame of a missing tile.
     if tile.pixels is None:
         size = (TILE_PX, TILE_PX * 3 // 4)
         draw.rectangle([at, (at[0] + size[0] - 1, at[1] + size[1] - 1)], _EMPTY)
         middle = (at[0] + size[0] // 2, at[1] + size[1] // 2)
         draw.text(middle, tile.missing, _FAINT, _font(15), anchor="mm")
         return
-    # Lay the note over the picture's corner, on a dark ground.
+    # Draw the note over the picture's corner, on a dark background.
     sheet.paste(Image.fromarray(tile.pixels), at)
     if tile.note:
         box = draw.textbbox((at[0] + 6, at[1] + 5), tile.note, _font(12))
@@ -188,7 +187,7 @@ def _draw_tile(
 def _legend_rows(classes: Sequence[int], width: int) -> list[list[_Chip]]:
     """The legend's rows, each as wide as width allows."""
     rows: list[list[_Chip]] = []
-    x = width  # where the next chip would begin
+    x = width  # left edge of the next chip
     for nyu40 in classes:
         # Measure a chip: its square, its word and the gap behind it.
         length = 22 + round(_font(14).getlength(NYU40_NAMES[nyu40])) + 22

@@ -1,6 +1,6 @@
-"""The HTML gallery of a finished output folder: pages of 5 MB at most, no network. Effects: reads files.
+"""HTML gallery of a finished output folder: pages of at most 5 MB, no network. Effects: reads files.
 
-Thumbnails are inside a page, so that one can be sent by mail; a click shows the full picture, linked
+Thumbnails are embedded, so that a page can be sent by mail; a click shows the full picture, linked
 relative to the folder.
 """
 
@@ -26,26 +26,26 @@ from pbrs_farm.gallery.view_tiles import TILES, Tile, tiles_of
 
 TEMPLATE: Final = ("pbrs_farm.gallery", "gallery.html")  # package and file of the pages
 THUMBNAIL_PX: Final = 320  # longer edge
-MAX_TILE_BYTES: Final = 11_000  # of a thumbnail
+MAX_TILE_BYTES: Final = 11_000  # maximum size of a thumbnail
 MAX_PAGE_BYTES: Final = 5_000_000
 
-# Views of a page: nine tiles each, with base64's third on top and 6 kB of words, stay below the bound.
+# Views per page: nine tiles each, base64's extra third and 6 kB of text stay below the limit.
 PAGE_VIEWS: Final = 35
-_BLACK_LX: Final = 0.05  # of daylight on a room's floor: a room without a window has less
+_BLACK_LX: Final = 0.05  # daylight on the floor below which a room is black, lux
 
 
 def page_name(number: int) -> str:
-    """The file of a page, counted from 1."""
+    """The file name of a page, counted from 1."""
     return "index.html" if number == 1 else f"index-{number}.html"
 
 
 @dataclass(frozen=True, slots=True)
 class CardTiles:
-    """What a view's card shows of its tiles: their pixels are dropped, a house may have many views."""
+    """The tiles of a view's card without pixels, since a house may have many views."""
 
     tiles: tuple[dict[str, Any], ...]  # for the template, pictures as URLs
     classes: tuple[tuple[int, float], ...]  # (NYU40 id, share), largest first
-    shape: tuple[int, ...] | None  # of the first picture there is
+    shape: tuple[int, ...] | None  # of the first available picture
 
 
 def card_tiles(tiles: Sequence[Tile]) -> CardTiles:
@@ -97,7 +97,7 @@ def _page(
     cards: list[dict[str, Any]] = []
     aspect = "4 / 3"
     for view in views:
-        # Give every tile the shape of the first picture there is.
+        # Give every tile the shape of the first available picture.
         tiles = made.get(view.folder) or card_tiles(tiles_of(view, THUMBNAIL_PX))
         if not cards and tiles.shape is not None:
             aspect = f"{tiles.shape[1]} / {tiles.shape[0]}"
@@ -119,16 +119,15 @@ def _page(
 
 
 def _near_pages(number: int, n_pages: int) -> list[int]:
-    """The pages a page links to: the first, the last, and those around it; none of a single one."""
+    """The page numbers linked from a page: first, last and neighbours; empty for a single page."""
     near = {1, n_pages, *range(number - 3, number + 4)}
     return sorted(k for k in near if 1 <= k <= n_pages) if n_pages > 1 else []
 
 
 def best_first(views: Iterable[ViewEntry]) -> list[ViewEntry]:
-    """The views house by house, each with its best room first and there with its best view.
+    """The views house by house, each with its best room first, and within it the best view.
 
-    By their score; one that daylight leaves black comes after all others. Frames of a sequence keep
-    their order.
+    Ordered by score; views left black by daylight come last. Frames of a sequence keep their order.
     """
     houses: dict[str, dict[str, list[ViewEntry]]] = {}
     for view in views:
@@ -142,7 +141,7 @@ def best_first(views: Iterable[ViewEntry]) -> list[ViewEntry]:
 
 
 def _rank(view: ViewEntry) -> tuple[bool, float]:
-    """The lower, the earlier a view is shown."""
+    """Sort key of a view: low ranks come first."""
     score = view.facts.get("score")
     light = (view.facts.get("modes") or {}).get("light") or {}
     lux = light.get("floor_lux") or {}
@@ -162,7 +161,7 @@ def _options(pairs: Iterable[tuple[str, str]]) -> list[tuple[str, str]]:
 
 def _card(root: Path, view: ViewEntry, tiles: CardTiles, reason: str | None) -> dict[str, Any]:
     """A view for the template. reason: why it is rejected, "" if kept, None if nobody judged it."""
-    # Search by home, room, view and the classes that are seen.
+    # Search text: home, room, view and visible classes.
     names = " ".join(NYU40_NAMES[i] for i, _share in tiles.classes)
     words = f"{view.house.id} {view.house.name} {view.room_name} {view.id} {names}"
     return {
@@ -182,7 +181,7 @@ def _card(root: Path, view: ViewEntry, tiles: CardTiles, reason: str | None) -> 
 def _tile_url(tile: Tile) -> str:
     if tile.pixels is None:
         return ""
-    # Flat colours stay exact as a PNG with a palette, where that is small enough.
+    # Keep flat colours exact with a palette PNG if it is small enough.
     if tile.kind.is_label:
         data = _palette_png(tile.pixels)
         if len(data) <= MAX_TILE_BYTES:
@@ -191,29 +190,29 @@ def _tile_url(tile: Tile) -> str:
 
 
 def data_url(data: bytes, kind: str) -> str:
-    """The bytes of a picture as a URL that needs no network; kind: "png" or "jpeg".
+    """The bytes of a picture as a data URL; kind: "png" or "jpeg".
 
-    For pages that are one file. A third longer than the bytes.
+    For self-contained pages. A third longer than the bytes.
     """
     return f"data:image/{kind};base64,{base64.b64encode(data).decode()}"
 
 
 def small_jpeg(pixels: Srgb8Image, max_bytes: int) -> bytes:
-    """JPEG bytes at the best of four qualities that keeps within max_bytes; else made smaller.
+    """JPEG bytes at the best of four qualities within max_bytes; else scaled down.
 
-    Below 16 px an edge it gives up and returns what it has, which may be larger than max_bytes.
+    Below 16 px an edge the result may be larger than max_bytes.
     """
     for quality in (84, 74, 62, 48):
         data = images.jpeg_from_array(pixels, quality)
         if len(data) <= max_bytes:
             return data
-    # Three quarters of the size, until it fits or cannot be made smaller.
+    # Scale to three quarters until it fits or is minimal.
     smaller = images.thumbnail(pixels, max_edge_px=max(16, max(pixels.shape[:2]) * 3 // 4))
     return small_jpeg(smaller, max_bytes) if smaller.shape != pixels.shape else data
 
 
 def _palette_png(pixels: Srgb8Image) -> bytes:
-    """PNG bytes with a palette, exact; without one where there are more than 256 colours."""
+    """PNG bytes, exact; with a palette for at most 256 colours."""
     # Number each colour by its bytes, then index the numbers that occur.
     keys = pixels.astype(np.uint32) @ np.array([65536, 256, 1], np.uint32)
     colours, index = np.unique(keys, return_inverse=True)

@@ -37,5 +37,5 @@ def compile_template(package: str, template: str) -> Template:
 
 
 def _finalized(value: Any) -> Any:
-    """A string without what steers a browser's text: direction overrides, control characters."""
+    """A string without control characters and direction overrides."""
     return printable(value) if type(value) is str else value

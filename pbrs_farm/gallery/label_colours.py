@@ -1,4 +1,4 @@
-"""Layers as colours that a person can read, each as the table of layers says it is shown; no effects."""
+"""Layers as readable colours, each drawn by its entry in the table of layers; no effects."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ _NEAR_TO_FAR: Final = np.array(
 
 
 def depth_range_m(depth_mm: NDArray[np.integer]) -> tuple[float, float]:
-    """Metres of the 1st and 99th percentile of depth_mm where it is known; (0, 1) if it is nowhere.
+    """Metres of the 1st and 99th percentile of the valid depths; (0, 1) if none is valid.
 
-    depth_mm is an array of any shape, whole millimetres, 0 = unknown. The range is at least 1 mm,
-    so that it can be divided by. Percentiles, so that one far window does not darken a room.
+    depth_mm is an array of any shape, whole millimetres, 0 = unknown. The range is at least 1 mm, so
+    that it can be a divisor. With percentiles, one far window does not darken a room.
     """
     valid = depth_mm[depth_mm > 0]
     if not valid.size:
@@ -34,7 +34,7 @@ def depth_range_m(depth_mm: NDArray[np.integer]) -> tuple[float, float]:
 def depth_colours(
     depth_mm: NDArray[np.integer], near_m: float | None = None, far_m: float | None = None
 ) -> Srgb8Image:
-    """(H, W, 3): pale where near, dark blue where far, grey where nothing is (0).
+    """(H, W, 3): pale = near, dark blue = far, grey = no depth (0).
 
     near_m, far_m: the ends of the scale; depth_range_m of the picture when None.
     """
@@ -49,23 +49,23 @@ def depth_colours(
     )
     picked = np.rint(table[np.rint(share * 255).astype(np.intp)])
     colours = np.asarray(picked, np.uint8)
-    colours[depth_mm == 0] = (58, 58, 62)  # nothing: a grey the ramp has not
+    colours[depth_mm == 0] = (58, 58, 62)  # no depth: a grey outside the ramp
     return colours
 
 
 def semantic_colours(nyu40: NDArray[np.integer]) -> Srgb8Image:
-    """(H, W, 3) uint8 colours of NYU40 ids (H, W); an id above 40 is shown as none.
+    """(H, W, 3) uint8 colours of NYU40 ids (H, W); ids above 40 get the colour of no class.
 
-    NYU40_COLOURS of core/classes.py, which dataset.json and COCO's categories have, too.
+    The colours are NYU40_COLOURS of core/classes.py, as in dataset.json and COCO's categories.
     """
     return NYU40_COLOURS[np.where(nyu40 > 40, 0, nyu40)]
 
 
 def instance_colours(instance: NDArray[np.integer]) -> Srgb8Image:
-    """(H, W, 3) a colour per instance id, the same in every view; neighbouring ids lie far apart.
+    """(H, W, 3) a colour per instance id, the same in every view; neighbouring ids differ clearly.
 
-    instance is (H, W), 0 = nothing, which has the colour of no class. Colours repeat in large
-    scenes only nearly: two ids far apart may look alike. Do not decode ids from them.
+    instance is (H, W), 0 = nothing, which has the colour of no class. In large scenes two distant ids
+    may look alike: do not decode ids from colours.
     """
     ids = np.arange(int(instance.max(initial=0)) + 1)
     # Step hues by the golden ratio, and vary value and saturation, so neighbours differ.
@@ -80,14 +80,14 @@ def instance_colours(instance: NDArray[np.integer]) -> Srgb8Image:
 
 
 def flow_colours(flow: NDArray[Any], most_px: float | None = None) -> Srgb8Image:
-    """(H, W, 3): hue = direction of (H, W, 2) motion, colourful = far; white = none.
+    """(H, W, 3): hue = direction of (H, W, 2) motion, saturation = distance; white = no motion.
 
-    most_px: what is shown at full colour; the 99th percentile of the picture when None.
+    most_px: motion at full saturation; the 99th percentile of the picture when None.
     """
     length = np.linalg.norm(flow, axis=-1)
     most = max(float(np.percentile(length, 99)), 0.5) if most_px is None else most_px
     share = np.clip(length / most, 0, 1)[..., None]
-    # HSV to RGB with value 1: the hue's ring fades to white.
+    # HSV to RGB with value 1: hues fade to white.
     hue = np.arctan2(flow[..., 1], flow[..., 0]) / (2 * np.pi) % 1.0
     ring = np.clip(np.abs((hue[..., None] * 6 + [0, 4, 2]) % 6 - 3) - 1, 0, 1)
     return np.asarray(np.rint(255 * (1 - share * (1 - ring))), np.uint8)
@@ -111,9 +111,9 @@ def boundary_colours(boundary: NDArray[np.uint8]) -> Srgb8Image:
 
 
 def shown_colours(layer: Layer, stored: NDArray[Any]) -> Srgb8Image:
-    """(H, W, 3) uint8 sRGB of a layer's array as it is stored, drawn as layer.shown_as says.
+    """(H, W, 3) uint8 sRGB of a layer's stored array, drawn by layer.shown_as.
 
-    Raises KeyError for a layer that is no picture (radiance).
+    Raises KeyError for a layer without a picture (radiance).
     """
     return _SHOWN[layer.shown_as](stored)
 
@@ -129,7 +129,7 @@ def _depth_m_colours(metres: NDArray[Any]) -> Srgb8Image:
 
 
 def _disparity_colours(disparity: NDArray[Any]) -> Srgb8Image:
-    # What is near is large: turn it round.
+    # Invert: disparity is large near the camera.
     steps = disparity.astype(np.int64)
     return depth_colours(np.where(steps > 0, 4_000_000 // np.maximum(steps, 1), 0))
 

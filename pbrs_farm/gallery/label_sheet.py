@@ -1,4 +1,4 @@
-"""One view's labels for the eye: over the picture, magnified at an edge, with a legend.
+"""Sheet of one view's labels: over the picture, magnified at an edge, with a legend.
 
 Effects: reads picture files.
 """
@@ -21,7 +21,7 @@ from pbrs_farm.gallery.label_colours import semantic_colours
 from pbrs_farm.images import array_from_png
 from pbrs_farm.regular_files import read_regular
 
-_ZOOM: Final = 8  # of the magnified edge
+_ZOOM: Final = 8  # scale factor of the magnified edge
 _ROW_PX: Final = 24  # height of a row of the legend
 _CHIP_PX: Final = 190  # width of an entry of the legend
 
@@ -48,9 +48,9 @@ def legend(semantic: NDArray[Any], width_px: int) -> Srgb8Image:
     """(H', width_px, 3) a row of chips per class in semantic, largest share first.
 
     semantic is an array of NYU40 ids, of any shape; shares are of all its pixels, 0 included as a
-    class. The height follows from how many chips fit a row.
+    class. The height follows from the number of chips per row.
     """
-    # List the classes that are seen, largest first.
+    # List the visible classes, largest first.
     counts = np.bincount(semantic.reshape(-1), minlength=1)
     classes = [int(i) for i in np.argsort(-counts, kind="stable") if counts[i]]
     columns = max(1, width_px // _CHIP_PX)
@@ -90,9 +90,9 @@ def _overlaid(
 
 
 def _busiest(boundary: NDArray[Any]) -> tuple[slice, slice]:
-    """The window, an eighth of the picture each way, with the most boundary pixels in it."""
+    """The window, an eighth of the picture each way, with the most boundary pixels."""
     height, width = (max(1, n // _ZOOM) for n in boundary.shape)
-    # Sum over every window at once, from a summed-area table.
+    # Sum over all windows with a summed-area table.
     edges = np.pad((boundary > 0).astype(np.int64), ((1, 0), (1, 0))).cumsum(0).cumsum(1)
     inside = edges[height:, width:] - edges[:-height, width:] - edges[height:, :-width]
     inside += edges[:-height, :-width]

@@ -1,7 +1,7 @@
-"""Made homes as files of a folder, with a page of their plans. Effects: reads and writes that folder.
+"""Generated homes as files of a folder, with a page of their plans. Effects: reads and writes it.
 
-A home that is there is kept: its file says what it was made from, so that a command that was
-interrupted goes on, and what a person changed in it since stays.
+Existing homes are kept: their files record seed and options, so that an interrupted command resumes
+and later edits by a person survive.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from pbrs_farm.generate.programme import Programme
 from pbrs_farm.prepare.dress_catalogue import GENERATED, catalogue_of_words
 
 PAGE = "plans.html"
-_XML_BYTES = 4096  # of Home.xml: its properties come first
+_XML_BYTES = 4096  # length of the start of Home.xml that holds its properties
 
 
 @dataclass(frozen=True, slots=True)
 class Done:
-    """What became of one home."""
+    """The result for one home."""
 
     home: MadeHome
     is_new: bool
@@ -40,12 +40,12 @@ def make_homes(
 ) -> Iterator[Done]:
     """Write <name>.sh3d and <name>.svg of each home into folder, and plans.html at the end.
 
-    homes: seeds and families. programme: what a home must have, None for the family's own. n_jobs:
-    processes. Yields what became of each home: written, there already, or `fault`, why it could not
-    be made; one that fails does not stop the others.
+    homes: seeds and families. programme: requirements for every home, None for the family's own. n_jobs:
+    processes. Yields the result for each home: new, existing, or failed with the reason in `fault`; a
+    failure does not stop the others.
     """
     make_one = partial(_make, folder, programme)
-    # The page of plans is written even where a run is cut short.
+    # Write the page of plans even if the run is interrupted.
     try:
         if n_jobs > 1:
             with ProcessPoolExecutor(n_jobs, get_context("spawn")) as pool:
@@ -70,10 +70,10 @@ def _make(folder: Path, programme: Programme | None, home: MadeHome) -> Done:
 
 
 def write_home(path: Path, home: GeneratedHome) -> None:
-    """Write a home's file and the picture of its plan. Raises BadInput where another home lies.
+    """Write a home's file and the picture of its plan. Raises BadInput if path has a different home.
 
-    The .svg stands beside the file with its stem. A file that is there already must be of the same
-    origin and is kept as it is; its picture is drawn again.
+    The .svg has the same folder and stem. An existing file must have the same origin and is kept; its
+    picture is drawn again.
     """
     if path.exists():
         _check_same(path, home.origin)
@@ -86,8 +86,8 @@ def write_home(path: Path, home: GeneratedHome) -> None:
 def plans_page(folder: Path) -> str:
     """The HTML page of every plan in a folder, in the order of their seeds.
 
-    A plan is listed where both its .svg and its .sh3d are there. Shorter names come first, so that
-    seed 10 comes after 9.
+    A plan is listed if both its .svg and its .sh3d exist. Shorter names come first, so that seed 10
+    comes after 9.
     """
     names = [p.stem for p in folder.glob("*.svg") if p.with_suffix(".sh3d").exists()]
     names.sort(key=lambda name: (len(name), name))
@@ -95,7 +95,7 @@ def plans_page(folder: Path) -> str:
 
 
 def _check_same(path: Path, expected: str) -> None:
-    """Raise BadInput where a file was made from something else."""
+    """Raise BadInput if a file has a different origin."""
     try:
         with zipfile.ZipFile(path) as archive, archive.open("Home.xml") as file:
             head = file.read(_XML_BYTES)
@@ -111,7 +111,7 @@ def _check_same(path: Path, expected: str) -> None:
 
 
 def _write_home_file(path: Path, data: bytes) -> None:
-    """Write a file whole or not at all."""
+    """Write a file atomically."""
     scratch = path.with_name(f".{path.name}.part")
     try:
         scratch.write_bytes(data)

@@ -39,12 +39,12 @@ def _small_figure(frame: Frame) -> str:
     try:
         return figure_html(frame.id, frame.colour, _THUMB_PX)
     except BadInput as error:
-        # A damaged frame, or one with labels alone, does not hide the others.
+        # Show the error in its place, so that the other frames are visible.
         return f"<p>{html.escape(str(error))}</p>"
 
 
 def figure_html(title: str, rgb: NDArray[np.uint8], width_px: int) -> str:
-    """A picture (H, W, 3) sRGB of that width with its escaped title below, the bytes within the text.
+    """A picture (H, W, 3) sRGB of that width, embedded, with its escaped title below.
 
     The JPEG has twice the width for dense screens; its pixel values are not exact.
     """

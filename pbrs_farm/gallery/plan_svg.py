@@ -26,14 +26,14 @@ _MARGIN_M: Final = 0.6
 _PX_PER_M: Final = 60.0
 _LIVING, _SLEEPING, _COOKING, _WATER = "#f6eedd", "#efe6f2", "#fbe7d3", "#dcecf4"
 _PASSING, _KEEPING, _OUTSIDE = "#eeeeea", "#e6e6e0", "#e2efdd"
-_TEXT_M: Final = 0.3  # the height of letters
-_RAISED_M: Final = 1.2  # what hangs higher is drawn dashed
+_TEXT_M: Final = 0.3  # height of letters
+_RAISED_M: Final = 1.2  # height above which furniture is drawn dashed
 
 
 def plan_svg(storeys: Sequence[Storey], title: str, stair: Stair | None = None) -> str:
     """The text of an SVG file: rooms with names and areas, walls, doors, windows, furniture.
 
-    Storeys lie side by side, the lowest on the left; stair: between the first two.
+    Storeys are side by side, the lowest on the left; stair: between the first two.
     """
     points = [p for storey in storeys for wall in storey.plan.walls for p in wall.corners()]
     x0, z0 = (min(p[k] for p in points) - _MARGIN_M for k in (0, 1))
@@ -89,7 +89,7 @@ def _draw_stairs(root: Element, stair: Stair) -> None:
 
 
 def _tint(type_: RoomType) -> str:
-    """The colour of a room's floor, by what it is used for."""
+    """The floor colour of a room type."""
     match type_:
         case RoomType.LIVING | RoomType.STUDIO | RoomType.OFFICE:
             return _LIVING
@@ -121,7 +121,7 @@ def _draw_piece(root: Element, piece: PlacedPiece) -> None:
         stroke_dasharray="0.08 0.06" if is_high else "",
     )
     if not is_high:
-        # A line along the front says where it faces.
+        # Mark the front with a line.
         left, right = piece.corners[3], piece.corners[2]
         element(
             root,
@@ -166,7 +166,7 @@ def _draw_opening(root: Element, plan: Plan, opening: PlanOpening) -> None:
         return
     if opening.kind is OpeningKind.PASSAGE:
         return
-    # The leaf stands open into its room; an arc shows its way.
+    # Draw the leaf open into its room, and its swing as an arc.
     hinge, edge = (start, end) if opening.hinge_at_start else (end, start)
     nx, nz = _into(plan, opening, wall)
     open_at = (hinge[0] + nx * opening.width, hinge[1] + nz * opening.width)
@@ -184,7 +184,7 @@ def _draw_opening(root: Element, plan: Plan, opening: PlanOpening) -> None:
 
 
 def _into(plan: Plan, opening: PlanOpening, wall: PlanWall) -> Point:
-    """The unit normal of the wall that looks into the opening's room."""
+    """The unit normal of the wall that points into the opening's room."""
     nx, nz = wall.normal
     x, z = wall.at(opening.along)
     reach = wall.thickness / 2 + 0.1
@@ -193,7 +193,7 @@ def _into(plan: Plan, opening: PlanOpening, wall: PlanWall) -> Point:
 
 
 def _label(root: Element, room: PlanRoom, pieces: Iterable[PlacedPiece]) -> None:
-    """A room's name and area, where they cover least of its furniture."""
+    """Write a room's name and area at the place with the least furniture below."""
     lines = room.name, f"{room.area:.1f} m²"
     x0, z0, x1, z1 = room.bounds
     size = min(_TEXT_M, (x1 - x0) / max(len(room.name), 4) * 1.5)
@@ -236,6 +236,6 @@ def _around(piece: PlacedPiece) -> Rect:
 
 
 def _shared(a: Rect, b: Rect) -> float:
-    """Square metres that two rectangles share."""
+    """Area of the intersection of two rectangles, square metres."""
     width, depth = min(a[2], b[2]) - max(a[0], b[0]), min(a[3], b[3]) - max(a[1], b[1])
     return max(width, 0.0) * max(depth, 0.0)

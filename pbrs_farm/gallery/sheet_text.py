@@ -1,6 +1,6 @@
-"""A line of text in whatever script it is, each letter in the first font that has it. Effects: draws, opens fonts.
+"""Draw text of any script, each letter in the first font that has it. Effects: draws, opens fonts.
 
-Pillow's own font has Latin letters; what it lacks comes from fonts of the machine (`make setup`
+Pillow's own font has Latin letters; others come from the machine's fonts (`make setup`
 installs two): DejaVu Sans (Latin, Greek, Cyrillic, Hebrew, Arabic, Armenian, Georgian and more)
 and Droid Sans Fallback (Chinese, Japanese, Korean).
 """
@@ -27,10 +27,10 @@ _FILES: Final = (
     "Loma.ttf", "FreeSans.ttf", "wqy-microhei.ttc", "unifont.otf", "unifont.ttf",
 )
 # fmt: on
-"""Fonts that are used where they are installed, the preferred first."""
-_MOST_LETTERS: Final = 1000  # of a line
-_ASCENT: Final = 0.78  # of the size: from the top of Pillow's own letters down to the base line
-_UNKNOWN: Final = "\u0378"  # an unassigned code point: drawn as a font's box for what it lacks
+"""Fonts to use if installed, in order of preference."""
+_MOST_LETTERS: Final = 1000  # maximum length of a line
+_ASCENT: Final = 0.78  # ascent of Pillow's own letters, as a share of the size
+_UNKNOWN: Final = "\u0378"  # an unassigned code point, drawn as the font's box for missing letters
 
 
 def draw_line(
@@ -41,10 +41,10 @@ def draw_line(
     fill: tuple[int, int, int],
     size: int,
 ) -> float:
-    """Draw a line whose letters' top left is at; its length in px.
+    """Draw a line of text with its top left corner at `at`; returns its length in px.
 
-    A letter that no font has is "?"; joiners and variation selectors of pictographs are left out
-    where the font before them lacks them.
+    A letter in no font becomes "?"; joiners and variation selectors of pictographs are left out if the
+    font before them lacks them.
     """
     x, y = at
     text = shown(text, _MOST_LETTERS)
@@ -83,7 +83,7 @@ def runs_of_one_font(text: str) -> Iterator[tuple[str, str]]:
 
 @cache
 def _has(file: str, c: str) -> bool:
-    """Whether a font has a letter of its own for c, and not the box for what it lacks."""
+    """True if a font has a glyph for c, other than its box for missing letters."""
     if c.isascii():
         return True
     font = _font_of_script(file, 16)
@@ -110,7 +110,7 @@ def _own_ascent(size: int) -> float:
 
 @cache
 def _installed() -> tuple[str, ...]:
-    """The files of _FILES that the machine has, below the folders that fontconfig looks into."""
+    """Paths of the installed fonts of _FILES, in the folders of fontconfig."""
     home = os.environ.get("XDG_DATA_HOME", str(Path.home() / ".local/share"))
     shared = os.environ.get("XDG_DATA_DIRS", "/usr/local/share:/usr/share").split(":")
     roots = [*(Path(s) / "fonts" for s in (home, *shared)), Path.home() / ".fonts"]

@@ -1,4 +1,4 @@
-"""The nine tiles that sheets show of a view, as small pictures. Effects: reads picture files."""
+"""The nine tiles of a view on sheets, as small pictures. Effects: reads picture files."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ TILES: Final = tuple(
     )
 )
 # fmt: on
-"""The layers of a sheet, a column each."""
+"""The layers of a sheet, one per column."""
 NOT_RENDERED: Final = "not rendered"
-"""Why a tile is missing whose file there is not."""
+"""Reason for a missing tile if its file does not exist."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,15 +36,15 @@ class Tile:
     """A tile of a view."""
 
     kind: Layer
-    pixels: Srgb8Image | None  # (H, W, 3), None where the layer is missing
-    missing: str = ""  # why it is
-    note: str = ""  # what a reader needs with it ("0.8 to 5.4 m")
+    pixels: Srgb8Image | None  # (H, W, 3), None if the layer is missing
+    missing: str = ""  # reason why the layer is missing
+    note: str = ""  # note for the reader ("0.8 to 5.4 m")
     classes: tuple[tuple[int, float], ...] = ()  # of semantic: (NYU40 id, share), largest first
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Layer:
-    # A layer as it is shown, at its full size.
+    # A drawn layer at full size.
     kind: Layer
     pixels: Srgb8Image | None = None
     missing: str = ""
@@ -52,7 +52,7 @@ class _Layer:
     classes: tuple[tuple[int, float], ...] = ()
 
     def tile(self, max_edge_px: int) -> Tile:
-        # Labels keep their values: the nearest pixel, but photographs and smooth layers are averaged.
+        # Nearest pixel keeps the values of labels; photographs and smooth layers are averaged.
         nearest, pixels = self.kind.shown_as in ("classes", "ids"), self.pixels
         if pixels is not None:
             pixels = images.thumbnail(pixels, max_edge_px=max_edge_px, nearest=nearest)
@@ -60,19 +60,18 @@ class _Layer:
 
 
 def tiles_of(view: ViewEntry, max_edge_px: int = 320) -> tuple[Tile, ...]:
-    """The view's tiles in the order of TILES; one that is absent or damaged says so in its place.
+    """The view's tiles in the order of TILES; missing or damaged tiles give a reason.
 
-    Reads the view's files and keeps nothing. A tile's longer edge has at most max_edge_px.
+    Reads the view's files; no caching. A tile's longer edge has at most max_edge_px.
     """
     (tiles,) = tiles_of_sizes(view, max_edge_px)
     return tiles
 
 
 def tiles_of_sizes(view: ViewEntry, *max_edges_px: int) -> list[tuple[Tile, ...]]:
-    """As tiles_of for each of several sizes; every layer is read once.
+    """As tiles_of, for several sizes: a tuple for each, in order.
 
-    A tuple for each size, in the order given. Cheaper than several calls of tiles_of, since
-    decoding costs most.
+    Reads every layer once, so it is cheaper than several calls of tiles_of.
     """
     layers = [_shown_layer(view, kind) for kind in TILES]
     return [tuple(layer.tile(edge_px) for layer in layers) for edge_px in max_edges_px]

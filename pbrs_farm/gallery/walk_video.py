@@ -1,4 +1,4 @@
-"""A sequence of frames as mp4 films: the picture, and its labels beside it; coded by formats/film_mp4.py.
+"""Sequences of frames as mp4 films: picture, and picture with labels; coded by formats/film_mp4.py.
 
 Effects: reads picture files, keeps a film in memory while it is coded.
 """
@@ -25,10 +25,10 @@ _LABELS: Final = ("depth", "normal", "semantic", "instance", "flow_forward")
 
 
 def sequences_of(views: Sequence[ViewEntry]) -> dict[str, list[ViewEntry]]:
-    """House id -> the frames of its sequence in their order; houses without any are left out.
+    """House id -> the frames of its sequence in order; houses without frames are left out.
 
-    Frames are known by "frame" in their view.json, of a rig the first camera's count. Gaps are not filled: a
-    sequence that is only partly rendered has the frames that are there.
+    Frames have "frame" in their view.json; of a rig, only the first camera counts. Gaps are not filled:
+    a partly rendered sequence has only its finished frames.
     """
     walks: dict[str, list[ViewEntry]] = {}
     for view in views:
@@ -40,9 +40,9 @@ def sequences_of(views: Sequence[ViewEntry]) -> dict[str, list[ViewEntry]]:
 
 
 def films_of(frames: Sequence[ViewEntry]) -> dict[str, bytes]:
-    """ "picture" and "labels" -> an mp4 file: the frames' picture alone, and beside its labels.
+    """ "picture" and "labels" -> an mp4 file: the frames' picture alone, and with its labels beside it.
 
-    Raises BadInput where a frame has no picture, MachineFailed without PyAV.
+    Raises BadInput if a frame has no picture, MachineFailed without PyAV.
     """
     fps = _fps(frames)
     picture = _mode(frames[0])
@@ -84,7 +84,7 @@ def _photo(frame: ViewEntry, mode: str) -> Srgb8Image:
 
 
 def _depth_range(frames: Sequence[ViewEntry]) -> tuple[float, float]:
-    """Near and far end of the scale of depth for the whole film, so that it does not flicker."""
+    """Near and far end of the depth scale for the whole film, to avoid flicker."""
     ranges = []
     for frame in frames[:: max(len(frames) // 10, 1)]:
         depth = _frame_layer(frame, "depth")
@@ -107,7 +107,7 @@ def _beside(frame: ViewEntry, mode: str, depth_m: tuple[float, float]) -> Srgb8I
 
 
 def _shown(name: str, stored: Any, depth_m: tuple[float, float]) -> Srgb8Image:
-    # One scale for the whole film, so that it does not flicker.
+    # Use one scale for the whole film, to avoid flicker.
     if LAYER[name].shown_as == "depth":
         return colours.depth_colours(stored, *depth_m)
     if LAYER[name].shown_as == "flow":

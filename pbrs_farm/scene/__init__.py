@@ -1,1 +1,1 @@
-"""Homes as values in Python: read, change, look, render. `import pbrs_farm` has the names."""
+"""Homes as Python values: inspect, edit and render them. `import pbrs_farm` exports the names."""

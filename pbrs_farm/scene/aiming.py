@@ -1,4 +1,4 @@
-"""Cameras that look at things: around placed models, near enough, with enough of them in sight. No effects."""
+"""Sample cameras around placed models, by distance, elevation and visible share. No effects."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from pbrs_farm.core.shown_text import shown
 from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.truth.coverage import coverage
 
-_TRIES: Final = 200  # of a camera
-_CLEAR_M: Final = 0.12  # around the eye
-_SMALL: Final = (160, 120)  # pixels that visibility is measured in
-_LEAST_PX: Final = 12  # of a thing in those: fewer say nothing
+_TRIES: Final = 200  # maximum number of samples per camera
+_CLEAR_M: Final = 0.12  # minimum free radius around the eye, metres
+_SMALL: Final = (160, 120)  # size of the image that measures visibility, pixels
+_LEAST_PX: Final = 12  # minimum size of an item in that image, pixels
 
 
 def cameras_around(
@@ -35,9 +35,9 @@ def cameras_around(
     intrinsics: Intrinsics,
     seed: int,
 ) -> list[Camera]:
-    """n cameras that look at one of the items each, in a room, clear of everything.
+    """Sample n cameras, each inside a room, clear of geometry and aimed at one of the items.
 
-    Each sees min_visible of the item it looks at. Raises BadInput where fewer are found.
+    Each sees at least min_visible of its item. Raises BadInput if fewer than n are found.
     """
     rng = np.random.default_rng([seed, 4])
     cameras: list[Camera] = []
@@ -67,7 +67,7 @@ def _one(
         level = math.cos(elevation)
         away = np.array([level * math.cos(azimuth), math.sin(elevation), level * math.sin(azimuth)])
         eye = target + rng.uniform(*distance_m) * away
-        # Look a little beside it, so that it is not always in the middle.
+        # Aim slightly beside the item, so that it is not always centred.
         aim = target + rng.normal(0, 0.15, 3) * np.ptp(item.bounds, axis=0)
         if not _is_clear(house, eye):
             continue
@@ -78,7 +78,7 @@ def _one(
 
 
 def _is_clear(house: House, eye: F64) -> bool:
-    """In a room, and nothing within a hand's breadth."""
+    """True if the eye is inside a room, with no surface within _CLEAR_M."""
     if not any(_is_in(room, eye) for room in house.rooms):
         return False
     axes = np.concatenate([np.eye(3), -np.eye(3), _DIAGONALS])
@@ -98,7 +98,7 @@ def _is_in(room: Room, point: F64) -> bool:
 
 
 def _visible(house: House, item: Item, camera: Camera) -> float:
-    """Share of an item's pixels that nothing hides, of those it has when alone and unbounded."""
+    """Visible share of an item: unoccluded pixels over its pixels when alone and not cropped."""
     small = camera.with_size(*_SMALL)
     alone = int(coverage(item, small, _caster_of(house).cut_outs).sum())
     if alone < _LEAST_PX:
@@ -109,12 +109,12 @@ def _visible(house: House, item: Item, camera: Camera) -> float:
 
 
 def _caster_of(house: House) -> Caster:
-    """The rays of a finished home, panes included; those of the last homes are kept."""
+    """Ray caster of a finished home, panes included; the last homes are cached."""
     return _caster(_Identity(house))
 
 
 class _Identity:
-    # A house by its identity: it is frozen, and kept alive by the cache.
+    # Compare houses by identity: they are frozen, and the cache keeps them alive.
     def __init__(self, house: House) -> None:
         self.house = house
 

@@ -1,7 +1,7 @@
-"""Things of a home that fall, slide and come to rest, recorded: rigid bodies by MuJoCo.
+"""Record items of a home as they fall, slide and come to rest: rigid bodies by MuJoCo.
 
-No effects. What is named moves and all else stands still. Things collide as they are exported: convex
-parts within 5 mm of their faces; walls and floors as slabs behind their faces.
+No effects. Only the named items move; everything else is static. Collision shapes are those of the
+export: convex parts within 5 mm of the faces; walls and floors are slabs behind their faces.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from pbrs_farm.export.home_pieces import ExportedHome, Piece, exported_home
 from pbrs_farm.scene.physics import STEP_S, mujoco_module, world_xml
 
 KEYS_A_SECOND: Final = 60
-_STILL_MPS: Final = 0.01  # slower points of a thing are at rest
+_STILL_MPS: Final = 0.01  # maximum speed of the points of an item at rest, m/s
 _STILL_S: Final = 0.2
-_REACH_M: Final = 1.0  # around what moves: what stands farther away is met on a second try
+_REACH_M: Final = 1.0  # margin around moving items for static geometry, metres; grows on retry
 _TRIES: Final = 3
-_FASTEST_MPS: Final = 60.0  # beyond, it exploded
-_DEEPEST_M: Final = 0.03  # in another thing, at the beginning
-_QUIET_S: Final = 0.3  # in which what stands somewhere finds its rest before it is pushed
-_OUT_M: Final = 5.0  # beyond the home's box it is lost
+_FASTEST_MPS: Final = 60.0  # maximum speed before the simulation counts as exploded, m/s
+_DEEPEST_M: Final = 0.03  # maximum initial penetration of another item, metres
+_QUIET_S: Final = 0.3  # damped settling time before the push, seconds
+_OUT_M: Final = 5.0  # distance outside the home's bounds at which an item is lost, metres
 
 
 def recorded_falls(
@@ -39,11 +39,11 @@ def recorded_falls(
     push: F64 | None = None,
     spin: F64 | None = None,
 ) -> tuple[BodyMotion, ...]:
-    """How items (ids) move from where they stand, let go at from_s, until they rest or seconds are over.
+    """Simulate items (ids), released at from_s, until they rest or the seconds are over.
 
-    push: (3,) m/s that each has at first; spin: (3,) rad/s about its middle, world axes. Keys are 60 a
-    second. Raises BadInput, naming the item: of one that has no surface or begins inside of another,
-    that flies off or leaves the home, or still moves in the end. MachineFailed without MuJoCo.
+    push: (3,) initial velocity, m/s; spin: (3,) initial rad/s about the item's middle; world axes. 60
+    keys a second. Raises BadInput, naming the item, if it has no surface, begins inside another item,
+    flies off, leaves the home, or still moves at the end; MachineFailed without MuJoCo.
     """
     mujoco = mujoco_module()
     home = exported_home(house)
@@ -57,7 +57,7 @@ def recorded_falls(
         far = float(np.linalg.norm(rows[:, :, :3] - rows[:1, :, :3], axis=-1).max())
         if far <= reach:
             break
-        # Again, with what stands where they went.
+        # Retry with the static geometry along the whole path.
         reach = 2 * far
     times = tuple(round(from_s + k / KEYS_A_SECOND, 6) for k in range(len(rows)))
     return tuple(
@@ -78,7 +78,7 @@ def _simulated(
     reach_m: float,
     how: tuple[float, F64 | None, F64 | None],
 ) -> tuple[F64, F64]:
-    """(K, N, 7) of each key and mover: its middle, and its turn as a quaternion; (N, 3) middles at rest."""
+    """(K, N, 7) middle and quaternion per key and moving item; (N, 3) initial middles."""
     seconds, push, spin = how
     pivots = np.array([piece.item.bounds.mean(0) for piece in movers])
     parts = [
@@ -92,7 +92,7 @@ def _simulated(
     mujoco.mj_forward(world, state)
     _check_begin(home.house, world, state, movers, names)
     if state.ncon:
-        # What stands on convex parts a little beyond its own finds its rest, slowly.
+        # Convex parts of touching items may overlap slightly: separate them slowly.
         for _ in range(int(_QUIET_S / STEP_S)):
             mujoco.mj_step(world, state)
             state.qvel *= 0.9
@@ -101,7 +101,7 @@ def _simulated(
     velocity[:, :3] += 0.0 if push is None else push
     for k in range(len(movers)):
         if spin is not None:
-            # Of a free joint, turning is about the body's own axes.
+            # The angular velocity of a free joint is in the body's frame.
             turn = np.zeros(9)
             mujoco.mju_quat2Mat(turn, state.qpos[7 * k + 3 : 7 * k + 7])
             velocity[k, 3:] += turn.reshape(3, 3).T @ spin
@@ -132,7 +132,7 @@ def _simulated(
 
 
 def _world_parts(piece: Piece) -> Iterator[F64]:
-    """Convex parts (V, 3) of a thing, in the world."""
+    """Convex parts (V, 3) of an item, in world coordinates."""
     for body in piece.bodies:
         for part in body.colliders:
             yield transform_points(piece.world_from_local, part)
@@ -141,10 +141,10 @@ def _world_parts(piece: Piece) -> Iterator[F64]:
 def _static_parts(
     home: ExportedHome, movers: Sequence[Piece], reach_m: float
 ) -> tuple[list[str], list[F64]]:
-    """(name and id, convex part) of all that stands still around the movers."""
+    """Names with ids, and convex parts, of the static geometry around the moving items."""
     bounds = np.array([piece.item.bounds for piece in movers])
     low, high = bounds[:, 0].min(0) - reach_m, bounds[:, 1].max(0) + reach_m
-    low[1] = -np.inf  # things fall
+    low[1] = -np.inf  # no lower limit: items fall
     names, parts = [], []
     moving = {piece.instance for piece in movers}
     for piece in home.pieces:
@@ -162,13 +162,13 @@ def _static_parts(
 def _check_begin(
     house: House, world: Any, state: Any, movers: Sequence[Piece], names: Sequence[str]
 ) -> None:
-    """Raise BadInput where a mover begins deep inside of another thing."""
+    """Raise BadInput if a moving item begins deep inside another item."""
     for contact in state.contact[: state.ncon]:
         if contact.dist >= -_DEEPEST_M:
             continue
         bodies = [int(world.geom_bodyid[g]) for g in (contact.geom1, contact.geom2)]
         who = [movers[b - 1].item.id for b in bodies if b > 0]
-        # Static parts come first, in their order.
+        # Static parts come first, in order.
         other_name = who[1] if len(who) > 1 else names[min(int(contact.geom1), int(contact.geom2))]
         text = f"begins {-1000 * contact.dist:.0f} mm inside of {other_name}"
         raise BadInput(house.id, who[0], text, hint="place it where there is room for it")
@@ -177,7 +177,7 @@ def _check_begin(
 def _check_flight(
     house: House, movers: Sequence[Piece], rows: F64, speed: F64, box: F64, time_s: float
 ) -> None:
-    """Raise BadInput for a thing that exploded, or left the home."""
+    """Raise BadInput if an item exploded or left the home."""
     for piece, row, v in zip(movers, rows, speed, strict=True):
         if not np.isfinite(row).all() or v > _FASTEST_MPS:
             text = f"flies off by {v:.0f} m/s after {time_s:.2f} s: the simulation exploded"

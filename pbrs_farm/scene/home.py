@@ -332,8 +332,8 @@ class Home:
         model's axes; or at: (3,) position of the middle of its foot, upright. name: of the new item
         (default: its model's id and a number).
 
-        Raises BadInput if there is no free place, for a pose that is no rigid motion, a name in use, or an
-        unknown item. A place in no room is a warning.
+        Raises BadInput if no place is free, the pose is not a rigid motion, the name is in use, or the item
+        is unknown. A place in no room is a warning.
 
             >>> home.place(can, on="dining table", seed=1).items["can 1"].id
             'can 1'
@@ -368,8 +368,8 @@ class Home:
         on: an item or room that supports them; in_: a room, on all its tables, shelves and floor; else
         anywhere in the home. physics: they are dropped and come to rest against each other and the home by
         rigid-body simulation (extra `physics`); after four falls off the support an item stays where it is.
-        Without it each is upright and by itself. floating: they hang in the air of rooms at any turn and
-        touch nothing, to teach geometry.
+        Without physics, items are upright and do not touch each other. floating: they are placed in the air
+        of rooms at random rotations and touch nothing, to teach geometry.
 
         Raises BadInput if less than n fit, MachineFailed if the extra is not installed.
 
@@ -447,7 +447,7 @@ class Home:
         return self._opened(KeyJoints(joints=joints, keys=keys))
 
     def _joints_of(self, items: ItemLike, part: str) -> tuple[tuple[str, str], ...]:
-        """(item, part) of the matching joints; BadInput if there are none."""
+        """(item, part) of the matching joints; raises BadInput without a match."""
         ids = frozenset(self._ids(items))
         joints = tuple(
             (item.id, joint.part)
@@ -601,7 +601,7 @@ class Home:
         return home
 
     def _warn_of_what_left(self, after: House, edits: Sequence[Edit]) -> None:
-        """Warn of items that edits put or moved into no room, if the home has rooms."""
+        """Warn of items that edits placed or moved outside all rooms, if the home has rooms."""
         was_in = {item.id: item.room_id is not None for item in self.house.items}
         put: list[str] = []
         for edit in edits:
@@ -700,7 +700,7 @@ class Home:
         views = views_from_json(data, "cameras.json")
         rows = [(view.id, view.room_id, view.score) for view in views.values()]
         chosen = plan.chosen_views(rows, n or 0, home.recipe)
-        # They were scored in a small picture: give them the size of the final pictures.
+        # Their scores come from a small picture: set the final size.
         size = home.recipe.image.width_px, home.recipe.image.height_px
         viewpoints = [
             Viewpoint(
@@ -885,7 +885,7 @@ class Items(Table):
 
     @checked_call
     def named(self, pattern: str) -> tuple[Item, ...]:
-        """The items whose id, name or class matches, as "chair*"; BadInput if there are none.
+        """The items whose id, name or class matches, as "chair*"; raises BadInput without a match.
 
         >>> len(home.items.named("floor*")) > 0
         True

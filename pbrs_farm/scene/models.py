@@ -1,4 +1,4 @@
-"""Objects of the user's own: one file, or many by a pattern, checked when they are named. Effects: reads files."""
+"""The user's own mesh files as models, one or many, checked when named. Effects: reads files."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from pbrs_farm.regular_files import MAX_SCENE_BYTES, fault_of, read_regular
 
 UNITS: Final = {"m": 1.0, "cm": 0.01, "mm": 0.001, "inch": 0.0254}
 _UP: Final = {
-    # Columns: what the model's x, y and z axes are where it stands upright, y up.
+    # Columns: directions of the model's x, y and z axes when upright, y up.
     "y": np.eye(3),
     "z": np.array([[1.0, 0, 0], [0, 0, 1.0], [0, -1.0, 0]]),
     "x": np.array([[0.0, -1.0, 0], [1.0, 0, 0], [0, 0, 1.0]]),
@@ -41,11 +41,11 @@ class Model:
     """
 
     ref: ModelRef
-    up: str = "y"  # the axis of its file that points up when it stands
+    up: str = "y"  # the file's up axis
 
     @property
     def id(self) -> str:
-        """What its instances are called in tables and poses.
+        """Prefix of the names of its instances in tables and poses.
 
         >>> can.id
         'can'
@@ -54,7 +54,7 @@ class Model:
 
     @property
     def shape(self) -> ModelShape:
-        """Surfaces, materials and pictures in its own frame, metres; read once a process.
+        """Surfaces, materials and pictures in the model's frame, metres; read once per process.
 
         >>> np.ptp(can.shape.bounds, axis=0).shape
         (3,)
@@ -63,7 +63,7 @@ class Model:
 
     @property
     def size_m(self) -> tuple[float, float, float]:
-        """Extent along x, y and z of its own frame.
+        """Extent along the x, y and z axes of the model's frame.
 
         >>> round(can.size_m[2], 3)
         0.11
@@ -73,7 +73,7 @@ class Model:
 
     @property
     def upright(self) -> F64:
-        """(3, 3) rotation that stands it up in a world with y up.
+        """(3, 3) rotation from the model's axes to a world with y up.
 
         >>> (can.upright @ (0, 0, 1)).tolist()
         [0.0, 1.0, 0.0]
@@ -82,7 +82,7 @@ class Model:
 
     @property
     def notes(self) -> tuple[Note, ...]:
-        """What of its file is missing or guessed, as `notes` of house.json has it.
+        """Missing or guessed parts of its file, as in `notes` of house.json.
 
         >>> can.notes
         ()
@@ -105,15 +105,15 @@ def model(
     name: str = "",
     credit: str = "",
 ) -> Model:
-    """An object of your own, to place in homes.
+    """Load a mesh file as a model to place in homes.
 
-    path: a .glb, .gltf, .obj, .ply, .stl or .off file. category: what it is in a word ("cup"); the
+    path: a .glb, .gltf, .obj, .ply, .stl or .off file. category: its kind in a word ("cup"); the
     NYU40 class follows from it, else from the file's name. size_m: its longest side in metres,
-    whatever its unit; else unit: m, cm, mm or inch a unit of the file. up: the axis that points up,
+    whatever its unit; else unit: m, cm, mm or inch per unit of the file. up: the axis that points up,
     x, y or z; y for glTF and OBJ, z for the others. credit: a line that pictures must carry.
 
-    Raises BadInput, naming the file, for a mesh that is missing, empty, not finite or 900 m large. What
-    of it is missing or guessed, a picture for instance, is a warning, and `notes` of the model and of homes.
+    Raises BadInput, naming the file, if the mesh is missing, empty, not finite or 900 m large. Missing
+    or guessed parts, such as a picture, are a warning and in `notes` of the model and of homes.
 
         >>> pf.model("can.ply", category="bottle", size_m=0.2).size_m[2]
         0.2...
@@ -142,13 +142,13 @@ def model(
         credit=credit,
     )
     if size_m is not None:
-        ref = ref.model_copy(update={"scale": 1e-3})  # so that any unit is small enough to read
+        ref = ref.model_copy(update={"scale": 1e-3})  # makes any unit small enough to read
         extent = float(np.ptp(model_shape(ref, ReadFields()).bounds, axis=0).max())
         ref = ref.model_copy(update={"scale": 1e-3 * size_m / extent})
     loaded = Model(ref, up)
-    # Read it now: a bad file is an error here, not in a run.
+    # Read the file now, so that a bad one raises here and not in a run.
     if notes := loaded.notes:
-        # One of each kind: a map that is not read must not hide a picture that is missing.
+        # Show one note per kind: an unread map must not hide a missing picture.
         firsts = list({note.kind: note for note in reversed(notes)}.values())[::-1]
         more = f"; and {len(notes) - len(firsts)} more: model.notes" if notes[len(firsts) :] else ""
         text = "; ".join(f"{note.place}: {note.text} ({note.kind})" for note in firsts)
@@ -158,18 +158,18 @@ def model(
 
 @checked_call
 def models(pattern: str | Path, **options: object) -> list[Model]:
-    """The models that a pattern or a folder names, in order of name; options as of `model`.
+    """Load the models of a pattern or folder, in order of name; options as of `model`.
 
         >>> [thing.id for thing in pf.models("*.ply")]
         ['can']
 
-    Raises BadInput where there is none, or one that cannot be read.
+    Raises BadInput if no file matches or a file cannot be read.
     """
     text = str(pattern)
     if Path(text).is_dir():
         files = sorted(p for p in Path(text).rglob("*") if p.suffix.lower() in SUFFIXES)
     elif Path(text).is_file():
-        files = [Path(text)]  # of a name that may hold [ and *
+        files = [Path(text)]  # a name may contain [ and *
     else:
         files = sorted(Path(p) for p in glob.glob(text, recursive=True))  # noqa: PTH207
     if not files:
@@ -179,11 +179,11 @@ def models(pattern: str | Path, **options: object) -> list[Model]:
 
 
 def _names(paths: list[Path]) -> list[str]:
-    """A name of its own for each file: its stem, with its folder where others have it too."""
+    """A unique name per file: its stem, prefixed with the folder if the stem is not unique."""
     stems = Counter(keys.slug(path.stem) for path in paths)
     names: list[str] = []
     for path in paths:
-        # Folders of scans call every file alike: then the folder tells them apart.
+        # Folders of scans often use one file name: prefix the folder.
         alone = stems[keys.slug(path.stem)] == 1
         name = keys.slug(path.stem if alone else f"{path.parent.name} {path.stem}")
         n = names.count(name) + sum(taken.startswith(f"{name}-x") for taken in names)

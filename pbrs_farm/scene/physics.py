@@ -1,8 +1,8 @@
-"""Drops things into a home until they come to rest: rigid bodies by MuJoCo, convex parts by CoACD.
+"""Drop models into a home until they come to rest: rigid bodies by MuJoCo, convex parts by CoACD.
 
-No effects. The home stands still. Furniture that things are dropped on is met triangle by triangle
-(a thin prism each), other furniture near it as its convex hull. Things start a few centimetres above
-free places of `dress.supports`, tumble, and lie where they stop; what falls off is dropped again.
+No effects. The home is static. Supports collide triangle by triangle (a thin prism each), other
+furniture nearby as its convex hull. Models start a few centimetres above free places of
+`dress.supports`, tumble, and stay where they stop; those that fall off are dropped again.
 """
 
 from __future__ import annotations
@@ -27,26 +27,26 @@ from pbrs_farm.scene.models import Model
 from pbrs_farm.scene.placing import Target, TargetTops, level_tops_of
 
 STEP_S: Final = 0.002
-_LONGEST_S: Final = 8.0  # of simulated time until all lie still
-_STILL: Final = 0.004  # m/s, and tenths of rad/s: what is slower for _STILL_S is at rest
+_LONGEST_S: Final = 8.0  # maximum simulated time of a drop, seconds
+_STILL: Final = 0.004  # maximum speed at rest, m/s (ten times that in rad/s), for _STILL_S
 _STILL_S: Final = 0.2
-_ROUNDS: Final = 4  # things that fell off are dropped again so often
-_TRIES: Final = 60  # places above a target that are tried for one thing
-_APART_M: Final = 0.01  # between things that fall at the same time
-_DROP_M: Final = 0.03  # above the surface, or what lies there
-_REACH_M: Final = 0.6  # around the surfaces: what stands farther away is left out
-_PRISM_M: Final = 0.03  # depth of a level triangle's prism, so that nothing falls through
-_THIN_M: Final = 0.002  # depth of the others'
-_LEAST_M2: Final = 1e-6  # smaller triangles are left out
+_ROUNDS: Final = 4  # maximum number of drops of a model
+_TRIES: Final = 60  # positions tried above a target per model
+_APART_M: Final = 0.01  # minimum initial gap between models, metres
+_DROP_M: Final = 0.03  # minimum initial height above the surface, metres
+_REACH_M: Final = 0.6  # margin around the surfaces for static geometry, metres
+_PRISM_M: Final = 0.03  # depth of a level triangle's prism, metres; stops tunnelling
+_THIN_M: Final = 0.002  # depth of the other prisms, metres
+_LEAST_M2: Final = 1e-6  # minimum area of a triangle, square metres
 _MOST_PRISMS: Final = 6_000
 _DENSITY: Final = 500.0  # kg/m3
-_FALLEN_M: Final = 0.05  # what lies so far below its surface fell off
+_FALLEN_M: Final = 0.05  # depth below its surface at which a model has fallen off, metres
 
 
 @dataclass(slots=True, eq=False)
 class _Body:
     model: Model
-    onto: TargetTops | None  # where it was dropped
+    onto: TargetTops | None  # last target
     pose: F64  # (4, 4) world_from_model
 
 
@@ -55,9 +55,9 @@ def settled_poses(
 ) -> list[tuple[Model, F64]]:
     """n models at rest, (model, world_from_model (4, 4)) each; equal seeds give equal poses.
 
-    Models are drawn alike, targets by their free area; a target that has no room above it for one
-    model still takes others. Raises MachineFailed without mujoco and coacd. Raises BadInput where no
-    target has a level top, where a thing has room above none, or where things do not come to rest,
+    Models are drawn with equal probability, targets by their free area; a target too low for one model
+    may still take others. Raises MachineFailed without mujoco and coacd. Raises BadInput if no target
+    has a level top, if no target has room above it for a model, or if models do not come to rest,
     naming those that move.
     """
     mujoco = mujoco_module()
@@ -83,11 +83,11 @@ def settled_poses(
 def penetration_m(
     house: House, placed: Sequence[tuple[Model, F64]], targets: Sequence[Target]
 ) -> float:
-    """How deep the deepest contact is of models (model, world_from_model) at rest, metres.
+    """Maximum contact depth of models (model, world_from_model) at rest, metres.
 
-    0 where nothing penetrates. Poses are float64 (4, 4), world_from_model, of at least one model.
-    Only solids of the home around the tops of the targets take part. BadInput where no target has a
-    level top, MachineFailed without MuJoCo.
+    0 without penetration. Poses are float64 (4, 4), world_from_model, of at least one model. Only
+    solids of the home around the targets' tops collide. Raises BadInput if no target has a level top,
+    MachineFailed without MuJoCo.
     """
     mujoco = mujoco_module()
     things = [_Body(model, None, pose) for model, pose in placed]
@@ -103,7 +103,7 @@ def penetration_m(
 
 @lru_cache(maxsize=256)
 def _parts_of(model: Model) -> tuple[F64, ...]:
-    """Convex parts of a model, (V, 3) vertices each in its frame; decomposed once a process."""
+    """Convex parts of a model, (V, 3) vertices each in its frame; cached per process."""
     return convex_parts(model.shape.triangles)
 
 
@@ -129,7 +129,7 @@ def _static_solids(house: House, surfaces: Sequence[TargetTops], size_m: float) 
 
 
 def _points_of(support: Support) -> F64:
-    """(4, 3) corners of the box of cells around what is free of a support."""
+    """(4, 3) corners of the bounding rectangle of a support's free cells."""
     rows, columns = np.nonzero(support.mask)
     ends = (
         np.array([columns.min(), columns.max() + 1] * 2),
@@ -139,7 +139,7 @@ def _points_of(support: Support) -> F64:
 
 
 def _is_hollow(item: Item, triangles: F64) -> bool:
-    """Whether its convex hull would fill what is empty: rooms' shells, furniture one reaches into."""
+    """True if a convex hull would fill empty space: rooms' shells, furniture with an open interior."""
     if item.kind.is_structure or item.kind in (ItemKind.DOOR, ItemKind.WINDOW, ItemKind.STAIRS):
         return True
     low, high = item.bounds
@@ -168,7 +168,7 @@ def _lift(
     surfaces: Sequence[TargetTops],
     rng: np.random.Generator,
 ) -> None:
-    """Put those that wait above their targets, turned at random, apart from each other."""
+    """Put the waiting models above their targets, at random rotations, without overlap."""
     balls = [_ball(t.model, t.pose) for t in things if t not in waiting]
     for thing in waiting:
         radius, turn = _radius(thing.model), Rotation.random(random_state=rng).as_matrix()
@@ -191,7 +191,7 @@ def _spot_above_any(
     balls: Sequence[tuple[F64, float]],
     rng: np.random.Generator,
 ) -> tuple[TargetTops, F64] | None:
-    """A target and a place (3,) above it for a ball: where it was dropped before, else by free area."""
+    """A target and a position (3,) above it for a ball: the last target, else one drawn by free area."""
     areas = np.array([surface.area_m2 for surface in surfaces])
     remaining = list(range(len(surfaces)))
     while remaining:
@@ -213,12 +213,12 @@ def _spot_above(
     balls: Sequence[tuple[F64, float]],
     rng: np.random.Generator,
 ) -> F64 | None:
-    """The lowest of some open places (3,) of a ball above a target's tops and above other balls."""
+    """The lowest of several free positions (3,) of a ball above a target's tops and above other balls."""
     areas = np.array([top.support.area for top in tops])
     best: F64 | None = None
     for _ in range(_TRIES):
         top = tops[int(rng.choice(len(tops), p=areas / areas.sum()))]
-        # A point of the top by area.
+        # Draw a point of the top, uniform in area.
         cells = np.argwhere(top.support.mask)
         row, column = cells[int(rng.integers(len(cells)))] + rng.random(2)
         x, z = top.grid.plan_of(column, row)
@@ -246,7 +246,7 @@ def _simulate(
     parts: dict[Model, tuple[F64, ...]],
     statics: Sequence[F64],
 ) -> list[int]:
-    """Let things fall until they lie still, and take their poses; the numbers of those that move."""
+    """Simulate until all models rest and update their poses; returns the indices of those still moving."""
     world = mujoco.MjModel.from_xml_string(world_xml([parts[t.model] for t in things], statics))
     state = mujoco.MjData(world)
     _set_poses(state, things)
@@ -273,9 +273,9 @@ def _set_poses(state: Any, things: Sequence[_Body]) -> None:
 
 
 def world_xml(bodies: Sequence[tuple[F64, ...]], statics: Sequence[F64]) -> str:
-    """A model of MuJoCo, y up, metres: free bodies of convex parts (V, 3), and convex solids that stand still.
+    """A MuJoCo model, y up, metres: free bodies of convex parts (V, 3), and static convex solids.
 
-    Body k is the k-th free joint. Parts that bodies share, as one tuple, are written once.
+    Body k is the k-th free joint. Parts shared by bodies, as one tuple, are written once.
     """
     assets = [_mjcf_mesh(f"s{k}", solid) for k, solid in enumerate(statics)]
     names: dict[int, str] = {}
@@ -324,7 +324,7 @@ def _radius(model: Model) -> float:
 
 
 def mujoco_module() -> Any:
-    """The package; MachineFailed, with the command that adds it, where it is not installed."""
+    """The mujoco package; raises MachineFailed, with the install command, if it is missing."""
     try:
         from pbrs_farm.quiet_mujoco import mujoco
     except ImportError:

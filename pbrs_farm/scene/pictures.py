@@ -1,4 +1,4 @@
-"""Pictures of homes from Python: in memory one by one, or many into a folder by this machine's pool."""
+"""Render homes from Python: frames in memory, or many homes into a folder with several processes."""
 
 from __future__ import annotations
 
@@ -35,9 +35,9 @@ from pbrs_farm.views.views import Frame, Views
 
 AnyCamera = Camera | Viewpoint
 Words = str | Iterable[str]
-"""Names of modes or layers: one, or several."""
+"""One or several names of modes or layers."""
 
-# Labels that every frame has, by the names that are asked for.
+# _ALWAYS: labels in every frame, by the names that callers use.
 _ALL: Final = tuple(mode.value for mode in ALL_MODES)
 _ALWAYS: Final = ("depth", "normal", "valid", "semantic", "class40", "instance", "boundary")
 
@@ -75,16 +75,16 @@ def render(
     observe: Callable[[str], None] | None = None,
     progress: bool = False,
 ) -> Frame | Views:
-    """Pictures and labels of a home in memory: no folder, no second process.
+    """Render pictures and labels of a home in memory: no folder, no second process.
 
-    cameras: one of home.cameras(), or a Camera of your own; or several. modes: of opengl_dl,
-    opengl_il, mlt_ol, mlt_il_ol; an empty list renders labels alone. layers: optional ones to make
-    beside depth, normal, class and instance, which each frame has (`pbrs-farm layers` lists them).
-    size: (width, height); of a camera that was made with a size its own, else the recipe's. observe: called
-    with the id of each frame that is done. progress: show bars on a terminal, lines in a notebook.
+    cameras: one or several of home.cameras(), or user-made Cameras. modes: of opengl_dl,
+    opengl_il, mlt_ol, mlt_il_ol; an empty list renders labels alone. layers: optional ones besides
+    depth, normal, class and instance, which each frame has (`pbrs-farm layers` lists them). size:
+    (width, height); default: the camera's if it was made with one, else the recipe's. observe: called
+    with the id of each finished frame. progress: show bars on a terminal, lines in a notebook.
 
-    The same bytes as `pbrs-farm run` makes of that home, recipe and view. A camera in no room is a
-    warning. Raises BadInput for a mode, a layer or a size that is none, RenderFailed.
+    The bytes equal those of `pbrs-farm run` for the same home, recipe and view. A camera in no room is
+    a warning. Raises BadInput for an unknown mode or layer or an invalid size, RenderFailed.
 
         >>> frame = pf.render(home, camera, modes=["opengl_dl"], layers=["albedo"])
         >>> frame.colour.shape, frame.layer("albedo").shape
@@ -121,16 +121,15 @@ def film(
     observe: Callable[[str], None] | None = None,
     progress: bool = False,
 ) -> Views:
-    """The frames of a film of a home in memory: what moves in it (`home.open(at=)`, `home.drop`) moves.
+    """Render a film of a home in memory, with its motions (`home.open(at=)`, `home.drop`).
 
-    cameras: one that stands still, or one a frame. fps: frames a second, of which seconds are filmed
-    from the time from_s on; the frames are `frame_00000` and so on. All else is as of `render`;
-    layers that need the next frame or the one before (flow_forward, scene_flow) are there, but for the
-    film's ends. rig: a file rig.toml, or what it holds: several cameras take each frame, and the ones
-    given say where the rig is; the views of its first camera are the frames, those of others are
-    `frame_00000_<camera>`. tracks: follow surface points through all frames, for `.export(out, to="tapvid")` and
-    tracks.npz of `.save(out)`. Raises BadInput where there are not as many cameras as frames, and for a
-    rig that is none.
+    cameras: one static camera, or one per frame. fps: frames a second. seconds: duration, from the time
+    from_s on; the frames are `frame_00000` and so on. Other arguments as of `render`; layers that need
+    the next or previous frame (flow_forward, scene_flow) are included except at the film's ends. rig:
+    a rig.toml file or its table: several cameras take each frame, and `cameras` gives the pose of the
+    rig; the views of its first camera are the frames, those of others are `frame_00000_<camera>`.
+    tracks: follow surface points through all frames, for `.export(out, to="tapvid")` and tracks.npz of
+    `.save(out)`. Raises BadInput if the numbers of cameras and frames differ, and for an invalid rig.
 
         >>> moving = home.open("door*", at={0: 0, 1: 1})
         >>> frames = pf.film(moving, camera, fps=2, seconds=1, modes=[], layers=["scene_flow"])
@@ -164,7 +163,7 @@ def _progress_of(
     observe: Callable[[str], None] | None,
     progress: bool,
 ) -> Iterator[Callable[[str], None]]:
-    """What hears of each view that is done: the caller, and the bars if they are wanted."""
+    """The callback for each finished view: calls observe, and updates the bars if enabled."""
     if not progress:
         yield observe or (lambda _view: None)
         return
@@ -188,7 +187,7 @@ def _progress_of(
 
 
 def _words(given: Words, name: str) -> tuple[str, ...]:
-    """Names as a tuple, of one or of several."""
+    """One or several names as a tuple."""
     names: tuple[str, ...] = as_words(given)
     for word in names:
         check_argument("render", name, word, str)
@@ -196,7 +195,7 @@ def _words(given: Words, name: str) -> tuple[str, ...]:
 
 
 def _wanted(modes: Words, layers: Words) -> Wanted:
-    # An empty list asks for labels alone, where the command line takes it for all modes.
+    # An empty list means labels alone; on the command line it means all modes.
     label_layers = tuple(name for name in _words(layers, "layers") if name not in _ALWAYS)
     return wanted_of(Wanted(modes=_words(modes, "modes"), layers=label_layers))
 
@@ -204,7 +203,7 @@ def _wanted(modes: Words, layers: Words) -> Wanted:
 def _recipe_of_view(
     home: Home, viewpoints: Sequence[Viewpoint], size: tuple[int, int] | None
 ) -> Recipe:
-    """The home's recipe with the size of the pictures and where their cameras come from."""
+    """The home's recipe with the size of the pictures and the source of their cameras."""
     fields = {id(viewpoint.chosen_by): viewpoint.chosen_by for viewpoint in viewpoints}
     if len({f.model_dump_json() if f else "" for f in fields.values()}) > 1:
         raise BadInput(
@@ -242,16 +241,16 @@ def render_homes(
     progress: bool = False,
     **options: Any,
 ) -> Views:
-    """Every home into one place by this machine's processes: `pbrs-farm run` from Python.
+    """Render homes into one place with this machine's processes: `pbrs-farm run` from Python.
 
-    homes: also edited ones. out: a folder or s3://bucket/prefix; what is there already is not made
-    again, so that a script that was killed goes on where it was. recipe: for all of them; None: the
-    homes' own, which must agree. views: of each home, None = all its sampled viewpoints. observe: hears
-    each step that ends. progress: show bars on a terminal, lines elsewhere, as `pbrs-farm run` does.
-    options: what else `pbrs-farm run` makes of a house, by its option's name: pairs=True.
+    homes: also edited ones. out: a folder or s3://bucket/prefix; existing results are kept, so a killed
+    script resumes. recipe: for all of them; None: the homes' own, which must agree. views: of each
+    home, None = all its sampled viewpoints. observe: called with each finished step. progress: show
+    bars on a terminal, lines elsewhere, as `pbrs-farm run` does. options: other outputs of `pbrs-farm
+    run`, by option name: pairs=True.
 
-    Returns the frames of out. A home that cannot be made costs itself alone and is a warning;
-    raises BadRecipe where recipes disagree or out holds another, BadInput where nothing was made.
+    Returns the frames of out. A home that fails is a warning and does not stop the others; raises
+    BadRecipe if recipes disagree or out holds another, BadInput if nothing was made.
 
         >>> small = home.set(**{"image.width_px": 64, "image.height_px": 48})
         >>> len(pf.render_homes([small], out="homes", views=1, modes=["opengl_dl"]))

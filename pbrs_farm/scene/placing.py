@@ -1,8 +1,8 @@
-"""Where models stand in a finished home: free places on furniture and floors, drawn by seed; no effects.
+"""Poses for models in a finished home: free places on furniture and floors, by seed; no effects.
 
-What is free comes from `dress.supports`, as for things that dressing lays about: level tops and
-shelves found in the meshes, in cells of a centimetre with the free height above each. A model takes
-the box around it, turned with it; nothing of it may reach over an edge or into what stands there.
+Free places come from `dress.supports`, as for clutter: level tops and shelves found in the meshes,
+in cells of a centimetre with the free height above each. A model occupies its box, rotated with it;
+the box may not reach over an edge or into other items.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from pbrs_farm.home.room_use import is_outdoors
 from pbrs_farm.scene.models import Model
 
 Target = Item | Room
-"""What a caller names to put things on: furniture, or a room for its floor."""
+"""A support named by the caller: furniture, or a room for its floor."""
 
 # fmt: off
 _FURNITURE: Final = frozenset(
@@ -36,31 +36,31 @@ _FURNITURE: Final = frozenset(
                  "night stand", "chair")
 )
 # fmt: on
-_EYE_LEVEL_M: Final = 1.4  # above the floor: higher tops are used only where there is no lower one
-_GIVEN_UP: Final = 40  # things in a row that find no place in the air
-_HEIGHT_M: Final = 3.0  # of the space over furniture that is in no room
-_NAMED: Final = 3  # targets in a message
+_EYE_LEVEL_M: Final = 1.4  # preferred maximum height of a top above the floor, metres
+_GIVEN_UP: Final = 40  # maximum consecutive failures to place a model in the air
+_HEIGHT_M: Final = 3.0  # height of the space above furniture outside all rooms, metres
+_NAMED: Final = 3  # maximum number of targets in a message
 _NO_LEVEL: Final = "name furniture with a level top, or a room for its floor"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TargetTops:
-    """The free surfaces of what a caller named; state: what was put there is taken."""
+    """Free surfaces of a target; mutable, since placed models occupy them."""
 
     target: Target
-    tops: tuple[Worktop, ...]  # empty: nothing of it is level, or all of it is taken
+    tops: tuple[Worktop, ...]  # empty: no level surface, or all of it is occupied
 
     @property
     def area_m2(self) -> float:
-        """What was free of its tops at first, square metres."""
+        """Initial free area of its tops, square metres."""
         return sum(top.support.area for top in self.tops)
 
 
 def free_pose(house: House, model: Model, targets: Sequence[Target], seed: int) -> F64:
-    """A pose (4, 4) world_from_model of a model that stands upright on one of the targets.
+    """Pose (4, 4) world_from_model of a model upright on one of the targets.
 
     The targets are tried in an order drawn by the seed; equal seeds give equal poses. Raises BadInput
-    where it fits on none, or where none has a level top.
+    if the model fits on no target, or no target has a level top.
     """
     rng = np.random.default_rng([seed, 1])
     surfaces = tops_of(house, targets)
@@ -77,12 +77,13 @@ def free_pose(house: House, model: Model, targets: Sequence[Target], seed: int) 
 def scattered_poses(
     house: House, models: Sequence[Model], n: int, targets: Sequence[Target], seed: int
 ) -> list[tuple[Model, F64]]:
-    """n models, (model, world_from_model (4, 4)) each, upright on the targets, none in another's way.
+    """n models, (model, world_from_model (4, 4)) each, upright on the targets, without overlap.
 
-    Models are drawn alike, targets by their free area. A target that has no room for one model still
-    takes smaller ones; a model that fits nowhere any more is left out. Equal seeds give equal poses.
+    Models are drawn with equal probability, targets by their free area. A target too small for one
+    model may still take smaller ones; a model that no longer fits anywhere is left out. Equal seeds
+    give equal poses.
 
-    Raises BadInput where fewer than n fit, or where no target has a level top.
+    Raises BadInput if fewer than n fit, or if no target has a level top.
     """
     rng = np.random.default_rng([seed, 2])
     surfaces = level_tops_of(house, targets)
@@ -110,10 +111,10 @@ def scattered_poses(
 def floating_poses(
     house: House, models: Sequence[Model], n: int, targets: Sequence[Target], seed: int
 ) -> list[tuple[Model, F64]]:
-    """n models, (model, world_from_model (4, 4)) each, in the air of rooms at any turn, that touch nothing.
+    """n models, (model, world_from_model (4, 4)) each, floating in rooms at random rotations.
 
-    Models are drawn alike, rooms among the targets by their volume, none outdoors; 5 cm are left to
-    all else. Equal seeds give equal poses. Raises BadInput where fewer than n fit.
+    Models are drawn with equal probability, rooms among the targets by volume, none outdoors; models
+    touch nothing, with a gap of 5 cm. Equal seeds give equal poses. Raises BadInput if fewer than n fit.
     """
     rng = np.random.default_rng([seed, 3])
     rooms = [target for target in targets if isinstance(target, Room) and not is_outdoors(target)]
@@ -138,10 +139,9 @@ def floating_poses(
 
 
 def furniture_of(house: House, room: Room) -> list[Item]:
-    """What stands in a room and has a level top, no higher than eyes, that people put things on.
+    """Furniture of a room with a level top below eye level, in the order of the house's items.
 
-    Tables, desks, cabinets, shelves, chairs and the like by their NYU40 class; one whose tops all
-    lie above eye level is left out. In the order of the house's items.
+    Tables, desks, cabinets, shelves, chairs and the like by their NYU40 class.
     """
     scene = SceneTriangles(house.items)
     return [
@@ -156,10 +156,9 @@ def furniture_of(house: House, room: Room) -> list[Item]:
 def level_tops_of(
     house: House, targets: Sequence[Target], border_m: float | None = None
 ) -> list[TargetTops]:
-    """tops_of, without targets that have none; BadInput where none has any.
+    """Targets with their free tops, as tops_of; raises BadInput, naming the targets, without any top.
 
-    For calls that cannot go on without a place. border_m as of tops_of. The message names the
-    targets.
+    Targets without a top are left out. border_m as of tops_of.
     """
     with_tops = [target for target in tops_of(house, targets, border_m) if target.tops]
     if not with_tops:
@@ -171,11 +170,11 @@ def level_tops_of(
 def tops_of(
     house: House, targets: Sequence[Target], border_m: float | None = None
 ) -> list[TargetTops]:
-    """The free surfaces of each target, in their order; border_m: as of supports_of_item.
+    """The free surfaces of each target, in order; border_m: as of supports_of_item.
 
-    A room gives its floor, an item the level tops of its mesh; a target without any has no tops,
-    and the caller decides. Items must be those of this house: the same objects, not equal ones.
-    Tops above eye level are left out where a target has lower ones.
+    A room gives its floor, an item the level tops of its mesh; a target without a level surface has
+    empty tops. Items must be those of this house: the same objects, not equal ones. Tops above eye
+    level are left out if a target has lower ones.
     """
     scene = SceneTriangles(house.items)
     rooms = {room.id: room for room in house.rooms}
@@ -194,10 +193,10 @@ def tops_of(
 
 
 def upright_at(model: Model, foot: F64, yaw_rad: float) -> F64:
-    """(4, 4) world_from_model of a thing that stands upright: the middle of its foot is at foot (3,).
+    """(4, 4) world_from_model of an upright model with the middle of its foot at foot (3,).
 
     float64. foot is (3,) metres in the world; the yaw turns about +y. The middle is that of the
-    bounding box after the turn, so a thing that leans does not stand on its centre of mass.
+    bounding box after the turn, so for a leaning model it is not below the centre of mass.
     """
     turn = rotation_y(yaw_rad) @ model.upright
     points = model.shape.points @ turn.T
@@ -209,22 +208,22 @@ def upright_at(model: Model, foot: F64, yaw_rad: float) -> F64:
 
 
 def _stand_on_tops(model: Model, tops: Sequence[Worktop], rng: np.random.Generator) -> F64 | None:
-    """Take a free place of some tops for a model; its pose (4, 4), None where it fits on none.
+    """Occupy a free place of some tops with a model; returns its pose (4, 4), None if it does not fit.
 
-    It is turned at random, and along the top's sides where it fits in no other way.
+    The rotation is random; if no place fits, it is aligned with the sides of the top.
     """
     if not tops:
         return None
     points = model.shape.points @ model.upright.T
     for yaw in (float(rng.uniform(0, 2 * np.pi)), 0.0, np.pi / 2):
-        local = points @ rotation_y(yaw).T  # about the axes of a top's grid
+        local = points @ rotation_y(yaw).T  # in axes of the top's grid
         low, high = local.min(0), local.max(0)
         width, height, depth = (float(v) for v in high - low)
         spots = [top.spots((width, height, depth), margin_m=0.0) for top in tops]
         counts = np.cumsum([len(rows) for rows, _columns, _n in spots])
         if not counts[-1]:
             continue
-        # Draw one place of all that there are.
+        # Draw one of the free places.
         number = int(rng.integers(counts[-1]))
         which = int(np.searchsorted(counts, number, side="right"))
         rows, columns, n = spots[which]
@@ -246,7 +245,7 @@ def _within_sight(supports: Sequence[Support]) -> Sequence[Support]:
 
 
 def _space_around(item: Item) -> Room:
-    """A room of its own for furniture that stands in none: the space over its bounds."""
+    """A substitute room for furniture outside all rooms: its footprint, to _HEIGHT_M above its top."""
     low, high = item.bounds
     outline = np.asarray(shapely.box(low[0], low[2], high[0], high[2]).exterior.coords)[:4]
     return Room(

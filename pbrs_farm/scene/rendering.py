@@ -1,8 +1,8 @@
-"""Pictures in memory by the steps of a run, one after another in a thread of its own.
+"""Render in memory with the steps of a run, serialised on a dedicated thread.
 
-Effects: a thread, memory; the steps' own. Mitsuba, Dr.Jit and OpenGL keep state a thread and a
-process: one thread does all of it, whoever calls, and a forked child is refused. A home's store
-stays for the next call, so that its second view costs what it costs in a run.
+Effects: a thread, memory, and those of the steps. Mitsuba, Dr.Jit and OpenGL keep state per thread
+and process: one thread does all the work, and a forked child is refused. A home's store is kept for
+the next call, so that its second view costs the same as in a run.
 """
 
 from __future__ import annotations
@@ -44,29 +44,29 @@ from pbrs_farm.views.views import ViewRef, Views
 if TYPE_CHECKING:
     pass
 
-_N_HOMES: Final = 4  # whose houses and steps are kept
+_N_HOMES: Final = 4  # maximum number of cached homes
 _T = TypeVar("_T")
 
 
 class Renderer:
-    """What this process keeps of the homes it works on, and the thread that works."""
+    """The cached homes of this process and its rendering thread."""
 
     def __init__(self) -> None:
         self._pid = os.getpid()
         after_fork(self._begin_in_child)
         self._lock = threading.Lock()
         self._thread: ThreadPoolExecutor | None = None
-        self._ident = 0  # of that thread
+        self._ident = 0  # of the rendering thread
         self._stop = threading.Event()
         self._stores: OrderedDict[tuple[str, str], MemoryStore] = OrderedDict()
         self._finished: OrderedDict[str, FinishedHouse] = OrderedDict()
         self._houses = HouseCache()
 
     def house(self, source: SourceRef, recipe: Recipe) -> FinishedHouse:
-        """The house of a source, read, dressed, repaired and edited; those of the last homes are kept.
+        """The house of a source: read, dressed, repaired and edited; the last homes are cached.
 
-        The same source and recipe give the same object as long as it is among the last homes; else
-        all steps of the house run again. Do not change it.
+        Returns the same object for the same source and recipe while it is cached; otherwise all steps of
+        the house run again. Do not change it.
         """
         key = cache_key(source, recipe)
         with self._lock:
@@ -81,10 +81,9 @@ class Renderer:
         return finished
 
     def sampled(self, source: SourceRef, recipe: Recipe) -> bytes:
-        """cameras.json of the step `cameras`.
+        """cameras.json of the step `cameras`, as stored in a root.
 
-        The bytes as they would be stored in a root. Reads and dresses the home first, where that
-        was not done.
+        Reads and dresses the home first if necessary.
         """
         return self.call(lambda: self._cameras(source, recipe))
 
@@ -96,9 +95,9 @@ class Renderer:
         want: Wanted,
         observe: Callable[[str], None] = lambda _view: None,
     ) -> Views:
-        """The viewpoints' frames: the steps of `want` for each, in a store of their own.
+        """Render the viewpoints' frames: runs the steps of `want` for each, in a separate store.
 
-        Blocks until all are done. Ctrl-C lets the step under way end and begins no other.
+        Blocks until all are done. Ctrl-C lets the current step end and starts no other.
         """
         return self.call(lambda: self._frames(source, recipe, viewpoints, want, observe))
 
@@ -107,15 +106,15 @@ class Renderer:
     ) -> list[NDArray[np.uint8]]:
         """An OpenGL-DL picture (H, W, 3) of each camera, at its own size; nothing is stored.
 
-        uint8 sRGB; without OpenGL the diffuse colours, darker where a surface turns away. Quick, for aiming cameras: no light is traced and no labels are made. The house
-        is prepared first, where that was not done.
+        uint8 sRGB; without OpenGL, diffuse colours, darker at grazing angles. Quick, for aiming cameras: no
+        light is traced and no labels are made. The house is prepared first if necessary.
         """
         return self.call(lambda: self._sketches(source, recipe, cameras))
 
     def close(self) -> None:
-        """Let go of every home.
+        """Release all homes.
 
-        It may be used again afterwards: homes are then read anew.
+        The renderer remains usable: homes are then read anew.
         """
         if self._thread is not None:
             self.call(self._houses.clear)
@@ -124,16 +123,16 @@ class Renderer:
         self._houses.before_edits.clear()
 
     def call(self, task: Callable[[], _T]) -> _T:
-        """What a task gives, done in the thread that works: rays and pictures have their state there.
+        """Run a task on the rendering thread, which owns the renderers' state, and return its result.
 
-        Calls of several threads are done one after another. A task that itself calls runs at once,
-        so that callbacks cannot wait for themselves. MachineFailed in a process that was forked
-        from one that renders, since the state of rays and pictures does not survive a fork.
+        Calls from several threads run one after another. A call from within a task runs immediately, so
+        that callbacks cannot deadlock. Raises MachineFailed in a process forked from one that renders,
+        since the renderers' state does not survive a fork.
         """
         if os.getpid() != self._pid:
             hint = 'multiprocessing.set_start_method("spawn"), or render in the children alone'
             raise MachineFailed("this process was forked from one that renders", hint=hint)
-        # A plugin that makes homes, or a callback, is in the thread already.
+        # Plugins that make homes, and callbacks, already run on the thread.
         if threading.get_ident() == self._ident:
             return task()
         with self._lock:
@@ -144,12 +143,12 @@ class Renderer:
         try:
             return future.result()
         except BaseException:
-            # Ctrl-C: the step under way ends, no other begins.
+            # Ctrl-C: the current step ends, no other starts.
             stop.set()
             raise
 
     def _begin_in_child(self) -> None:
-        # A forked child has no thread of its parent's; before one is begun it may begin its own.
+        # A child forked before the parent starts its thread may start one itself.
         if self._thread is None:
             self._pid = os.getpid()
 
@@ -165,13 +164,13 @@ class Renderer:
         store = self._stores.setdefault(key, MemoryStore())
         self._stores.move_to_end(key)
         while len(self._stores) > _N_HOMES:
-            # What is loaded may be of that store.
+            # Loaded houses may refer to that store.
             self._stores.popitem(last=False)
             self._houses.clear()
         return store
 
     def _with_house(self, source: SourceRef, recipe: Recipe) -> Work:
-        """The work on a home whose step `house` is done."""
+        """Prepare a home up to the step `house`."""
         if uses_catalogue(source, recipe):
             fetch_catalogue(recipe.dress)
         work = Work(self._store(source), recipe, source.house_id, self._houses, source)
@@ -180,7 +179,7 @@ class Renderer:
 
     def _house(self, source: SourceRef, recipe: Recipe) -> FinishedHouse:
         if source.edits:
-            # On the house before them, without a step: that is done when it is rendered.
+            # Edit the finished house directly; the step runs only when rendering.
             before = self.house(source.unedited, recipe)
             return before._replace(house=apply_edits(before.house, source, recipe.read))
         return self._unedited(source, recipe)
@@ -193,7 +192,7 @@ class Renderer:
         get, key = work.store.get, keys.house_key
         report = RepairReport.model_validate_json(get(key(source.house_id, "repair.json")))
         house = self._cached(work).house
-        # Edits of it begin here.
+        # Keep the house as the base for edits.
         dress_key = key(source.house_id, keys.DRESS)
         is_dressed = work.store.head(dress_key) is not None
         dressing = DressReport.model_validate_json(get(dress_key)) if is_dressed else None
@@ -233,7 +232,7 @@ class Renderer:
             self._give_cameras(work, viewpoints)
         for step in plan.house_steps(want, source.house_id)[1:]:
             self._run(step, work)
-        # In a store of its own: another call may ask for other files of the same view.
+        # Use a separate store: another call may request other files of the same view.
         taken = MemoryStore()
         taken.put(keys.RECIPE, json_bytes(recipe))
         inner = replace(work, store=taken)
@@ -258,7 +257,7 @@ class Renderer:
         run_step(step, work)
 
     def _give_cameras(self, work: Work, viewpoints: Iterable[Viewpoint]) -> None:
-        """Write cameras.json of cameras from Python, those of former calls among them."""
+        """Write cameras.json for cameras from Python, including those of earlier calls."""
         key = keys.house_key(work.house_id, "cameras.json")
         views = {}
         new_views = {viewpoint.id: viewpoint.view for viewpoint in viewpoints}
@@ -268,7 +267,7 @@ class Renderer:
             views = _without_other_film(work, views, new_views)
         views |= new_views
         all_views = [views[name] for name in sorted(views)]
-        # Its digest says where they come from, not which they are: a view's own id does.
+        # The digest covers the source of the cameras, not the cameras; a view's id does that.
         work.store.delete(keys.marker_key(work.house_id, "cameras"))
         facts = {"views": [[v.id, v.room_id, v.score] for v in all_views]}
         data = cameras_json(all_views, {"source": "given", "n_views": len(all_views)})
@@ -279,9 +278,9 @@ class Renderer:
 def _without_other_film(
     work: Work, stored: Mapping[str, View], new: Mapping[str, View]
 ) -> dict[str, View]:
-    """The views that are held, without the frames of another film than is given.
+    """The stored views, without the frames of a different film.
 
-    Frames are named by their numbers: what was made of others of these names is taken away.
+    Film frames are named by number, so results of another film's frames are invalidated.
     """
     films = [
         {name: cameras_json([v], {}) for name, v in views.items() if v.frame is not None}
@@ -298,7 +297,7 @@ def _without_other_film(
 
 
 def _sketch_by_rays(cached: CachedHouse, camera: Camera) -> NDArray[np.uint8]:
-    """(H, W, 3) uint8: diffuse colours as a lamp at the camera shows them, half as bright edge-on."""
+    """(H, W, 3) uint8 diffuse colours, lit from the camera; half as bright at grazing angles."""
     from pbrs_farm.transport.scene_tables.material_rows import max_albedo
     from pbrs_farm.truth.surface_layers import albedo_label
 
@@ -312,6 +311,6 @@ def _sketch_by_rays(cached: CachedHouse, camera: Camera) -> NDArray[np.uint8]:
 
 
 def _copy_steps(of: Store, to: Store, house: str, view: str, steps: Iterable[str]) -> None:
-    """Copy what steps of a view have made, those that are done."""
+    """Copy the results of a view's finished steps."""
     for step in steps:
         copy_done(of, to, keys.marker_key(house, step, view))

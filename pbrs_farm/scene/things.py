@@ -1,4 +1,4 @@
-"""Furniture and small items made on request, by pf.thing. Effects: writes a GLB into the cache."""
+"""Furniture and small items generated on request, by pf.thing. Effects: writes a GLB into the cache."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where pictures are taken from: cameras that a home's sampler chose, or the user; no effects."""
+"""Viewpoints: cameras chosen by a home's sampler or by the user; no effects."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from pbrs_farm.sample.stored_cameras import OUTSIDE, room_of, sector_of
 if TYPE_CHECKING:
     from pbrs_farm.scene.home import Home
 
-_SKETCH_PX: Final = 160  # of the longer edge of a small picture
+_SKETCH_PX: Final = 160  # longer edge of a small picture, pixels
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,7 +33,7 @@ class Viewpoint:
     """A camera in a home, and how it was chosen."""
 
     view: View
-    chosen_by: CameraFields | None = None  # None: by the user
+    chosen_by: CameraFields | None = None  # None: chosen by the user
 
     @property
     def id(self) -> str:
@@ -68,7 +68,7 @@ class Viewpoint:
 
 
 class Viewpoints(Sequence[Viewpoint]):
-    """The viewpoints of a home, and the report on those that were refused."""
+    """The viewpoints of a home, and the report on rejected ones."""
 
     def __init__(
         self,
@@ -76,7 +76,7 @@ class Viewpoints(Sequence[Viewpoint]):
         report: CameraReport | None = None,
         home: Home | None = None,
     ) -> None:
-        """home: they are of; a notebook shows what is seen from them where it is given."""
+        """home: the home of the viewpoints; if given, a notebook shows sketches of the views."""
         self._viewpoints = tuple(viewpoints)
         self.report = report
         self.home = home
@@ -127,7 +127,7 @@ class Viewpoints(Sequence[Viewpoint]):
                 for viewpoint, rgb in zip(some, pictures, strict=True)
             )
         except PbrsError as error:
-            # A machine that cannot draw them shows where they are.
+            # Without a renderer, show the error below the plan.
             cells = f"<p>{html.escape(str(error))}</p>"
         n_more = len(self) - len(some)
         more = f"<p>... and {n_more} more</p>" if n_more else ""
@@ -152,7 +152,7 @@ def viewpoint_of(camera: Camera, house: House, fields: CameraFields) -> Viewpoin
 def film_viewpoints(
     cameras: Sequence[Viewpoint], fps: float, from_s: float = 0.0
 ) -> list[Viewpoint]:
-    """Viewpoints one after another as the frames of a film, fps a second, the first at from_s."""
+    """Viewpoints in sequence as the frames of a film, fps a second, the first at from_s."""
     return [
         Viewpoint(
             replace(
@@ -171,6 +171,6 @@ def film_viewpoints(
 
 
 def rig_viewpoints(frames: Sequence[Viewpoint], rig: RigFields | None) -> list[Viewpoint]:
-    """Each viewpoint as the cameras of a rig take it; as they are without one."""
+    """The viewpoints of each rig camera for each frame; unchanged without a rig."""
     views = add_rig_views([frame.view for frame in frames], rig)
     return [Viewpoint(with_lens(view, LensFields(), rig)) for view in views]
