@@ -45,7 +45,7 @@ if TYPE_CHECKING:
 
     __version__: str
 
-# Public name -> where it is defined.
+# Public name -> module:name.
 _PUBLIC: Final = {
     "BadHouse": "pbrs_farm.core.errors:BadHouse",
     "BadInput": "pbrs_farm.core.errors:BadInput",
@@ -117,13 +117,13 @@ def __getattr__(name: str) -> Any:
 
 
 def _version() -> str:
-    """What was installed, by its metadata: the git tag that it was built from."""
+    """The installed version: the git tag of the build, from the package metadata."""
     from importlib.metadata import PackageNotFoundError, version
 
     try:
         return version("pbrs-farm")
     except PackageNotFoundError:
-        return "0+unknown"  # a folder on PYTHONPATH
+        return "0+unknown"  # run from a folder on PYTHONPATH, not installed
 
 
 def __dir__() -> list[str]:

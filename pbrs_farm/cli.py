@@ -1,7 +1,7 @@
-"""The `pbrs-farm` command: arguments -> one verb's handler -> exit code. Effects: the verb's.
+"""The `pbrs-farm` command: parses arguments, runs one verb's handler, returns an exit code. Effects: the verb's.
 
-A command imports the module of its own verb only. Exit codes: 0 done; 1 something failed, the rest
-was done; 2 the arguments are wrong; 130 interrupted.
+A command imports only the module of its verb. Exit codes: 0 success; 1 a part failed, the rest
+completed; 2 invalid arguments; 130 interrupted.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ from pbrs_farm.core.errors import PbrsError
 from pbrs_farm.core.shown_text import did_you_mean
 from pbrs_farm.installation import EXTRA_OF, install_command
 
-# Module of pbrs_farm.commands -> the verbs it adds, in the order of the help.
+# Module of pbrs_farm.commands -> its verbs, in the order of the help.
 MODULES: Final = {
     module: tuple(row.verb for row in VERBS.values() if row.module == module)
     for module in dict.fromkeys(row.module for row in VERBS.values())
 }
 _OF_THE_FARM: Final = ("submitting", "steering")  # modules that need celery and redis
-# Modules whose verbs read files of others: the command runs them in a process that may die.
+# Modules whose verbs read untrusted files, so they run in a child process that may crash.
 OF_STRANGERS: Final = (
     "making",
     "data_sets",
@@ -43,9 +43,9 @@ OF_STRANGERS: Final = (
 
 
 def command() -> int:
-    """Run the command of this process' words, in a child where it reads files of others; the exit code.
+    """Run the command given by sys.argv, in a child process if it reads untrusted files; returns the exit code.
 
-    A library that dies over a stranger's file ends the child alone: the parent says so in a line.
+    If a library crashes on such a file, only the child ends, and the parent prints an error line.
     """
     words = _verb_first(sys.argv[1:])
     if _module_of(words) not in OF_STRANGERS:
@@ -61,17 +61,17 @@ def _module_of(words: Sequence[str]) -> str | None:
 
 def _verb_first(words: Sequence[str]) -> list[str]:
     def parser_of(verb: str) -> argparse.ArgumentParser:
-        # A verb whose packages are not installed takes no option.
+        # If a verb's packages are not installed, it has no options.
         return build_parser(_module_of([verb]), words).verbs().get(verb, Parser())
 
     return verb_first(words, list(VERBS), parser_of)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one command in this process; the exit code. Without words: those of this process.
+    """Run one command in this process; returns the exit code. argv: sys.argv[1:] if None.
 
-    main(["run", "builtin", "--out", "out/x"]) is what tests call. Prints; raises nothing but what is
-    a fault of ours, and SystemExit for words that are wrong.
+    Tests call it as main(["run", "builtin", "--out", "out/x"]). Prints. Raises only internal errors,
+    and SystemExit for invalid arguments.
     """
     if argv is None:
         return command()
@@ -90,7 +90,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _run_parsed(words, verb, module)
     except KeyboardInterrupt:
         warn("interrupted; run the same command again to resume")
-        return 130  # 128 + SIGINT, as shells have it
+        return 130  # 128 + SIGINT, the convention of shells
     finally:
         if verb == "demo":
             _end_untaken()
@@ -110,28 +110,28 @@ def _run_parsed(words: Sequence[str], verb: str, module: str | None) -> int:
 
 
 def _start_early(words: Sequence[str]) -> None:
-    """Start the demo's process that makes the house, before the modules of the verb are loaded."""
+    """Start the process that makes the demo's house before the verb's modules are imported."""
     from pbrs_farm.operating_system import OPEN_FILES_MOVE
     from pbrs_farm.run.processes.early_start import FINISHING_HANDLER, start_early
     from pbrs_farm.run.processes.limits import is_room_for_two
 
     options = {word.partition("=")[0] for word in words}
-    # Other numbers of processes have other processes; the run moves the log of the one it takes.
+    # With --jobs the run starts other processes. It renames the log of the process it adopts.
     if OPEN_FILES_MOVE and is_room_for_two() and not options & {"-h", "--help", "--jobs"}:
-        # What cannot start now cannot later either, and is told then.
+        # A failed start fails again in the run, which reports it.
         with suppress(OSError):
             start_early(FINISHING_HANDLER)
 
 
 def _end_untaken() -> None:
-    """End what _start_early started and no run has taken: its words were wrong, or ask for others."""
+    """End the process of _start_early if no run adopted it, for example after invalid arguments."""
     from pbrs_farm.run.processes.early_start import end_untaken
 
     end_untaken()
 
 
 def _handled(args: argparse.Namespace) -> int:
-    """Run the verb's handler and turn what it raises into an exit code."""
+    """Run the verb's handler; its exceptions become exit codes."""
     try:
         return int(args.handler(args) or 0)
     except PbrsError as error:
@@ -140,25 +140,25 @@ def _handled(args: argparse.Namespace) -> int:
         warn(str(error))
         return 1
     except ModuleNotFoundError as error:
-        # A package of an extra that is not installed is no fault of ours.
+        # A missing package of an optional extra is not an internal error.
         if error.name not in EXTRA_OF or args.debug:
             raise
         warn(f"this needs {error.name}: {install_command(EXTRA_OF[error.name])}")
         return 1
     except BrokenPipeError:
-        # The reader of the pipe is gone: keep Python from complaining as it exits.
+        # The pipe's reader has closed it: redirect stdout so that Python prints no error at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
 
 
 def build_parser(module: str | None = None, words: Sequence[str] | None = None) -> Parser:
-    """The parser with the verbs of one module of pbrs_farm.commands, or with all.
+    """Build the parser with the verbs of one module of pbrs_farm.commands, or of all modules.
 
-    module: a name of MODULES. One module is imported for one verb, so that a command starts fast; the
-    farm's verbs are left out where celery or redis is not installed. words: of the command, which some
-    options depend on; with None the parser has all options.
+    module: a key of MODULES; a single one makes a command start fast. Verbs of the farm are omitted if
+    celery or redis is not installed. words: the command's arguments, on which some options depend;
+    None adds all options.
     """
-    # Every verb takes --debug, before or after its own options.
+    # All verbs accept --debug, before or after their other options.
     common = Parser(add_help=False)
     common.add_argument("--debug", action="store_true", help="show tracebacks")
     parser, add_parser = _bare_parser()
@@ -179,7 +179,7 @@ def build_parser(module: str | None = None, words: Sequence[str] | None = None) 
 
 
 def first_screen() -> Parser:
-    """The parser of a command without a verb: it knows their names and help, and imports none of them."""
+    """Parser for a command without a verb: has all verb names and help texts, and imports no verb."""
     parser, add_parser = _bare_parser()
     for row in VERBS.values():
         if row.module not in _OF_THE_FARM or has_farm():
@@ -188,7 +188,7 @@ def first_screen() -> Parser:
 
 
 def _bare_parser() -> tuple[Parser, Callable[..., Parser]]:
-    """The parser without verbs, and what adds one."""
+    """The parser without verbs, and the function that adds a verb."""
     parser = Parser(
         prog="pbrs-farm",
         description="Houses designed by people in, physically-based training images with exact labels out.",
@@ -197,7 +197,7 @@ def _bare_parser() -> tuple[Parser, Callable[..., Parser]]:
         "--version", action=_Version, nargs=0, help="show program's version number and exit"
     )
     parser.set_defaults(debug=False, every_verb=build_parser)
-    # A base installation has no verb of the farm, and says how to get them.
+    # Without the farm's packages, the help names the command that installs them.
     if not has_farm():
         farm = "submit, status, workers and the other verbs of a farm need celery and redis"
         parser.epilog = f"{farm}: {install_command('workers')}"
@@ -205,7 +205,7 @@ def _bare_parser() -> tuple[Parser, Callable[..., Parser]]:
 
 
 class _Version(argparse.Action):
-    """Prints the version, which is looked up only then."""
+    """Option that prints the version; the metadata is read only when it is used."""
 
     def __call__(self, parser: argparse.ArgumentParser, *_parsed: object) -> None:
         echo(pbrs_farm.__version__)

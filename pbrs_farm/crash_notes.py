@@ -1,6 +1,6 @@
-"""Notes of the present file and step, for the process that watches this one: they locate a crash.
+"""Notes of the current file and step, which let the parent process locate a crash of this one.
 
-Effects: writes lines to the file that send_notes_to names. run/processes/verb_process.py reads them.
+Effects: writes lines to the file given to send_notes_to; run/processes/verb_process.py reads them.
 """
 
 from __future__ import annotations
@@ -10,15 +10,15 @@ import os
 from contextvars import ContextVar
 from typing import Final
 
-_MAX_CHARS: Final = 300  # of a file's name
+_MAX_CHARS: Final = 300  # maximum length of a file name in a note
 _FILE: ContextVar[int | None] = ContextVar("file", default=None)
 
 
 def note_step(file: str, step: str) -> None:
-    """Note the beginning of a file's step, for the process that watches this one, if any.
+    """Note the start of a step on a file for the parent process, if any.
 
-    A native library may kill the process without a message; the last note then locates the crash. Characters
-    that cannot be printed become "?". A failed write is no error.
+    If a native library kills the process without a message, the last note locates the crash. Unprintable
+    characters become "?". Write errors are ignored.
     """
     notes = _FILE.get()
     if notes is not None:
@@ -28,5 +28,5 @@ def note_step(file: str, step: str) -> None:
 
 
 def send_notes_to(notes: int) -> None:
-    """Write the notes of this thread's context to a file descriptor from now on."""
+    """Write notes of this thread's context to a file descriptor from now on."""
     _FILE.set(notes)

@@ -1,4 +1,4 @@
-"""What this machine can do, part by part, and what to do about what is missing.
+"""Check the parts of this machine and suggest a remedy for each missing one.
 
 Effects: starts a process per part that could crash (LLVM, GL), reads versions.
 """
@@ -29,8 +29,8 @@ from pbrs_farm.installation import (
 State = Literal["ok", "degraded", "missing"]
 PROBE_TIMEOUT_S: Final = 120
 GL: Final = "GL"
-"""The part whose lack leaves path tracing and takes the two OpenGL modes."""
-_EXCEPTION: Final = re.compile(r"^(pbrs_farm\.[\w.]+|\w+Error): ")  # before a traceback's last text
+"""Name of the OpenGL part. Without it the two OpenGL modes are unavailable; path tracing works."""
+_EXCEPTION: Final = re.compile(r"^(pbrs_farm\.[\w.]+|\w+Error): ")  # prefix of an error line
 
 # fmt: off
 PACKAGES: Final = (
@@ -50,27 +50,27 @@ _VARIANTS: Final = ("cuda_ad_rgb", "llvm_ad_rgb", "scalar_rgb")
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One part of the machine: its state, what was found, what to do about it."""
+    """Result of checking one part of the machine: state, details and remedy."""
 
     part: str
-    state: State  # degraded: the main job still runs
+    state: State  # degraded: the main job runs without it
     text: str
     remedy: str = ""
     needed: bool = False  # the main job cannot run without it
 
     @property
     def gives(self) -> str:
-        """What the part would give where it is not there and the main job does without; "" else."""
+        """The benefit of installing an absent, optional part; "" otherwise."""
         return "" if self.state == "ok" else _GIVES.get(self.part, "")
 
 
 def examine(store_url: str = "", redis_url: str = "") -> list[Finding]:
-    """Every part of the machine, in the order in which a house meets it.
+    """Check all parts of the machine, in the order in which a run uses them.
 
-    store_url, redis_url: what to try beside the machine; "" tries none. Each part that could crash
-    is tried in a process of its own, so that this takes some ten seconds and never ends ours.
+    store_url, redis_url: services to check too; "" skips them. Parts that could crash are checked in
+    child processes, about 10 s in all.
     """
-    # What to install where a library is missing.
+    # Remedy for missing libraries.
     again = install_command()
     return [
         _python(),
@@ -87,9 +87,9 @@ def examine(store_url: str = "", redis_url: str = "") -> list[Finding]:
 
 
 def can_run(findings: list[Finding]) -> bool:
-    """Whether the main job (run, demo) can run: nothing that it needs is missing.
+    """True if the main job (run, demo) can run, with all required parts present.
 
-    What is degraded slows it or takes a part of it, such as the OpenGL modes.
+    Degraded parts make it slower or disable an output, such as the OpenGL modes.
     """
     return not any(f.needed and f.state == "missing" for f in findings)
 
@@ -116,7 +116,7 @@ def packages() -> Finding:
 def _extras() -> Finding:
     missing = missing_extras()
     if not missing:
-        # `all` leaves it out: torch is large, and only networks need it.
+        # The extra `all` excludes torch, which is large and only used to train networks.
         exception = f" but study, which trains networks: {install_command('study')}"
         return Finding("extras", "ok", "all" + exception * (not is_installed("torch")))
     features = "; ".join(f"{name}: {GIVES[name]}" for name in missing)
@@ -129,7 +129,7 @@ def llvm() -> Finding:
     library = find_llvm()
     if library is not None:
         return Finding("LLVM", "ok", str(library))
-    # Say which versions there are: an old one looks like a good one to apt.
+    # List the old versions, as apt reports LLVM as installed.
     old = ", ".join(".".join(map(str, v)) for v, _path in llvm_libraries())
     text = f"only {old}; 14 to 16 crash inside Dr.Jit" if old else "no libLLVM found"
     text += f"; {MIN_LLVM} or later is needed (19 is what we test); running with scalar_rgb, several times slower"
@@ -141,7 +141,7 @@ def _variants() -> list[Finding]:
         probe(f"mitsuba {n}", check_variant, _variant_remedy(n), argument=n, state="degraded")
         for n in _VARIANTS
     ]
-    # One variant is enough; without any nothing can be rendered.
+    # One working variant is enough; without any, rendering is impossible.
     if not any(f.state == "ok" for f in findings):
         last = findings[-1]
         findings[-1] = Finding(last.part, "missing", last.text, last.remedy, True)
@@ -149,7 +149,7 @@ def _variants() -> list[Finding]:
 
 
 def _variant_remedy(name: str) -> str:
-    """What to do where a variant of Mitsuba does not work."""
+    """Remedy if a variant of Mitsuba fails."""
     if name == "cuda_ad_rgb":
         return "only with an NVIDIA GPU and its driver; not needed"
     return llvm_command() if name == "llvm_ad_rgb" else mitsuba_command()
@@ -186,13 +186,13 @@ def probe(
     needed: bool = False,
     state: State = "missing",
 ) -> Finding:
-    """The finding of a check, run in a process of its own: a crash there is a finding here.
+    """Run a check in a child process and return the finding; a crash counts as a failed check.
 
-    check: a function of this module; it returns what it found, and exits with a fault's text.
+    check: a function of this module; it returns a description, or raises SystemExit with the error.
     """
     code = f"import sys; from {__name__} import {check.__name__} as f; print(f(sys.argv[1]))"
     command = [sys.executable, "-c", code, argument]
-    # The child imports the check by name; its last line is what it found.
+    # The child imports the check by name; its last output line is the result.
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=PROBE_TIMEOUT_S)
     except subprocess.TimeoutExpired:
@@ -200,23 +200,22 @@ def probe(
         return Finding(part, state, text, remedy, needed)
     if done.returncode == 0:
         return Finding(part, "ok", done.stdout.strip().splitlines()[-1], "", needed)
-    # The last line of a traceback, or of SystemExit, is the fault.
+    # The last line of a traceback, or the text of SystemExit, is the error.
     lines = [line for line in done.stderr.splitlines() if line.strip()]
     text = lines[-1] if lines else f"ended with exit code {done.returncode}"
-    # Neither the name of the exception nor its own remedy is news to a reader.
+    # Drop the exception's name, and the remedy, which is shown separately.
     text = _EXCEPTION.sub("", text).removesuffix(f" ({remedy})")
     return Finding(part, state, text[:200], remedy, needed)
 
 
 def check_variant(name: str) -> str:
-    """Mitsuba's variant of that name traces a ray.
+    """Trace a ray with a variant of Mitsuba; SystemExit with the reason if that fails.
 
-    Traces in this process, so a library that crashes ends it: the doctor runs each check in a
-    child. SystemExit with the reason where it does not work.
+    Runs in this process, so a crash ends it; the doctor calls each check in a child.
     """
     from pbrs_farm.raycast import variant
 
-    # Dr.Jit would load an old LLVM and crash.
+    # Dr.Jit would load an older LLVM and crash.
     if name.startswith("llvm") and not variant.find_llvm():
         raise SystemExit(f"no LLVM of version {variant.MIN_LLVM} or later")
     variant.choose_variant()
@@ -226,7 +225,7 @@ def check_variant(name: str) -> str:
 
 
 def check_gl(_argument: str) -> str:
-    """An OpenGL context opens."""
+    """Open an OpenGL context."""
     from pbrs_farm.raster.gl_device import open_context
 
     context = open_context()
@@ -234,13 +233,13 @@ def check_gl(_argument: str) -> str:
 
 
 def check_denoiser(_argument: str) -> str:
-    """Open Image Denoise keeps a grey picture grey."""
+    """Denoise a grey picture with Open Image Denoise and check that it is unchanged."""
     import numpy as np
 
     from pbrs_farm.transport.develop.denoiser import denoise_radiance
 
     grey = np.full((32, 32, 3), 0.5, np.float32)
-    # The denoiser's guides: a grey albedo, a floor's normal.
+    # Guide images: grey albedo and an upward normal.
     normal = np.broadcast_to(np.array([0, 1, 0], np.float32), grey.shape).copy()
     mean = float(denoise_radiance(grey, grey, normal).mean())
     if abs(mean - 0.5) >= 0.05:
@@ -249,12 +248,12 @@ def check_denoiser(_argument: str) -> str:
 
 
 def check_pictures(_argument: str) -> str:
-    """OpenImageIO reads back the PNG it wrote."""
+    """Write a PNG with OpenImageIO and read it back."""
     import numpy as np
 
     from pbrs_farm.images import array_from_png, png_from_array
 
-    # Every value of a byte, in the 16 bits that depth has.
+    # All byte values, in 16 bits as in depth images.
     pixels = np.arange(256, dtype=np.uint16).reshape(16, 16)
     if not np.array_equal(array_from_png(png_from_array(pixels)), pixels):
         raise SystemExit("a PNG reads back as other pixels")
@@ -262,23 +261,21 @@ def check_pictures(_argument: str) -> str:
 
 
 def check_redis(url: str) -> str:
-    """The Redis at url answers."""
-    # By name: the package itself does without Redis.
+    """Ping the Redis at url."""
+    # Import by name: redis is an optional package.
     client = import_module("redis").Redis.from_url(url, socket_timeout=5)
     return f"answers, version {client.info('server')['redis_version']}"
 
 
 def check_store(url: str) -> str:
-    """The store at url keeps an object.
+    """Write, read and remove doctor/probe.txt in the store at url.
 
-    Writes, reads and removes doctor/probe.txt. SystemExit or the store's own error where one of
-    these fails.
+    Raises SystemExit or the store's own error if one of these fails.
     """
     from pbrs_farm.settings import settings_from_environment
     from pbrs_farm.store import store_from_url
 
     store = store_from_url(url, settings_from_environment().store)
-    # Write, read back, remove: what a worker does with every file.
     store.put("doctor/probe.txt", b"ok")
     if store.get("doctor/probe.txt") != b"ok":
         raise SystemExit("an object reads back as other bytes")

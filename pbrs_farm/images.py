@@ -1,8 +1,8 @@
-"""Pixels <-> PNG, EXR and JPEG bytes: the only user of OpenImageIO.
+"""Convert between pixel arrays and PNG, EXR or JPEG bytes; the only user of OpenImageIO.
 
-Effects: a temporary file per call, because the binding reads and writes files only. Writing uses memory
-(on a disk a small PNG took 5 ms), reading a disk. EXR channels are found by name, never by position
-(OpenEXR sorts them), and carry a fixed DateTime, so that equal images give equal bytes.
+Effects: one temporary file per call, as the binding only handles files. Written files are in memory
+(on disk a small PNG took 5 ms), read files on disk. EXR channels are found by name, never by position
+(OpenEXR sorts them). EXR files have a fixed DateTime, so equal images give equal bytes.
 """
 
 from __future__ import annotations
@@ -26,16 +26,16 @@ from pbrs_farm.operating_system import OPEN_FILES, memory_file
 
 MAX_FILE_PIXELS: Final = 16384 * 16384  # larger pictures are rejected before their pixels are read
 
-_FIXED_DATE: Final = "2000:01:01 00:00:00"  # of EXR files: equal images, equal bytes
+_FIXED_DATE: Final = "2000:01:01 00:00:00"  # DateTime of all EXR files, for equal bytes
 
-# (libpng filter, zlib level), the best of 24 measured on synthetic 640x480 pictures. Labels repeat
-# the row above: 16-bit depth takes 10 kB and a third of the time of libpng's own choice of filter
-# (17 kB), normals 4 kB and half of its time. Photographs go by the mean of left and above: noise of
-# 3 levels takes 536 kB and a fifth of its time (535 kB).
+# (libpng filter, zlib level), the best of 24 measured on synthetic 640x480 pictures. Labels use the
+# UP filter: 16-bit depth takes 10 kB and a third of the time of libpng's default choice of filter
+# (17 kB), normals 4 kB and half of its time. Photographs use AVG: noise of 3 levels takes 536 kB
+# and a fifth of its time (535 kB).
 _PNG_LABELS: Final = (32, 4)
 _PNG_PHOTO: Final = (64, 2)
 
-# First bytes -> kind of file.
+# First bytes -> file type.
 _MAGIC: Final = (
     (b"\x89PNG\r\n\x1a\n", ".png"),
     (b"\xff\xd8\xff", ".jpg"),
@@ -45,28 +45,27 @@ _MAGIC: Final = (
     (b"#?", ".hdr"),
 )
 _RESOLUTION: Final = re.compile(rb"\n\r?\n([+-])([XY]) +[0-9]+ +([+-])[XY] +[0-9]+\r?\n")
-_HDR_HEADER_BYTES: Final = 65_536  # maximum header of a Radiance picture
+_HDR_HEADER_BYTES: Final = 65_536  # maximum header size of a Radiance picture
 _TEXTURE_KINDS: Final = (".png", ".jpg", ".gif", ".bmp", ".tga")
 
 
 def png_from_array(
     array: NDArray[np.uint8] | NDArray[np.uint16], *, attribution: str = ""
 ) -> bytes:
-    """PNG bytes of (H, W) or (H, W, 3 or 4) uint8 or uint16; no alpha is added, no clock written.
+    """PNG bytes of (H, W) or (H, W, 3 or 4) uint8 or uint16, without an added alpha or timestamp.
 
-    Colour of 8 bits is marked sRGB; everything else is data. attribution: the file's copyright.
+    8-bit colour is tagged as sRGB, everything else as data. attribution: the file's copyright.
     """
     channels = _channels(array, (1, 3, 4))
     if array.dtype not in (np.uint8, np.uint16):
         raise ValueError(f"a PNG holds uint8 or uint16, got {array.dtype}")
-    # Compress photographs and labels each by what suits them.
     is_photo = channels >= 3 and array.dtype == np.uint8
     png_filter, level = _PNG_PHOTO if is_photo else _PNG_LABELS
     spec = oiio.ImageSpec(array.shape[1], array.shape[0], channels, str(array.dtype))
     spec["oiio:ColorSpace"] = "sRGB" if is_photo else "data"
     spec["png:filter"] = png_filter
     spec["png:compressionLevel"] = level
-    spec["oiio:UnassociatedAlpha"] = 1  # colours are not multiplied by alpha
+    spec["oiio:UnassociatedAlpha"] = 1  # store colours without multiplying them by alpha
     if attribution:
         spec["Copyright"] = attribution
     return _encoded(array, spec, ".png")
@@ -75,8 +74,8 @@ def png_from_array(
 def jpeg_from_array(array: NDArray[np.uint8], quality: int = 85) -> bytes:
     """JPEG bytes of (H, W) or (H, W, 3) uint8 sRGB; quality 1..100.
 
-    For pictures people look at: it loses a little, so never for labels. Equal arrays give equal
-    bytes on one machine. Raises ValueError for another shape or type.
+    For pictures to look at, never for labels, as JPEG is lossy. Equal arrays give equal bytes on one
+    machine. Raises ValueError for another shape or type.
     """
     channels = _channels(array, (1, 3))
     if array.dtype != np.uint8:
@@ -89,9 +88,9 @@ def jpeg_from_array(array: NDArray[np.uint8], quality: int = 85) -> bytes:
 def thumbnail(
     array: NDArray[np.uint8], *, max_edge_px: int, nearest: bool = False
 ) -> NDArray[np.uint8]:
-    """array, (H, W) or (H, W, C) uint8, with its longer edge at most max_edge_px; same form.
+    """Shrink (H, W) or (H, W, C) uint8 so that its longer edge is at most max_edge_px; never enlarges.
 
-    Never enlarges. nearest: keep values instead of averaging them, for labels and their colours.
+    nearest: pick pixels instead of averaging them, for labels and their colours.
     """
     height, width = array.shape[:2]
     scale = min(1.0, max_edge_px / max(height, width))
@@ -102,10 +101,10 @@ def thumbnail(
 def resized(
     array: NDArray[np.uint8], width_px: int, height_px: int, *, nearest: bool = False
 ) -> NDArray[np.uint8]:
-    """array, (H, W) or (H, W, C) uint8, on a grid of width_px x height_px.
+    """Resample (H, W) or (H, W, C) uint8 to width_px x height_px with a box filter.
 
-    By a box filter: averages when it shrinks, repeats when it enlarges. nearest: the pixel whose
-    centre is nearest, so that labels keep their values. Sides may change their ratio.
+    The aspect ratio may change. nearest: pick the pixel with the nearest centre, which preserves the
+    values of labels.
     """
     height, width = array.shape[:2]
     if (height, width) == (height_px, width_px):
@@ -114,7 +113,6 @@ def resized(
         rows = (np.arange(height_px) + 0.5) * height / height_px
         columns = (np.arange(width_px) + 0.5) * width / width_px
         return np.asarray(array[rows.astype(np.intp)[:, None], columns.astype(np.intp)])
-    # Average over boxes.
     channels = _channels(array, (1, 3, 4))
     source = oiio.ImageBuf(np.ascontiguousarray(array).reshape(height, width, channels))
     target = oiio.ImageBuf(oiio.ImageSpec(width_px, height_px, channels, "uint8"))
@@ -129,12 +127,11 @@ def exr_from_layers(
 ) -> bytes:
     """OpenEXR bytes of named channels ("outdoor.R": (H, W) float32), all of one size.
 
-    half: 16-bit floats instead of 32.
-    attribution: the file's copyright. Not handled: channels of unequal type.
+    half: 16-bit floats instead of 32. attribution: the file's copyright. All channels have one type.
     """
     if not layers:
         raise ValueError("an EXR needs at least one layer")
-    # Sort channels as OpenEXR does, so that files do not depend on the order of layers.
+    # Sort channels like OpenEXR, so that files do not depend on the order of layers.
     names = sorted(layers)
     shapes = {layers[name].shape for name in names}
     if len(shapes) != 1 or any(len(shape) != 2 for shape in shapes):
@@ -153,8 +150,8 @@ def exr_from_layers(
 def layers_from_exr(data: bytes, name: str = "radiance.exr") -> dict[str, F32]:
     """Channel name -> (H, W) float32 of an OpenEXR file.
 
-    Half floats become float32. Channels are found by name ("outdoor.R"); OpenEXR sorts them, so
-    never go by their place. Raises BadInput naming the file for anything else, or a damaged one.
+    Half floats become float32. Address channels by name ("outdoor.R"), as OpenEXR sorts them. Raises
+    BadInput with the file's name if it is damaged or not an EXR.
     """
     if _kind(data, name) != ".exr":
         raise _not_a("an OpenEXR file", data, name)
@@ -167,11 +164,11 @@ def layers_from_exr(data: bytes, name: str = "radiance.exr") -> dict[str, F32]:
 def array_from_png(
     data: bytes, name: str = "picture.png"
 ) -> NDArray[np.uint8] | NDArray[np.uint16]:
-    """The pixels as the PNG stores them: (H, W) or (H, W, C), uint8 or uint16.
+    """The pixels as stored in the PNG: (H, W) or (H, W, C), uint8 or uint16.
 
-    16 bits stay 16, no colour space is converted and alpha is not multiplied in: this reads labels. Use
-    decode_photo or decode_texture for pictures to look at and for textures. name: for messages. Raises
-    BadInput for data that is no PNG, is damaged or is above MAX_FILE_PIXELS.
+    For labels: keeps 16 bits, converts no colours and does not multiply by alpha. Use decode_photo or
+    decode_texture for photographs and textures. name: for messages. Raises BadInput for other formats,
+    damaged data, and more than MAX_FILE_PIXELS.
     """
     if _kind(data, name) != ".png":
         raise _not_a("a PNG file", data, name)
@@ -184,7 +181,7 @@ def array_from_png(
 def decode_photo(data: bytes, name: str) -> NDArray[np.uint8]:
     """(H, W, 3) uint8 sRGB of a PNG, JPEG, GIF, BMP or TGA; alpha is dropped.
 
-    As decode_texture reads it: 16 bits become 8, grey is repeated. Raises BadInput naming name.
+    Like decode_texture: 16 bits become 8, grey is repeated. Raises BadInput with the file's name.
     """
     return decode_texture(data, name)[..., :3]
 
@@ -192,15 +189,15 @@ def decode_photo(data: bytes, name: str) -> NDArray[np.uint8]:
 def decode_texture(data: bytes, name: str, media_type: str = "") -> NDArray[np.uint8]:
     """(H, W, 3) or (H, W, 4) uint8 sRGB, row 0 = top, of a PNG, JPEG, GIF, BMP or TGA.
 
-    The kind follows from the bytes; TGA, which has no signature, by name or media_type. Grey is
-    repeated to three channels; alpha is not multiplied into the colours and a wholly opaque one
-    is dropped. EXIF orientation is ignored. Raises BadInput naming name.
+    The type is detected from the bytes; for TGA, which has no signature, from name or media_type. Grey
+    is repeated to three channels; alpha is not multiplied into the colours, and dropped if fully
+    opaque. EXIF orientation is ignored. Raises BadInput with the file's name.
     """
     kind = _kind(data, f"{name} {media_type}".strip())
     if kind not in _TEXTURE_KINDS:
         raise _not_a("a PNG, JPEG, GIF, BMP or TGA picture", data, name)
     pixels, spec = _decoded(data, name, kind, "uint8")
-    # Part alpha from colour; drop it where it is opaque everywhere.
+    # Separate alpha from colour; drop it if it is opaque everywhere.
     channels = pixels.shape[2]
     if channels in (2, 4) and (spec.alpha_channel >= 0 or channels == 4):
         colour, alpha = pixels[..., :-1], pixels[..., -1:]
@@ -216,8 +213,8 @@ def decode_texture(data: bytes, name: str, media_type: str = "") -> NDArray[np.u
 def decode_radiance(data: bytes, name: str) -> F32:
     """(H, W, 3) float32 linear of a Radiance .hdr or OpenEXR panorama; BadInput if unreadable.
 
-    Values are as stored, not scaled or clipped. Channels are found by the names R, G and B, in
-    whatever order they lie; other channels are dropped. Row 0 is the top, however a .hdr is stored.
+    Values are not scaled or clipped. Channels are found by the names R, G and B; others are dropped.
+    Row 0 is the top, whatever the orientation of the .hdr.
     """
     kind = _kind(data, name)
     if kind not in (".hdr", ".exr"):
@@ -239,9 +236,9 @@ def _not_a(wanted: str, data: bytes, name: str) -> BadInput:
 
 
 def _upright(scanlines: NDArray[Any], data: bytes) -> NDArray[Any]:
-    """The scanlines of a Radiance picture as rows from the top, columns from the left.
+    """Flip and transpose a Radiance picture's scanlines to rows from the top, columns from the left.
 
-    The line before the pixels says which way they run ("-Y 64 +X 128" from the top, "+Y" from below,
+    The line before the pixels gives their order ("-Y 64 +X 128" from the top, "+Y" from below,
     "+X ... -Y" by columns), x to the right and y up (Ward, Radiance file formats).
     """
     match = _RESOLUTION.search(data[:_HDR_HEADER_BYTES])
@@ -284,7 +281,7 @@ def _temporary(suffix: str, data: bytes | None = None) -> Iterator[Path]:
 
 @contextmanager
 def _scratch(suffix: str) -> Iterator[Path]:
-    """An empty file in memory, where the system has such: one on a disk would be written out."""
+    """An empty file in memory if the system supports it, since a file on disk would be written out."""
     handle = memory_file("pbrs-image")
     if handle is None:
         with _temporary(suffix) as path:
@@ -301,7 +298,7 @@ def _encoded(array: NDArray[Any], spec: Any, suffix: str) -> bytes:
         output = oiio.ImageOutput.create(f"picture{suffix}")
         if output is None:
             raise MachineFailed(f"OpenImageIO cannot write {suffix}: {oiio.geterror()}")
-        # The binding takes a two-dimensional array for a row of pixels: always give it channels.
+        # The binding interprets a 2D array as a row of pixels, so add a channel axis.
         pixels = np.ascontiguousarray(array).reshape(spec.height, spec.width, spec.nchannels)
         written = output.open(str(path), spec) and output.write_image(pixels)
         closed = output.close()
@@ -315,9 +312,9 @@ def _encoded(array: NDArray[Any], spec: Any, suffix: str) -> bytes:
 
 def _decoded(data: bytes, name: str, suffix: str, kind: str) -> tuple[NDArray[Any], Any]:
     """(H, W, C) array of type kind ("unknown": as stored) and the file's ImageSpec."""
-    if suffix == ".png" and _is_cut_short(data):  # said here: libpng would write to stderr
+    if suffix == ".png" and _is_cut_short(data):  # raised here, as libpng would write to stderr
         raise BadInput(name, "", "cannot be read as a picture: damaged or truncated")
-    # Read alpha as stored, not multiplied into the colours.
+    # Read alpha without multiplying it into the colours.
     config = oiio.ImageSpec()
     config["oiio:UnassociatedAlpha"] = 1
     with _temporary(suffix, data) as path:
@@ -329,7 +326,7 @@ def _decoded(data: bytes, name: str, suffix: str, kind: str) -> tuple[NDArray[An
             if spec.width * spec.height > MAX_FILE_PIXELS:
                 raise BadInput(name, "", f"{spec.width}x{spec.height} pixels are too many")
             pixels = source.read_image(0, 0, 0, spec.nchannels, kind)
-            fault = source.geterror()  # a truncated file gives pixels and a fault
+            fault = source.geterror()  # a truncated file gives pixels and an error
         finally:
             source.close()
     if pixels is None or fault:
@@ -339,9 +336,9 @@ def _decoded(data: bytes, name: str, suffix: str, kind: str) -> tuple[NDArray[An
 
 def _is_cut_short(png: bytes) -> bool:
     """True if a chunk of the PNG is longer than the rest of the file."""
-    position = 8  # behind the signature
+    position = 8  # after the signature
     while position < len(png):
-        # A chunk: length, type, data, checksum.
+        # Chunk: length, type, data, checksum.
         end = position + 12 + int.from_bytes(png[position : position + 4], "big")
         if end > len(png):
             return True
@@ -352,6 +349,6 @@ def _is_cut_short(png: bytes) -> bool:
 
 
 def _reason(fault: str, path: Path) -> str:
-    # Take the temporary file's name out: it says nothing to the user.
+    # Hide the temporary file's name from the user.
     text = " ".join(fault.replace(str(path), "it").split())
     return f"cannot be read as a picture: {text or 'damaged or truncated'}"

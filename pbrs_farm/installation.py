@@ -1,6 +1,6 @@
-"""How this program was installed, and the command that adds what it lacks. Effects: reads /etc/os-release.
+"""Commands that install missing parts of this installation, for hints. Effects: reads /etc/os-release.
 
-A wheel takes its extras by name, a checkout from its own folder; each system has its own packages.
+A wheel takes extras by name, a checkout from its folder; system packages depend on the distribution.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ EXTRA_OF: Final = {
     "onnx": "study", "onnxscript": "study", "tensorboard": "tensorboard", "wandb": "wandb",
 }
 # fmt: on
-"""Module -> the extra of pyproject.toml that installs it; "" where every installation has it."""
+"""Module -> the extra of pyproject.toml that installs it; "" for required packages."""
 
 GIVES: Final = {
     "llvm": "light and labels several times faster, where the system has no LLVM",
@@ -38,9 +38,9 @@ GIVES: Final = {
     "ifc": "homes from IFC",
     "gltf": "packed meshes and textures of glTF",
 }
-"""Extra that a user may want -> what it gives."""
+"""Optional extra -> the feature it adds."""
 
-# System -> what is needed -> the command that installs it.
+# System -> library or service -> the command that installs it.
 _COMMANDS: Final = {
     "debian": {
         "llvm": "sudo apt-get install -y libllvm19",
@@ -81,10 +81,10 @@ _WHAT: Final = {
 
 
 def install_command(*extras: str) -> str:
-    """The pip command that adds extras to this installation; without any, that repairs it.
+    """The pip command that adds extras to this installation, or without extras reinstalls it.
 
-    extras: names of pyproject.toml; "" is ignored. In a checkout the command installs the checkout,
-    since no index has it; a wheel takes its extras by name. For hints of errors: nothing is run.
+    extras: names of pyproject.toml; "" is ignored. A checkout is installed from its folder, since no
+    index has it. For hints in errors: runs nothing.
     """
     chosen = [name for name in extras if name]
     names = f"[{','.join(chosen)}]" if chosen else ""
@@ -95,10 +95,9 @@ def install_command(*extras: str) -> str:
 
 
 def pip_command() -> str:
-    """How this Python's own pip is called: "pip" only where that word starts it, as in an active environment.
+    """Command prefix for this Python's pip: "pip" if PATH resolves to it, else "PYTHON -m pip".
 
-    For hints of what to install: the words go before "install", and always reach the environment
-    that runs us.
+    For hints: "install ..." follows it, and it always reaches the current environment.
     """
     path = shutil.which("pip")
     is_ours = path is not None and Path(path).parent == Path(sys.executable).parent
@@ -106,40 +105,40 @@ def pip_command() -> str:
 
 
 def checkout_folder(package: Path | None = None) -> Path | None:
-    """The checkout that this program runs from, None where it was installed from a wheel.
+    """The checkout from which this program runs; None if it was installed from a wheel.
 
-    package: the folder pbrs_farm, this one where it is left out.
+    package: the folder pbrs_farm; default: this one.
     """
     folder = (package or Path(__file__).parent).parent
     return folder if (folder / "pyproject.toml").is_file() else None
 
 
 def system_command(what: str, system: str = "") -> str:
-    """The command that installs "llvm", "atomic", "gl" or "redis" on this system (or the one named).
+    """The command that installs "llvm", "atomic", "gl" or "redis" on this system (or the given one).
 
-    On a system that we know no command of, a sentence that says what to install.
+    On an unsupported system, a sentence that names the package to install.
     """
     return _COMMANDS.get(system or this_system(), _WHAT).get(what, _WHAT[what])
 
 
 def llvm_command() -> str:
-    """The command that adds LLVM: pip's, which needs no root, where there is a wheel of it."""
+    """The command that adds LLVM: pip's, which needs no root, if LLVM has a wheel for this platform."""
     if sys.platform == "linux" and platform.machine() == "x86_64":
         return install_command("llvm")
     return system_command("llvm")
 
 
 def missing_extras() -> list[str]:
-    """The extras of GIVES that lack a module here; LLVM's is no module and never among them."""
+    """Extras of GIVES with a missing module. LLVM has no module, so it is never included."""
     lacking = {EXTRA_OF[name] for name in EXTRA_OF if not is_installed(name)}
     return [extra for extra in GIVES if extra in lacking]
 
 
 def mitsuba_command() -> str:
-    """The command that repairs a Mitsuba that cannot be imported.
+    """The command that repairs a Mitsuba that fails to import.
 
-    Its wheel needs libatomic on Linux: where that is missing, the command that installs it, else the
-    one that installs the package again.
+    On Linux its wheel needs libatomic: if that is missing, the command installs it, else it reinstalls
+    the package.
     """
     if sys.platform == "linux":
         try:
@@ -150,9 +149,9 @@ def mitsuba_command() -> str:
 
 
 def this_system(os_release: Path = Path("/etc/os-release")) -> str:
-    """debian, ubuntu, fedora, arch, macos, or "" for one we know no command of.
+    """This system: debian, ubuntu, fedora, arch, macos, or "" if unsupported.
 
-    A system that is none of these is the first of them that os-release says it is like.
+    Derived distributions map to the first supported one of os-release's ID_LIKE.
     """
     if sys.platform == "darwin":
         return "macos"
@@ -161,25 +160,24 @@ def this_system(os_release: Path = Path("/etc/os-release")) -> str:
     except OSError:
         return ""
     fields = dict(line.partition("=")[::2] for line in lines)
-    # A system that is none of ours names those it is like.
     words = f"{fields.get('ID', '')} {fields.get('ID_LIKE', '')}".replace('"', "").split()
     alike = {"rhel": "fedora", "centos": "fedora"}
     return next((s for w in words if (s := alike.get(w, w)) in _COMMANDS), "")
 
 
 def is_installed(module: str) -> bool:
-    """Whether a module could be imported, as far as its files tell; nothing is imported.
+    """True if a module is installed, judged by its files without importing it.
 
-    A package that is there and broken counts as installed.
+    A broken package counts as installed.
     """
-    # kombu, once imported, has no spec any more.
+    # kombu has no spec after its import.
     return module in sys.modules or find_spec(module) is not None
 
 
 def need(*modules: str) -> None:
-    """Raise MachineFailed, naming what is missing and the command that adds it, unless all modules are there.
+    """Raise MachineFailed if a module is missing, with its name and the command that installs it.
 
-    need("moderngl") at the start of a verb says at once what each step would say later.
+    need("moderngl") at the start of a verb fails before any step does.
     """
     missing = [name for name in modules if not is_installed(name)]
     if missing:

@@ -1,7 +1,7 @@
-"""Differences between operating systems, each with a substitute where POSIX or Linux names are missing.
+"""Wrappers for functions that differ between operating systems, with substitutes for POSIX and Linux.
 
-Processes, their memory, pipes and files. No other module uses such a name. Effects: those of
-each function. psutil is imported by the functions that need it, since the command line imports this module.
+They cover processes, memory, pipes and files; other modules use no system-specific names. Effects:
+those of each function. psutil is imported on use, since the command line imports this module.
 """
 
 from __future__ import annotations
@@ -22,18 +22,18 @@ from pathlib import Path, PureWindowsPath
 from typing import IO, Any, Final, Protocol
 
 NOT_REGULAR: Final = "is no regular file (a device or a pipe)"
-_PR_SET_PDEATHSIG: Final = 1  # of linux/prctl.h
-_LOOK_EVERY_S: Final = 1.0  # whether the parent lives, where the system does not tell of its end
-_CRASH_CODES: Final = 0xC0000000  # Windows: exit codes from here on are faults that it names
-_CHUNK: Final = 65536  # bytes read of a pipe at once
+_PR_SET_PDEATHSIG: Final = 1  # from linux/prctl.h
+_LOOK_EVERY_S: Final = 1.0  # interval of checks for a dead parent, where the system sends no signal
+_CRASH_CODES: Final = 0xC0000000  # Windows: lowest exit code that is a fault (NTSTATUS error)
+_CHUNK: Final = 65536  # maximum bytes per read of a pipe
 
-_POSIX: Final = hasattr(os, "killpg")  # whether there are process groups, and signal 0 asks
+_POSIX: Final = hasattr(os, "killpg")  # has process groups, and signal 0 as a test
 OWN_SESSION: Final[Mapping[str, Any]] = (
     {"start_new_session": True}
     if _POSIX
     else {"creationflags": getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0)}
 )
-"""Options of Popen for a process that Ctrl-C does not reach, and that end_tree ends with all it started."""
+"""Popen options for a process that ignores Ctrl-C and that end_tree ends with its descendants."""
 
 MEMORY_LIMIT: Final = """
 try:
@@ -42,16 +42,16 @@ try:
 except (ImportError, ValueError, OSError):
     pass  # a system that limits no process
 """
-"""Code for a process that may not take more than 8 GiB, where the system can hold it to that."""
+"""Code that limits a process to 8 GiB of memory, where the system supports it."""
 
 
 # Processes
 
 
 def end_tree(process: subprocess.Popen[bytes]) -> None:
-    """Kill a process that was started with OWN_SESSION, and whatever it started, without waiting.
+    """Kill a process started with OWN_SESSION and its descendants, without waiting.
 
-    SIGKILL to its process group; where there are no groups, each process below it is ended.
+    Sends SIGKILL to the process group; without process groups, kills each process of the tree.
     """
     if _POSIX:
         # macOS forbids signals to a group whose processes have all ended.
@@ -68,19 +68,19 @@ def end_tree(process: subprocess.Popen[bytes]) -> None:
 
 
 def has_crashed(code: int) -> bool:
-    """Whether an exit code is that of a process that did not end by itself."""
+    """True if an exit code means a signal or a fault."""
     return code < 0 or code >= _CRASH_CODES
 
 
 def was_killed(code: int) -> bool:
-    """Whether an exit code may be that of a process which the system killed, as when memory is short."""
+    """True if an exit code means SIGKILL, as sent when memory runs out."""
     return hasattr(signal, "SIGKILL") and code == -signal.SIGKILL
 
 
 def ending(code: int) -> str:
-    """How a process ended, in words; code: minus the signal that killed it, or Windows' number of a fault.
+    """Describe how a process ended. code: minus the signal that killed it, or Windows' fault number.
 
-    Signals are named; SIGKILL says that memory may have been short, as the kernel kills so.
+    Names the signal; SIGKILL adds a note that memory may have run out, as the kernel then sends it.
     """
     if was_killed(code):
         return "its process was killed by SIGKILL from outside (out of memory?)"
@@ -92,11 +92,11 @@ def ending(code: int) -> str:
 
 
 def die_with_parent(sign: int | None = None) -> None:
-    """Have this process end when the one that started it does; sign: the signal, SIGKILL unless given.
+    """Make this process end when its parent ends. sign: the signal to use; default SIGKILL.
 
-    Linux sends the signal when the parent's thread ends, so a parent starts children from a thread that lives
-    as long as they should; it is lost when the child starts another program with other rights. Elsewhere a
-    thread of ours looks once a second.
+    Linux sends the signal when the parent's thread ends, so the parent must start children from a thread
+    with their lifetime. The setting is lost when the child executes a program with other privileges. Other
+    systems use a thread that checks once a second.
     """
     parent = os.getppid()
     if not _has_proc():
@@ -110,12 +110,12 @@ def die_with_parent(sign: int | None = None) -> None:
 
 
 def dying_with_parent(sign: int | None = None) -> Callable[[], None] | None:
-    """The preexec_fn of a program that ends when this process does; None where only Linux could do it."""
+    """A preexec_fn for a program that ends with this process; None on other systems than Linux."""
     return (lambda: die_with_parent(sign)) if _has_proc() else None
 
 
 def _end_after(parent: int, sign: int | None) -> None:
-    # Windows keeps the number of a parent that is gone, others give the orphan a new one.
+    # Windows keeps the parent's pid after its end; other systems give the orphan a new parent.
     while os.getppid() == parent and is_running(parent):
         time.sleep(_LOOK_EVERY_S)
     _end_by(sign)
@@ -129,14 +129,14 @@ def _end_by(sign: int | None) -> None:
 
 
 def is_running(pid: int) -> bool:
-    """True while a process of this number runs, or has ended and was not waited for."""
+    """True if a process with this pid runs, or is a zombie."""
     import psutil
 
     return bool(psutil.pid_exists(pid))
 
 
 def after_fork(act: Callable[[], None]) -> None:
-    """Have each process that is forked from this one call act first; nothing where none is ever forked."""
+    """Call act first in every process forked from this one; no effect on systems without fork."""
     if hasattr(os, "register_at_fork"):
         os.register_at_fork(after_in_child=act)
 
@@ -145,14 +145,14 @@ def after_fork(act: Callable[[], None]) -> None:
 
 
 def memory_bytes() -> int:
-    """Memory of this machine, bytes."""
+    """Physical memory of this machine, bytes."""
     import psutil
 
     return int(psutil.virtual_memory().total)
 
 
 def resident_mb(pid: int) -> float:
-    """Resident memory of a process in MiB, 0 when it is gone; pages shared with others count in full."""
+    """Resident memory of a process in MiB, with shared pages in full; 0 if it has ended."""
     import psutil
 
     try:
@@ -176,7 +176,7 @@ def tree_mb(pid: int) -> float:
 
 
 def peak_mb() -> float:
-    """Largest resident memory of this process so far, MB."""
+    """Peak resident memory of this process, MB."""
     try:
         resource = import_module("resource")
     except ImportError:
@@ -185,13 +185,13 @@ def peak_mb() -> float:
         memory = psutil.Process().memory_info()
         return float(getattr(memory, "peak_wset", memory.rss)) / 1e6
     peak = float(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
-    return peak / 1000 if _has_proc() else peak / 1e6  # Linux counts in KiB, macOS in bytes
+    return peak / 1000 if _has_proc() else peak / 1e6  # KiB on Linux, bytes on macOS
 
 
 def give_back_memory() -> None:
-    """Hand pages that nothing uses back to the system, where the C library can; 5 ms.
+    """Return free heap pages to the system, if the C library supports it; 5 ms.
 
-    Each thread has an arena of its own (mallopt(3)), which keeps what was freed.
+    Each thread has a malloc arena, which otherwise keeps freed memory (mallopt(3)).
     """
     if _has_proc():
         trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
@@ -203,30 +203,30 @@ def give_back_memory() -> None:
 
 
 class Readable(Protocol):
-    """What has a descriptor that can be waited for."""
+    """An object with a file descriptor that can be waited for."""
 
     def fileno(self) -> int: ...
 
 
 class ReplyPipe:
-    """The end of a pipe that is read as it fills; wait_readable waits for several.
+    """The read end of a pipe; wait_readable waits for several.
 
-    select(2) watches pipes on POSIX. Where it knows sockets alone, a thread reads each pipe.
+    Uses select(2) on POSIX. Windows' select supports only sockets, so a thread reads each pipe.
     """
 
     def __init__(self, pipe: IO[bytes]) -> None:
         self._pipe = pipe
-        self._chunks: list[bytes] = []  # what the thread has read; b"" is the end
+        self._chunks: list[bytes] = []  # chunks read by the thread; b"" marks the end
         if not _POSIX:
             _READ_BY_THREAD[pipe.fileno()] = self
             threading.Thread(target=self._fill, daemon=True).start()
 
     def fileno(self) -> int:
-        """Its descriptor."""
+        """The file descriptor."""
         return self._pipe.fileno()
 
     def read(self, timeout_s: float) -> bytes | None:
-        """What has come, b"" at the pipe's end, None where nothing comes in timeout_s. From one thread only."""
+        """Read available bytes: b"" at the end, None after timeout_s without data. Call from one thread only."""
         if not wait_readable([self], timeout_s):
             return None
         if _POSIX:
@@ -235,13 +235,13 @@ class ReplyPipe:
             return self._chunks.pop(0) if self._chunks[0] else b""
 
     def close(self) -> None:
-        """Close it; the process at its other end has ended."""
+        """Close the pipe after the process at its other end has ended."""
         if not self._pipe.closed:
             _READ_BY_THREAD.pop(self.fileno(), None)
             self._pipe.close()
 
     def has_news(self) -> bool:
-        """Whether the thread has read something, or the end."""
+        """True if the thread has read data or the end."""
         return bool(self._chunks)
 
     def _fill(self) -> None:
@@ -256,12 +256,12 @@ class ReplyPipe:
                 _NEWS.notify_all()
 
 
-_READ_BY_THREAD: Final[dict[int, ReplyPipe]] = {}  # by descriptor
+_READ_BY_THREAD: Final[dict[int, ReplyPipe]] = {}  # descriptor -> pipe
 _NEWS: Final = threading.Condition()
 
 
 def wait_readable(files: Sequence[Readable], timeout_s: float) -> bool:
-    """Whether one of the reply pipes, or of what has their descriptors, can be read within timeout_s."""
+    """True if a reply pipe, or another object with the same descriptor, becomes readable within timeout_s."""
     if _POSIX:
         return bool(select.select(files, [], [], timeout_s)[0])
     pipes = [_READ_BY_THREAD[file.fileno()] for file in files]
@@ -273,9 +273,9 @@ def wait_readable(files: Sequence[Readable], timeout_s: float) -> bool:
 
 
 def open_unwaiting(path: Path) -> int:
-    """The descriptor of a file opened to be read, a pipe without a writer too; OSError as of os.open.
+    """Open a file for reading without waiting for a pipe's writer; returns the descriptor. OSError like os.open.
 
-    Where opening cannot be asked not to wait, what is no regular file is an OSError instead.
+    Systems without O_NONBLOCK raise OSError for anything but a regular file.
     """
     if hasattr(os, "O_NONBLOCK"):
         return os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
@@ -285,17 +285,17 @@ def open_unwaiting(path: Path) -> int:
 
 
 OPEN_FILES_MOVE: Final = _POSIX
-"""Whether a file can be moved while a process has it open."""
+"""True if a file can be renamed while a process has it open."""
 
 
 def create_new(path: Path) -> int:
-    """The descriptor of a file that was not there, opened to be written; FileExistsError where it was."""
+    """Create a file for writing; returns its descriptor. FileExistsError if it exists."""
     flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_CLOEXEC", 0)
     return os.open(path, flags | _OF_WINDOWS, 0o666)
 
 
 def flush_folder(folder: Path) -> None:
-    """Have the names in a folder outlive a loss of power; nothing where folders cannot be opened."""
+    """Sync a folder's entries to disk; no effect where folders cannot be opened."""
     if not hasattr(os, "O_DIRECTORY"):
         return
     descriptor = os.open(folder, os.O_RDONLY)
@@ -309,42 +309,42 @@ _OF_WINDOWS: Final[int] = getattr(os, "O_BINARY", 0) | getattr(os, "O_NOINHERIT"
 
 
 OPEN_FILES: Final = Path("/proc/self/fd")
-"""Where the files that this process holds open are, by number, on Linux."""
+"""Linux folder of this process's open files, by descriptor."""
 
 
 def memory_file(name: str) -> int | None:
-    """The descriptor of a new file in memory, which OPEN_FILES has; None where none can be made."""
+    """Create a file in memory, reachable through OPEN_FILES; returns its descriptor, or None if unsupported."""
     if not (hasattr(os, "memfd_create") and OPEN_FILES.is_dir()):
         return None
     try:
         return os.memfd_create(name)
-    except OSError:  # a sandbox forbids it
+    except OSError:  # forbidden in some sandboxes
         return None
 
 
 def has_drive(place: str) -> bool:
-    """Whether words name a folder by a drive, as C:\\homes does; a URL has more letters before its colon."""
+    """True if a path has a drive letter (C:\\homes); a URL's scheme has more than one letter."""
     return bool(PureWindowsPath(place).drive)
 
 
 def path_of_url(path: str) -> Path:
     """The path that the part of a file URL after its host names: /C:/homes is C:\\homes on Windows."""
-    from urllib.request import url2pathname  # loads what speaks HTTP
+    from urllib.request import url2pathname  # imports HTTP modules
 
     return Path(url2pathname(path))
 
 
 def kernel_cache() -> Path:
-    """The folder in which Dr.Jit keeps compiled kernels."""
+    """Dr.Jit's folder of compiled kernels."""
     return Path.home() / ".drjit" if _POSIX else Path.home() / "AppData/Local/Temp/drjit"
 
 
 def has_nvidia_driver() -> bool:
-    """Whether the driver of an NVIDIA GPU is installed."""
+    """True if an NVIDIA driver is installed."""
     on_windows = Path(os.environ.get("SYSTEMROOT", "C:/Windows"), "System32/nvcuda.dll")
     return Path("/proc/driver/nvidia").exists() or on_windows.exists()
 
 
 def _has_proc() -> bool:
-    """Whether this is Linux, whose processes are files."""
+    """True on Linux, which has /proc."""
     return Path("/proc/self/statm").exists()

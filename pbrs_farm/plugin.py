@@ -1,12 +1,12 @@
-"""The stable names for plugins: they stay from version to version, as do those of `pbrs_farm`.
+"""The stable names for plugins: like those of `pbrs_farm`, they stay from version to version.
 
-Everything else in the package may move or change with any version. docs/plugins.md describes each kind of
-plugin; examples/plugins has a package of each. A removed name is kept for one minor version with a warning,
-and the changelog names its replacement.
+Everything else in the package may change with any version. docs/plugins.md describes each kind of
+plugin; examples/plugins has a package of each. A removed name keeps working for one minor version with a
+warning, and the changelog names its replacement.
 
     from pbrs_farm.plugin import BadHouse, Format, House
 
-Names are imported when they are first used. No effects.
+Names are imported on first use. No effects.
 """
 
 from __future__ import annotations
@@ -96,7 +96,7 @@ if TYPE_CHECKING:
     from pbrs_farm.transport.develop.mode_pictures import develop as develop
     from pbrs_farm.truth.optional_layers import LabelInputs as LabelInputs
 
-# Module -> the names of it that a plugin may use.
+# Module -> its names for plugins.
 # fmt: off
 _MODULES: Final = {
     "core.arrays": ("HitRecord",),

@@ -28,18 +28,18 @@ from pbrs_farm.core.shown_text import printable
 from pbrs_farm.run.processes.render_task import Event
 
 ShareTeller: TypeAlias = "Callable[[str, float], None]"
-_SHARE_EVERY_S: Final = 30.0  # of a view
+_SHARE_EVERY_S: Final = 30.0  # interval between lines about one view
 _HOME_SHARE_EVERY_S: Final = 10.0
 
 
 class CountTeller(Protocol):
-    """Hears how many things are done, of how many where that is known."""
+    """Callback with the number of finished items and, if known, their total."""
 
     def __call__(self, n: int, of: int | None = None, /) -> None: ...
 
 
 class ProgressReporter(ABC):
-    """Reports a run's events, called with each, until its `with` block ends."""
+    """Reports a run's events: call it with each event inside its `with` block."""
 
     def __enter__(self) -> ProgressReporter:
         return self
@@ -52,9 +52,10 @@ class ProgressReporter(ABC):
 
 
 def progress_reporter(n_homes: int, *, as_json: bool) -> ProgressReporter:
-    """The reporter that fits: JSON lines where asked for, bars where standard error is a terminal, else lines.
+    """Choose a reporter: JSON lines if as_json, bars if standard error is a terminal, else plain lines.
 
-    n_homes: how many will be made, for the time left. It is a context manager, called with each event:
+    n_homes: number of homes to make, for the remaining time. Use it as a context manager and call it
+    with each event:
 
         with progress_reporter(3, as_json=False) as report:
             run_local(run, report)
@@ -74,28 +75,28 @@ def _write_line(line: str) -> None:
 
 
 class TimeLeft:
-    """How long a run will take yet, by its events. now_s: seconds that only grow.
+    """Estimates a run's remaining time from its events. now_s: monotonic seconds.
 
-    Views of homes whose views are not known yet count as many as the known homes have on average,
-    and making such a home as long as the others took.
+    Homes whose views are not yet planned are assumed to have the average number of views and the average
+    time of preparation.
     """
 
     def __init__(self, n_homes: int) -> None:
         self._n_homes = n_homes
-        self._n_planned = 0  # homes whose views are known
-        self._n_views = 0  # of those
-        self._n_ended = 0  # views
-        self._n_made = 0  # views of them that were not there already
-        self._began_s: float | None = None  # when the first home or view that is made was begun
-        self._view_s = 0.0  # of steps of views that were made
-        self._home_s: dict[str, float] = {}  # home that was made -> seconds of its own steps
+        self._n_planned = 0  # homes with planned views
+        self._n_views = 0  # of these homes
+        self._n_ended = 0  # finished views
+        self._n_made = 0  # finished views rendered in this run
+        self._began_s: float | None = None  # start of the first home or view made in this run
+        self._view_s = 0.0  # total of the steps of rendered views
+        self._home_s: dict[str, float] = {}  # home made in this run -> seconds of its house steps
         self._making: set[str] = set()
-        self._shares: dict[str, float] = {}  # view under way -> share of its long step, light
+        self._shares: dict[str, float] = {}  # view in progress -> finished share of its light step
 
     def hear(self, event: Event, now_s: float) -> None:
-        """Take an event into account.
+        """Update the estimate with an event.
 
-        now_s: when it came, on a clock that only grows (time.monotonic).
+        now_s: time of the event on a monotonic clock.
         """
         if event.kind == "planned":
             self._n_planned += 1
@@ -116,7 +117,7 @@ class TimeLeft:
             self._shares[_name(event)] = event.facts["share"]
 
     def _hear_of_home(self, event: Event, now_s: float) -> None:
-        # A home that failed before its views were known has none.
+        # No views are expected of a home that failed before they were planned.
         self._n_homes -= event.kind == "failed" and event.step in ("house", "cameras")
         if event.kind == "begin" and self._began_s is None:
             self._began_s = now_s
@@ -126,7 +127,7 @@ class TimeLeft:
 
     @property
     def views_text(self) -> str:
-        """How many views have ended, of how many.
+        """Numbers of finished and of all views.
 
         "3 of 12"; "3 of about 40" while homes are still unread.
         """
@@ -134,15 +135,15 @@ class TimeLeft:
         return f"{self._n_ended} of {about}{self._expected_views()}"
 
     def seconds(self, now_s: float) -> float | None:
-        """Seconds to the end at now_s.
+        """Remaining seconds at now_s.
 
-        None while no view was made, not even a part of one: nothing is known of how long one takes.
+        None until a part of a view is rendered.
         """
         part = sum(self._shares.values())
         n_made = self._n_made + part
         if self._began_s is None or not n_made > 0:
             return None
-        # A home counts as the views that are made while it is.
+        # A home counts as many views as could be rendered in its time.
         home_s, n_homes = sum(self._home_s.values()), max(1, len(self._home_s))
         views_a_home = home_s / n_homes / (self._view_s / n_made) if self._view_s else 0.0
         done = n_made + views_a_home * len(self._home_s)
@@ -157,12 +158,12 @@ class TimeLeft:
         return round(self._n_views + self._n_unknown() * a_home)
 
     def _n_unknown(self) -> int:
-        """Homes whose views are not known yet."""
+        """Number of homes whose views are not yet planned."""
         return max(0, self._n_homes - self._n_planned)
 
 
 def seconds_text(seconds: float) -> str:
-    """A time for people, in its two largest units.
+    """Format a duration in its two largest units.
 
     "40 s", "12 min", "3 h 20 min", "2 d 4 h".
     """
@@ -176,7 +177,7 @@ def seconds_text(seconds: float) -> str:
 
 
 class _JsonLines(ProgressReporter):
-    """A JSON object a line for each event."""
+    """Writes one JSON object per event and line."""
 
     def __call__(self, event: Event) -> None:
         row = {
@@ -196,14 +197,14 @@ class _JsonLines(ProgressReporter):
 
 
 class _PlainLines(ProgressReporter):
-    """A line per house's step and per finished view, with the time left; failures on standard error."""
+    """Writes a line per house step and finished view, with remaining time; failures to standard error."""
 
     def __init__(self, n_homes: int) -> None:
         self._left = TimeLeft(n_homes)
         self._started = time.monotonic()
         self._seconds: dict[str, float] = {}  # view -> seconds of its steps so far
-        self._made: dict[str, int] = {}  # view -> steps made now, not kept
-        self._told_s: dict[str, float] = {}  # view -> when its share was told last
+        self._made: dict[str, int] = {}  # view -> steps run now, not skipped
+        self._told_s: dict[str, float] = {}  # view -> time of its last line about its share
 
     def __call__(self, event: Event) -> None:
         name = _name(event)
@@ -212,7 +213,7 @@ class _PlainLines(ProgressReporter):
         if event.kind == "failed":
             sys.stderr.write(f"{clock} {name} {event.step}: FAILED: {printable(event.message)}\n")
         elif event.kind in ("done", "kept"):
-            # Add the step to its view; say a house's steps at once.
+            # Sum the steps of views; print the steps of houses immediately.
             self._seconds[name] = self._seconds.get(name, 0.0) + event.seconds
             self._made[name] = self._made.get(name, 0) + (event.kind == "done")
             if event.view_id is None:
@@ -226,7 +227,7 @@ class _PlainLines(ProgressReporter):
             _write_line(f"{clock} {name}: {how}; {self._left.views_text}{self._time_left()}")
 
     def _tell_share(self, name: str, clock: str, event: Event) -> None:
-        """A line for a view that takes minutes, twice a minute; for a home each ten seconds."""
+        """Write a line about a slow view twice a minute, about a home every ten seconds."""
         now_s = time.monotonic()
         every_s = _SHARE_EVERY_S if event.view_id else _HOME_SHARE_EVERY_S
         if now_s - self._told_s.get(name, self._started) < every_s:
@@ -254,14 +255,14 @@ def _facts(event: Event) -> str:
 
 
 class _Bars(ProgressReporter):
-    """A bar for houses and one for views, with rate and time left."""
+    """Shows a bar for houses and one for views, with rate and remaining time."""
 
     def __init__(self, n_homes: int) -> None:
         self._progress = _bars()
         self._houses = self._progress.add_task("houses", total=n_homes, note="")
         self._views = self._progress.add_task("views", total=None, note="")
         self._left = TimeLeft(n_homes)
-        self._n_views = 0  # of all houses whose views are known
+        self._n_views = 0  # planned views of all houses
         self._n_ended = 0
         self._started = 0.0  # when the first view ended; 0 = not yet
 
@@ -297,7 +298,7 @@ class _Bars(ProgressReporter):
             self._progress.advance(self._views)
 
     def _rate(self) -> str:
-        # Leave out the first view: its time includes the house's.
+        # Exclude the first view, whose time includes the house's.
         seconds = time.monotonic() - self._started if self._started else 0.0
         rate = f"{60 * (self._n_ended - 1) / seconds:.1f}/min" if self._n_ended > 1 else ""
         left_s = self._left.seconds(time.monotonic())
@@ -305,7 +306,7 @@ class _Bars(ProgressReporter):
 
 
 def _bars(done: ProgressColumn | None = None) -> Progress:
-    """Bars on standard error: what, bar, how much is done (n of n), time, a note."""
+    """Bars on standard error: noun, bar, progress (n of n), time, note."""
     return Progress(
         TextColumn("{task.description:<7}"),
         BarColumn(),
@@ -313,16 +314,16 @@ def _bars(done: ProgressColumn | None = None) -> Progress:
         TimeElapsedColumn(),
         TextColumn("{task.fields[note]}"),
         console=Console(stderr=True),
-        # Lines that go to a file or a pipe still go there while a bar is shown.
+        # Output to a file or pipe is not redirected while a bar is shown.
         redirect_stdout=sys.stdout.isatty(),
     )
 
 
 @contextmanager
 def counting_bar(noun: str) -> Iterator[CountTeller]:
-    """A bar on standard error of things of one kind; nothing where that is no terminal.
+    """Show a bar on standard error while items are counted; no bar if it is not a terminal.
 
-    What it gives is called with how many are done, of how many where that is known.
+    Yields a callback that takes the number of finished items and, if known, their total.
     """
     if not sys.stderr.isatty():
         yield lambda _n, _of=None: None
@@ -342,9 +343,9 @@ def counting_bar(noun: str) -> Iterator[CountTeller]:
 
 @contextmanager
 def share_bar(noun: str) -> Iterator[ShareTeller]:
-    """A bar on standard error of one long piece of work; nothing where that is no terminal.
+    """Show a bar on standard error for one long task; no bar if it is not a terminal.
 
-    What it gives is called with what is being done and the share (0..1) of all of it that is done.
+    Yields a callback that takes the current step and the finished share of the whole task (0..1).
     """
     if not sys.stderr.isatty():
         yield lambda _doing, _share: None

@@ -1,6 +1,6 @@
-"""MuJoCo, without the MUJOCO_LOG.TXT that it writes its warnings into, wherever a program runs.
+"""MuJoCo without MUJOCO_LOG.TXT, the file of warnings that it creates in the working directory.
 
-Effects: warnings of MuJoCo are dropped from here on; its errors are raised as ever.
+Effects: MuJoCo's warnings are dropped from now on; its errors are still raised.
 
     from pbrs_farm.quiet_mujoco import mujoco
 """

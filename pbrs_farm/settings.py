@@ -1,6 +1,6 @@
-"""Environment -> Settings; read by the command line and the workers only.
+"""Settings from environment variables, read only by the command line and the workers.
 
-Effects: reads environment variables and, where they name one, files that hold a secret.
+Effects: reads environment variables and the files of secrets that they refer to.
 """
 
 from __future__ import annotations
@@ -22,17 +22,18 @@ DEFAULT_REDIS: Final = "redis://127.0.0.1:6379/0"
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """What the environment says."""
+    """Settings from the environment."""
 
     store: StoreSettings = field(default_factory=StoreSettings)
     redis_url: Secret = field(default_factory=lambda: Secret(DEFAULT_REDIS))  # broker and ledger
 
 
 def settings_from_environment(environment: Mapping[str, str] | None = None) -> Settings:
-    """Settings from PBRS_* variables; NAME_FILE gives the path of a file that holds NAME's value.
+    """Settings from PBRS_* variables; NAME_FILE is the path of a file with NAME's value.
 
     PBRS_REDIS_URL, PBRS_S3_ENDPOINT, PBRS_S3_REGION, PBRS_S3_ACCESS_KEY, PBRS_S3_SECRET_KEY,
-    PBRS_S3_ALLOW_HTTP (1), PBRS_FSYNC (1), PBRS_STORE_LAYOUT (files, packed). Raises BadInput when such a file cannot be read.
+    PBRS_S3_ALLOW_HTTP (1), PBRS_FSYNC (1), PBRS_STORE_LAYOUT (files, packed). Raises BadInput
+    if such a file cannot be read.
     """
     env = dict(os.environ if environment is None else environment)
     s3 = S3Settings(
@@ -54,7 +55,7 @@ def settings_from_environment(environment: Mapping[str, str] | None = None) -> S
 
 
 def value_or_file(environment: Mapping[str, str], name: str) -> str:
-    """A variable's value, or what the file holds that NAME_FILE names; "" when neither is set."""
+    """A variable's value, or the contents of the file NAME_FILE; "" if neither is set."""
     file = environment.get(f"{name}_FILE", "")
     if not file:
         return environment.get(name, "")

@@ -35,8 +35,7 @@ def entries_from_arguments(
 ) -> list[tuple[HouseEntry, SourceRef]]:
     """Resolve arguments to houses: files, folders of files, example homes, `builtin`.
 
-    One house per home and dressing seed. Does not access a store. Raises BadHouse for an argument that is no
-    house.
+    One house per home and dressing seed. Does not access a store. Raises BadHouse for any other argument.
     """
     # Take each house once, whatever arguments name it.
     entries: dict[str, tuple[HouseEntry, SourceRef]] = {}
@@ -195,7 +194,7 @@ def fill_cache(store: Store, *, with_furniture: bool = False) -> None:
 
     The example homes' package, and the furniture's where a house is dressed or made.
     """
-    # Download only required packages that are missing here.
+    # Download only missing packages.
     packages = [homes_package.PACKAGE] if homes_package.cached() is None else []
     if with_furniture and not has_furniture():
         packages.append(furniture_package.PACKAGE)

@@ -144,7 +144,7 @@ def log_key(job: str, task: str, attempt: int) -> str:
 
 
 def attempts_from_log_keys(job: str, task: str, keys: Iterable[str]) -> dict[int, str]:
-    """Attempt -> the key of its log, for those of the keys that are logs of the task.
+    """Attempt -> the key of its log, for the keys of the task's logs.
 
     keys: any keys, as from a listing of the job's logs; those of other tasks are ignored. Empty if the task
     has no log: only failures and long tasks have one.

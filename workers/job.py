@@ -181,7 +181,7 @@ def lines_from_houses(houses: Iterable[HouseEntry]) -> bytes:
 def houses_from_lines(data: bytes) -> Iterator[HouseEntry]:
     """The houses of a houses.jsonl.
 
-    An iterator, so that a million houses are not in memory at once. Raises pydantic's ValidationError for an
+    An iterator, so that memory does not hold a million houses. Raises pydantic's ValidationError for an
     invalid line: the file is always written by this program.
     """
     for line in data.splitlines():

@@ -15,7 +15,7 @@ KEY: Final = "jobs/store.id"
 
 
 def known_store_id(store: Store) -> str:
-    """The store's id, "" if it has none.
+    """The store's id, "" if it does not exist yet.
 
     Only reads, so it suits a client without write access. At most 64 characters. Other StoreFailed are passed
     on.
@@ -27,7 +27,7 @@ def known_store_id(store: Store) -> str:
 
 
 def store_id(store: Store) -> str:
-    """The store's id; created if it has none.
+    """The store's id, created on first use.
 
     16 random hex digits. Of several processes with a new store one writes, and all read that id. Two URLs with
     one id are one store.

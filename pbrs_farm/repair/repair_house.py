@@ -75,9 +75,9 @@ class RepairStep:
 def repair(
     house: House, fields: RepairFields, *, occluder_from: Callable[[House], Occluder] | None = None
 ) -> tuple[House, RepairReport]:
-    """The repaired house and everything that was changed (paper section 3).
+    """The repaired house and a report of all changes (paper section 3).
 
-    A house that is repaired already comes back as it is. occluder_from: builds a ray caster over
+    An already repaired house is returned unchanged. occluder_from: builds a ray caster over
     a house's triangles; None leaves leaks and the lamps' light output ratio unmeasured.
     """
     if house.is_repaired:

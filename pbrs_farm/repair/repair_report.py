@@ -12,7 +12,7 @@ Point = tuple[float, float, float]
 
 
 class Removed(Record):
-    """An item that was removed."""
+    """A removed item."""
 
     item_id: str
     name: str
@@ -165,7 +165,7 @@ class RepairReport(Record, extra="allow"):
     removed: tuple[Removed, ...] = ()
     faces: FacesReport = FacesReport()
     structure: StructureReport = StructureReport()
-    mirrors: tuple[str, ...] = ()  # ids of items drawn as boards that are mirrors now
+    mirrors: tuple[str, ...] = ()  # ids of items drawn as boards and replaced by mirrors
     sources: tuple[SourceRepair, ...] = ()
     fallback_lights: tuple[str, ...] = ()  # ids of the rooms that got one: nothing lit them
     added_lamps: tuple[str, ...] = ()  # ids of rooms with no lamp, or too weak ones

@@ -23,7 +23,7 @@ def section_svg(before: House, after: House, level_id: str) -> str:
     The section goes through doors and windows. Faults are visible before: walls that overlap, have
     gaps or no thickness. SVG, plan with x right and z down, one unit per metre.
     """
-    # Section wall by wall before repair, all of the structure at once after it.
+    # Section wall by wall before repair, the whole structure together after it.
     y = before.level(level_id).elevation + _CUT_M
     parts = [section_of_items([i], y) for i in before.items if i.kind is ItemKind.WALL]
     solid = section_of_items([i for i in after.items if i.kind.is_structure], y)

@@ -126,7 +126,7 @@ def _against_normals(surface: Surface, faces: I32) -> Bools:
 
 
 def _in_closed_shells(positions: F32, faces: I32) -> Bools:
-    """(F,) true for faces of connected parts that are closed and consistently wound.
+    """(F,) true for faces of closed and consistently wound connected parts.
 
     Each edge of such a part has one face in each direction, so that turning single faces would open it.
     """

@@ -69,7 +69,7 @@ def megapixels(recipe: Recipe) -> float:
 
 
 def views_per_house(recipe: Recipe, want: Wanted) -> float:
-    """How many views a home has: as many as are asked for, a walk its frames, else as the paper's had."""
+    """Expected views per home: the requested number, a walk's frames, or else the paper's average."""
     count = source_of(recipe.cameras).n_views
     if count is not None:
         n = count(recipe.cameras)

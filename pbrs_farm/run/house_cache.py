@@ -145,7 +145,7 @@ class CachedHouse:
         return sky_for_house(self.recipe, self.house_id, panorama=panorama)
 
     def view(self, view_id: str, cameras_digest: str) -> View:
-        """The view with an id; BadInput if the house has none.
+        """The view with an id; BadInput if the house does not have it.
 
         cameras_digest: of the cameras step's marker; another digest reads cameras.json again.
         """
@@ -199,7 +199,7 @@ def decoded_textures(house: House) -> tuple[dict[str, NDArray[np.uint8]], list[s
 class HouseCache:
     """The last house of this process.
 
-    before_edits: the last house before its edits, which outlasts the houses that are made of it.
+    before_edits: the last house before its edits, which outlasts the houses made from it.
     """
 
     def __init__(self) -> None:

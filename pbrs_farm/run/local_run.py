@@ -43,7 +43,7 @@ class Summary:
     houses: list[str] = field(default_factory=list)
     n_views: int = 0
     n_done: int = 0  # steps
-    n_kept: int = 0  # steps that were done before
+    n_kept: int = 0  # steps completed in an earlier run
     peak_mb: float = 0.0  # of the largest process
     failures: list[tuple[str, str, str]] = field(default_factory=list)  # what, message, command
     without_views: list[tuple[str, str]] = field(default_factory=list)  # house, reason

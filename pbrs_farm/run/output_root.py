@@ -36,7 +36,7 @@ def finish_house(store: Store, house_id: str) -> int:
     """Write the house's manifest if it changed, and remove the checkpoints of done steps.
 
     Returns the number of objects that the markers list, whether or not the files exist. An equal manifest is
-    not written again, since its date tells when the house last changed.
+    not written again, since its date is that of the house's last change.
     """
     read_markers = [read_marker(store, k) for k in store.list(keys.house_key(house_id, "done/"))]
     markers = [marker for marker in read_markers if marker is not None]
@@ -111,7 +111,7 @@ def pull(of: Store, folder: Path, tell: Callable[[int], None] = lambda _n: None)
 def as_files(word: str, settings: StoreSettings) -> Iterator[Path]:
     """The folder of an output root; for a URL or a packed root a temporary copy of all of it.
 
-    A folder that is no root is yielded as it is.
+    Yields a folder unchanged if it is not a root.
     """
     if "://" not in word and not (Path(word) / LAYOUT).is_file():
         yield Path(word)

@@ -51,7 +51,7 @@ STEPS: Final = {
         Step("opengl_dl", 3, ("house", "cameras")),
         Step("opengl_il", 3, ("house", "cameras")),
         Step("illuminance", 10, ("house",), per_view=False),
-        # Whatever changes illuminance changes light's digest, too: it need not stand in `after`.
+        # Every change of illuminance also changes light's digest, so it is not listed in `after`.
         Step("light", 27, ("house", "cameras"), needs=("illuminance",)),
         Step("develop", 8, ("light",), needs=("light",)),
         Step("view", 3, _VIEW_READS, needs=("truth",)),

@@ -200,7 +200,7 @@ class Schedule:
     def _add_views(self, house: str, facts: dict[str, Any]) -> None:
         want, source = self._run.want, self._sources[house]
         rows = [(str(v), str(room), float(score)) for v, room, score in facts["views"]]
-        # Skip rooms that were measured dark, if the recipe chooses the views.
+        # Skip rooms measured as dark, if the recipe chooses the views.
         reason, lux = str(facts.get("why_none", "")), self._floor_lux.pop(house, {})
         if plan.leaves_out_dark_rooms(self._run.recipe, want, house):
             rows, lines = plan.lit_views(rows, lux, self._run.recipe.selection.min_room_lx)

@@ -110,7 +110,7 @@ def run_unless_done(
     if old is not None and not is_valid:
         work.store.delete(key)
 
-    # Put the files, then the marker: both at once in a store that packs them.
+    # Put the files, then the marker: in one write if the store packs them.
     started = time.perf_counter()
     output = function(replace(work, inputs=inputs, digest=digest))
     if is_valid:

@@ -105,7 +105,7 @@ def _object_cameras(work: Work, house: House, seed: int) -> StepOutput:
 
 
 def _camera_output(views: Sequence[View], report: dict[str, Any], recipe: Recipe) -> StepOutput:
-    """cameras.json of views that were chosen through a pin-hole, with the recipe's lens applied."""
+    """cameras.json of views chosen through a pin-hole, with the recipe's lens applied."""
     from pbrs_farm.run.chosen_cameras import with_lens
 
     views = [with_lens(view, recipe.lens, recipe.rig_in_use) for view in views]

@@ -218,7 +218,7 @@ class Farm:
     def jobs(self) -> list[JobView]:
         """Every job in the ledger, oldest first.
 
-        A few reads per job. Jobs that are forgotten in the meantime are skipped; jobs only in the store are
+        A few reads per job. Jobs forgotten in the meantime are skipped; jobs only in the store are
         `lost_jobs`.
         """
         return [v for j in self.ledger.known_jobs() if (v := self.ledger.view(j)) is not None]

@@ -1,7 +1,7 @@
 """Unreferenced objects in a farm's store: found and listed first, removed only on request.
 
-Effects: lists the store, reads manifests and the ledger; `remove` deletes objects. Objects of a job
-that is loading, running or paused, and objects younger than the retention time, are never touched.
+Effects: lists the store, reads manifests and the ledger; `remove` deletes objects. Objects of a loading,
+running or paused job, and objects younger than the retention time, are never touched.
 """
 
 from __future__ import annotations
@@ -82,7 +82,7 @@ def garbage(farm: Farm, keep_s: float, now_s: float) -> list[Garbage]:
 def remove(farm: Farm, groups: Iterable[Garbage]) -> int:
     """Delete objects, and forget cancelled jobs without any left; returns the number of objects.
 
-    groups: a recent result of `garbage`: ages are not checked again. Objects that are missing already are
+    groups: a recent result of `garbage`: ages are not checked again. Already missing objects are
     counted too.
     """
     n = 0

@@ -25,7 +25,7 @@ def job_rows(farm: Farm) -> list[dict[str, Any]]:
 def job_row(view: JobView, slots: Mapping[str, int]) -> dict[str, Any]:
     """A job's row. slot_hours: of finished tasks; slot_hours_left: expected.
 
-    slots: stage -> tasks that workers can run at once, for the ETA. For an ended job "eta_s" is None and
+    slots: stage -> maximum concurrent tasks, for the ETA. For an ended job "eta_s" is None and
     "slot_hours_left" 0, even if tasks were not run.
     """
     stages = stage_views(view, slots)

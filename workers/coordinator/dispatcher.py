@@ -58,7 +58,7 @@ class Dispatcher:
     """
 
     def __init__(self, config: FarmConfig, ledger: Ledger, send: Send, token: str) -> None:
-        self.slots: Mapping[str, int] = {}  # stage -> tasks that workers can run at once
+        self.slots: Mapping[str, int] = {}  # stage -> maximum concurrent tasks of the workers
         self.users: Mapping[str, User] = {}
         self._config = config
         self._ledger = ledger

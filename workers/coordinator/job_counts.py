@@ -78,7 +78,7 @@ def n_slots(view: JobView, pool: str, state: str) -> int:
 def n_claimed_together(view: JobView, stage: str) -> int:
     """Number of tasks of a stage that a slot claims together: about TOGETHER_S of work, at least one.
 
-    From the mean of the job's own tasks; 1 before one has ended. At most MOST_TOGETHER.
+    From the mean of the job's own tasks; 1 before the first has ended. At most MOST_TOGETHER.
     """
     seconds = mean_s([view], stage)
     return max(1, min(MOST_TOGETHER, int(TOGETHER_S / seconds))) if seconds else 1

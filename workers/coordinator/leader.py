@@ -57,7 +57,7 @@ _OVER_SHARE_S: Final = 1.0  # seconds a user may exceed his share before his job
 
 
 class Coordinator:
-    """Leads the farm, or stands by until the leader is gone.
+    """Leads the farm, or waits until the leader is gone.
 
     Several may run; the ledger has one leader, and refuses commands of others. `run` calls `turn` until it is
     stopped; a turn ends dead leases, applies budgets, limits and shares, and sends ready tasks.
@@ -242,7 +242,7 @@ def _notice(config: FarmConfig, ledger: RedisLedger) -> Callable[[], None]:
 
 
 def main() -> int:
-    """`python -m workers.coordinator.leader`: lead, or stand by, until a signal ends it.
+    """`python -m workers.coordinator.leader`: lead, or wait to lead, until a signal ends it.
 
     1, with a line on stderr, for an invalid configuration or scratch folder. It waits for Redis
     indefinitely, serves metrics if a port is configured, and gives up the lead on SIGTERM or SIGINT.

@@ -15,7 +15,7 @@ def choose_victims(
 ) -> list[Hold]:
     """Choose the holds to end: of the least urgent job first, and its most recent ones.
 
-    Frees as many slots as queued tasks of urgent jobs need, minus slots that are free or ending already. Only
+    Frees as many slots as queued tasks of urgent jobs need, minus slots already free or ending. Only
     slots of workers on the urgent tasks' queue count. Urgent jobs' tasks and merges are never chosen.
     holds_of: the holds of a job. [] while no urgent task waits.
     """

@@ -77,8 +77,8 @@ def views_per_hour(view: JobView) -> float:
 def stage_views(view: JobView, slots: Mapping[str, int]) -> list[StageView]:
     """The stages of a job: counts, rate, and an ETA from the rate or, at first, from p50.
 
-    slots: stage -> tasks that workers can run at once, 0 if none can. Stages that the job does not have
-    (light of a job without it) are omitted.
+    slots: stage -> maximum concurrent tasks of the workers, 0 without a worker. Stages that the job does not
+    have (light of a job without it) are omitted.
     """
     return [
         _stage_view(view, stage, slots.get(stage, 0)) for stage in STAGES if _has_stage(view, stage)
@@ -160,7 +160,7 @@ def durations(view: JobView, stage: str) -> dict[int, float]:
 
 
 def mean_s(views: Iterable[JobView], stage: str) -> float:
-    """Mean seconds of the stage's tasks over all these jobs, 0 before one has ended.
+    """Mean seconds of the stage's tasks over all these jobs, 0 before the first has ended.
 
     views: of several jobs, if one alone has too few tasks. Failed attempts are excluded.
     """

@@ -23,7 +23,7 @@ from workers.ledger.redis_ledger import RedisLedger
 from workers.ledger.task_ledger import HouseState
 from workers.runner import StepRunner
 
-_THREADS: Final = 16  # storage is slow but handles many requests at once
+_THREADS: Final = 16  # storage is slow but handles many parallel requests
 _CHUNK: Final = 1000  # houses in memory at a time
 
 

@@ -262,7 +262,7 @@ def _user_of(view: JobView) -> str:
 
 
 def _count_in_flight(views: Sequence[JobView], pool: str) -> Counter[str]:
-    """User -> tasks in a pool that are queued or running; 0 for users with only ready tasks."""
+    """User -> queued and running tasks in a pool; 0 for users with only ready tasks."""
     n_of_user: Counter[str] = Counter()
     for view in views:
         n = n_queued_or_running(view, pool)

@@ -165,7 +165,7 @@ class RedisLedger:
         """Append fresh houses to the job's order; `first` is the index of the first of them.
 
         The caller increments `first` from call to call, unchecked; repeating a call adds the houses twice. For a
-        job that is still loading: `open` follows.
+        loading job: `open` follows.
         """
         p = self._p(job)
         with self.errors():
@@ -344,7 +344,7 @@ class RedisLedger:
     ) -> list[str] | None:
         """Admit houses and take ready tasks to be sent, at most room[stage]; None: not leading.
 
-        max_open: houses of the job in work at once. The returned tasks are queued from now on: `resend` finds those
+        max_open: maximum houses of the job in work. The returned tasks are queued from now on: `resend` finds those
         that the caller fails to send. A job that is not running only gives its last merge.
         """
         pairs = [x for pair in room.items() for x in pair]

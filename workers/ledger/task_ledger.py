@@ -31,9 +31,9 @@ FaultClass = Literal[
 # fmt: on
 
 TOGETHER_S: Final = (
-    30.0  # of work that a slot claims at once: long compared to a claim, short enough to lose
+    30.0  # of work per claim of a slot: long compared to a claim, short enough to lose
 )
-MOST_TOGETHER: Final = MOST_IN_GROUP  # tasks of one house that a slot claims at once
+MOST_TOGETHER: Final = MOST_IN_GROUP  # maximum tasks of one house per claim of a slot
 EVERYWHERE: Final = "*"  # all queues, for a blocked job
 ALIVE_S: Final = 45.0  # a worker whose last heartbeat is no older than this is there
 # Classes of fault that do not count against the task: the attempt is given back.
@@ -115,7 +115,7 @@ class GoOn:
 
     recipe: str  # digest of the job's recipe
     queues: tuple[str, ...]  # that its worker takes from
-    is_long: bool = False  # the last task loaded a scene that is worth reusing for its house
+    is_long: bool = False  # the last task loaded a scene worth reusing for its house
 
 
 @dataclass(frozen=True, slots=True)
@@ -248,7 +248,7 @@ class JobView:
 
     @property
     def n_in_flight(self) -> float:
-        """Tasks that are queued or running."""
+        """Number of queued and running tasks."""
         return self.n_running + self._n_in("QUEUED")
 
     def _n_in(self, state: str) -> float:
@@ -335,7 +335,7 @@ class Ledger(Protocol):
 class WorkerRegistry(Protocol):
     """Workers of the farm, and the health of storage, as seen by slots and the coordinator.
 
-    slots: stage -> tasks that live workers can run at once. The breaker is open while storage is unhealthy: then
+    slots: stage -> maximum concurrent tasks of live workers. The breaker is open while storage is unhealthy: then
     nothing is claimed or sent; it closes automatically.
     """
 

@@ -150,7 +150,7 @@ class Registry:
         )
 
     def slots(self) -> dict[str, int]:
-        """Stage -> tasks that workers seen in the last ALIVE_S seconds can run at once.
+        """Stage -> maximum concurrent tasks of the workers seen in the last ALIVE_S seconds.
 
         Stages without a worker are missing. Slots for several stages count for each, so the sum is more than the
         farm has.

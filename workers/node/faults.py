@@ -47,7 +47,7 @@ def class_of(error: BaseException) -> FaultClass:
 def fingerprint(error: BaseException) -> str:
     """Identifier of similar faults: type, place in our code, and the message without its numbers.
 
-    For grouping, so it is equal on all machines and library versions: the innermost frame of our own code
+    For grouping, so it is equal on all machines and library versions: the innermost frame of this package
     names the place, without a line number.
     """
     # The innermost frame in our own code; library frames differ by version.

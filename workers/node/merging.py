@@ -101,7 +101,7 @@ def _put_file(store: Store, key: str, file: IO[bytes]) -> None:
 def _new_rows(
     store: Store, spec: JobSpec, houses: list[str], on_step: OnText
 ) -> Iterator[tuple[str, bytes | None]]:
-    """House -> its manifest, from its shard's if it exists; None if it has none."""
+    """House -> its manifest, from its shard's if it exists; None without a manifest."""
     size = spec.rules.shard_size
     for first in range(0, len(houses), size):
         on_step(f"merge shard {first // size}")

@@ -35,7 +35,7 @@ from workers.store_identity import store_id
 _log = logging.getLogger("pbrs.supervisor")
 _PREEMPT_S: Final = 20.0  # what giving everything back may take
 _POLL_S: Final = 0.2
-_SEEN_EVERY_S: Final = 10.0  # heartbeat of a worker that is finishing its tasks
+_SEEN_EVERY_S: Final = 10.0  # heartbeat of a worker finishing its tasks
 DRAINED_POLL_S: Final = 5.0  # between two looks of a drained worker whether it is wanted again
 _ASK_EVERY_S: Final = 10.0  # whether a job has work
 _STORE_S: Final = 5.0  # how long the store may take to say which it is

@@ -85,7 +85,7 @@ def fill_hole(
 ) -> Item | None:
     """Build the door or window for a hole; None if the hole stays open.
 
-    library: receives its materials. The item is tagged `made`, as it is not in the source.
+    library: receives its materials. The item is tagged `made`, since the source does not contain it.
     """
     if hole.kind == "open":
         return None

@@ -88,7 +88,7 @@ class ModelMaterials:
         return png if self._folder.path(png) is not None else f"texture/{name}.jpg"
 
     def _texture(self, name: str, opacity: str, place: str) -> LoadedTexture | None:
-        """The colour picture ("" = none), with the alpha of the opacity picture if that is another one."""
+        """The colour picture ("" = none), with the alpha of the opacity picture if the two differ."""
         if opacity and opacity != name:
             mask = self._picture(opacity)
             if mask is not None:

@@ -31,7 +31,7 @@ class ZipResources:
     """The entries of a zip archive in memory or on disk; every read is bounded.
 
     Raises BadHouse for data that is not a zip, a damaged archive, a name that leaves the archive's
-    root, too many entries, or one that is or claims to be larger than MAX_ENTRY_BYTES.
+    root, too many entries, or an entry whose actual or declared size exceeds MAX_ENTRY_BYTES.
     """
 
     def __init__(self, data: bytes | Path, file: str) -> None:

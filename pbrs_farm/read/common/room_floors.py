@@ -98,7 +98,7 @@ def floor_polygons(
     ways += [line for bounds in doors if (line := _line_of_door(bounds)) is not None]
     parts = [p for whole in shapely.get_parts(between) for p in parted_at_doorways(whole, ways)]
     pieces = np.array(parts, object)
-    # Keep pieces that are large and wide enough; restore the ground of the strips.
+    # Keep large and wide enough pieces; restore the ground of the strips.
     narrow = shapely.is_empty(_grown(pieces, -min_width_m / 2))
     fit = pieces[(shapely.area(pieces) >= min_area_m2) & ~narrow].tolist()
     fit.sort(key=lambda p: (-p.area, p.bounds))

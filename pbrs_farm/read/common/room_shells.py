@@ -26,7 +26,7 @@ _WELD_M: Final = 1e-4  # corners this near are one
 _LEAST_HEIGHT_M: Final = 1.8  # least height of a room
 _LEAST_SIDE_M, _LARGEST_SIDE_M = 0.6, 200.0  # of a room in plan; a larger box is a sky
 _LEVEL_UP, _UPRIGHT_UP = 0.98, 0.1  # |y| of the normal: above is level, below is upright
-_LEAST_BOXY: Final = 0.7  # minimum share of a room's faces that are horizontal or vertical
+_LEAST_BOXY: Final = 0.7  # minimum share of horizontal and vertical faces in a room
 # Twice the volume over the area is the thickness of a plate: a wall has less, a room more.
 _THICKER_THAN_WALLS_M: Final = 0.3
 _THICKER_THAN_BLOCKS_M: Final = 0.5
@@ -112,7 +112,7 @@ def room_parts(item: Item, others: F64) -> tuple[Item, ...]:
     shown = np.any(rooms, axis=0)
     rest = ~shown & ~_encloses(corners, bounds, shown)[shell_of_face]
     parts = _parts_by_plane(_turn_faces(item, shown) if sign > 0 else item, shown)
-    # Leave items that are only the walls of a room unchanged.
+    # Leave items unchanged if they contain only the walls of a room.
     if sign < 0 and {p.kind for p in parts} == {item.kind}:
         return (item,)
     remaining = picked(item, rest)

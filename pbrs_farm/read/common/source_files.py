@@ -74,7 +74,7 @@ class SourceFiles:
     def digest(self, folder: RootFolder, names: Iterable[str]) -> str:
         """Digest over the names and bytes of the existing files below a folder; "" if there are none.
 
-        A file that is added, changed or removed changes the digest, so that the step runs again. Damaged
+        Adding, changing or removing a file changes the digest, so that the step runs again. Damaged
         files and files outside the folder count as absent: the reader reports them.
         """
         digests = {name: self._digest(folder, name) for name in names}

@@ -31,7 +31,7 @@ _DEPTH_M: Final = 0.12  # where nothing is behind
 _COLUMN_M: Final = 0.7  # a stretch without a sheet behind is no longer where a wall meets this one
 _LEAST_M: Final = 0.02
 _COPLANAR: Final = 0.9998  # least |cosine| of the normals of sheets in one plane: 1.1 degrees
-_WITHIN_M: Final = 0.03  # maximum overhang of a sheet that is part of another one, metres
+_WITHIN_M: Final = 0.03  # maximum overhang of a sheet counted as part of another one, metres
 _SEAM_M: Final = 0.002  # between the meshes of one wall
 _HOLE_M: Final = 0.2  # least width and height
 _FILLED: Final = 0.8  # share of a gap that the sheet behind fills: a niche
@@ -251,8 +251,8 @@ def _looking(sheet: Sheet, floors: Mapping[str, Any], tree: Any, names: list[str
 def pieces_of(inner: Sequence[Sheet], outer: Sequence[Sheet]) -> list[WallPiece]:
     """Split every inner sheet into stretches of one thickness.
 
-    The back of a stretch is a parallel sheet, inner or outer, within the thickness of a wall; a
-    stretch without one has no back.
+    The back of a stretch is a parallel sheet, inner or outer, within the thickness of a wall. A
+    stretch may have no back.
     """
     sheets = [*inner, *outer]
     normals = np.array([s.normal for s in sheets]).reshape(-1, 3)

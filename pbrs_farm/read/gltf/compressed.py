@@ -28,7 +28,7 @@ _MOST_POINTS: Final = 20_000_000
 
 
 def draco_arrays(gltf: Gltf, primitive: dict[str, Any], place: str) -> DracoMesh | None:
-    """Decode a primitive's Draco data; None if it has none.
+    """Decode a primitive's Draco data; None for a primitive without Draco.
 
     Raises BadHouse for damaged data, other counts than the accessors', and without DracoPy.
     """

@@ -237,7 +237,7 @@ def numbers(gltf: Gltf, value: Any, n: int, place: str) -> F64:
 
 
 def object_at(holder: dict[str, Any], key: str) -> dict[str, Any]:
-    """The JSON object under a key of another, {} if there is none.
+    """The JSON object under a key of another object; {} if absent.
 
     Optional glTF fields may be missing, null or of another type; all of these count as absent.
     """

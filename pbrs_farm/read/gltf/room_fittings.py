@@ -79,8 +79,8 @@ def parted_fittings(item: Item, *, by_shape: bool) -> tuple[Item, tuple[Item, ..
     """The item without a room's fittings, and the fittings, touching parts merged.
 
     Fittings are surfaces with materials named after glass, frames, windows, doors or skirting;
-    by_shape: also connected parts that are strips or thin closed boards. The item is unchanged if all
-    or none of it qualifies.
+    by_shape: also connected parts in the shape of strips or thin closed boards. The item is unchanged
+    if all or none of it qualifies.
     """
     corners = corners_of_surfaces(item.surfaces)
     if not len(corners):

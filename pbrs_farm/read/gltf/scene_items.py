@@ -141,8 +141,8 @@ def _gather_things(gltf: Gltf, mapping: Mapping) -> list[_Thing]:
     """Group the scene's nodes into items.
 
     A node belongs to its nearest ancestor (or itself) that is an item: the outermost with a known
-    class, and tagged ones below it. Members of a collection ("Chairs") without a class of their own
-    inherit the collection's.
+    class, and tagged ones below it. Members of a collection ("Chairs") without a class inherit the
+    collection's.
     """
     # By path from the root: the item a node belongs to, and the class its members inherit.
     owner: dict[tuple[int, ...], _Thing] = {}

@@ -26,7 +26,7 @@ def centres_of(items: Sequence[Item]) -> F64:
 
 
 def structure_parts(item: Item, others: F64) -> tuple[Item, ...]:
-    """Split a node's item that is structure or unknown.
+    """Split a node's item if its class is structure or unknown.
 
     others: centres_of all items. After its fittings (room_fittings), a room seen from inside is split
     by face directions; other meshes by the names of their materials; open walls plane by plane. A node

@@ -162,7 +162,7 @@ def _carries_storey(slab: Item, walls: F64) -> bool:
 
 
 def _walls_above(slab: Item, walls: F64) -> F64:
-    """The walls (W, 2, 3) on a slab that are as high as a storey."""
+    """The walls (W, 2, 3) on a slab with the height of a storey."""
     near = _walls_over_or_under(slab, walls)
     return np.asarray(near[near[:, 1, 1] > slab.bounds[1, 1] + _HEADROOM_M])
 

@@ -148,7 +148,7 @@ def _decoded_name(rest: bytes) -> str:
 def _parse_rows(lines: list[bytes], n: int, file: str, what: str) -> F64:
     if not lines:
         return np.zeros((0, n))
-    # Parse all lines at once if they have equally many numbers; else pad or cut them.
+    # Parse all lines together if they have equally many numbers; else pad or cut them.
     tokens = b" ".join(lines).split()
     # Colours after a position, or a third texture coordinate, are cut off below.
     per_line = len(tokens) // len(lines)
@@ -186,7 +186,7 @@ def _word_at_fault(lines: list[bytes], what: str, kind: type[int] | type[float])
 
 def _indices(part: _Part, pools: tuple[F64, ...], file: str) -> I64:
     # (n corners, 3) zero-based vertex, uv and normal index; -1 = none.
-    # Parse all corners at once if they have one form: v, v/vt, v//vn or v/vt/vn.
+    # Parse all corners together if they have one form: v, v/vt, v//vn or v/vt/vn.
     joined = b" ".join(part.lines).replace(b"//", b"/0/")
     tokens = joined.split()
     slashes = {t.count(b"/") for t in tokens}

@@ -26,7 +26,7 @@ def triangulated_corners(positions: F64, sizes: I64) -> I64:
             continue
         which = np.flatnonzero(sizes == n)
         corners = starts[which][:, None] + np.arange(n)
-        # Triangulate all convex polygons of one size at once, as fans round their first corner.
+        # Triangulate all convex polygons of one size together, as fans round their first corner.
         first = np.broadcast_to(corners[:, :1], (len(which), n - 2))
         fans = np.stack([first, corners[:, 1:-1], corners[:, 2:]], -1)
         if n == 3:

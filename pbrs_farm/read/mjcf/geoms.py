@@ -208,5 +208,5 @@ def png_of_texture(model: Any, texture: int) -> bytes:
 
 
 def name_of(model: Any, kind: Any, number: int) -> str:
-    """The name of an element; "" if it has none."""
+    """The name of an element; "" if unnamed."""
     return str(mujoco.mj_id2name(model, kind, number) or "")

@@ -1,6 +1,6 @@
 """Read SUNCG v2's wall/<id>/<id>.arch.json as structure items and openings (docs/spec/suncg.md section 1.7).
 
-No effects. Walls become solids of their own depth, outward from their points; floors and ceilings
+No effects. Walls become solids of their given depth, outward from their points; floors and ceilings
 slabs upwards from their offset, like v1's released meshes (the format does not define the direction);
 holes become openings that repair cuts.
 """

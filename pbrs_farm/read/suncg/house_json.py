@@ -150,7 +150,7 @@ def house_record(data: bytes, file: str) -> HouseRecord:
 
 
 def _node(file: str, raw: Any, level_id: str, i: int, index: int) -> Node | str | None:
-    """The node, its type if that is unknown, or None if the node is invalid."""
+    """The node, the name of its unknown type, or None for an invalid node."""
     place = f"level {i} node {index}"
     raw = checked(dict, raw, file, place, error=BadHouse)
     if not _flag(raw.get("valid", 1)):

@@ -27,7 +27,7 @@ from pbrs_farm.read.sweethome3d.wall_solids import picture_uvs
 MIN_AREA_M2 = 0.01  # smaller rooms are left out
 LEAST_ROOM_M2 = 1.0  # a smaller area between walls is a shaft
 LEAST_WALL_M = 1.8  # lower walls enclose no room
-GAP_M = 0.1  # maximum gap between walls that were meant to touch, metres
+GAP_M = 0.1  # maximum gap between walls meant to touch, metres
 ACROSS_M = 0.01  # half the width that a doorway is closed by
 DOOR_SILL_M = 0.3  # what begins higher is a window
 SLIVER_M2 = 1e-4  # smaller pieces come of rounding
@@ -196,8 +196,8 @@ def plane_items(
 ) -> list[Item]:
     """Floor and ceiling of each room as an item, horizontal or, below a roof, sloped.
 
-    Where rooms overlap the later one has the floor. floor_cuts, ceiling_cuts: areas of staircases by
-    level id.
+    Where rooms overlap, the floor belongs to the later one. floor_cuts, ceiling_cuts: areas of staircases
+    by level id.
     """
     items = []
     for k, room in enumerate(rooms):

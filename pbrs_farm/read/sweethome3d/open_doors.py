@@ -1,7 +1,7 @@
 """Open the doors between rooms about the hinges in their models; no effects.
 
-A model's leaf hangs on a hinge ("sweethome3d_opening_on_hinge_1_door" on "sweethome3d_hinge_1_2"), and
-swings to the side on which the hinge protrudes.
+A model's leaf is attached to a hinge ("sweethome3d_opening_on_hinge_1_door" on "sweethome3d_hinge_1_2"),
+and swings to the side on which the hinge protrudes.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ def shut_leaves(
 ) -> tuple[Leaf, ...]:
     """The closed leaves of a door's model with an upright hinge.
 
-    matrix: (4, 4) from the model's frame to the piece's. told: joints from the file, in the model's
+    matrix: (4, 4) from the model's frame to the piece's. joints: from the file, in the model's
     frame; they take precedence over the hinges in the model.
     """
     if joints:

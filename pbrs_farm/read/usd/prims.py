@@ -181,7 +181,7 @@ class StageNodes:
         return NodeClass(label_class.nyu40, label_class.kind, is_tagged=True)
 
     def _is_group(self, prim: Any) -> bool:
-        """True if a prim is a room's scope, or contains items with classes of their own."""
+        """True if a prim is a room's scope, or contains classified items."""
         own_class = class_of_node_name(prim.GetName())
         if own_class is not None and own_class.kind is ItemKind.LAMP:
             return False

@@ -30,7 +30,7 @@ class GivenLights:
     """Ids of the rooms that got a ceiling light."""
 
     fallback: tuple[str, ...]  # nothing lit them
-    added: tuple[str, ...]  # rooms with daylight but no lamp, or with lamps that are too weak
+    added: tuple[str, ...]  # rooms with daylight and either no lamp or too weak ones
 
 
 def with_room_lighting(

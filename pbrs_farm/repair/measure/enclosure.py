@@ -1,7 +1,7 @@
 """Which rooms are closed, which are connected, and why others are open; no effects.
 
 A room is closed if full-height walls, or rooms that it opens into, bound its polygon, and it has a
-floor and a ceiling of its own or those of the space it opens into (stairwell, hall).
+floor and a ceiling, or shares those of the space it opens into (stairwell, hall).
 """
 
 from __future__ import annotations

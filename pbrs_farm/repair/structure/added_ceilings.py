@@ -156,7 +156,7 @@ def _bare(
     *,
     is_below: bool,
 ) -> plan.Shape:
-    """The part of a room without a ceiling of its own or one at the top of a void, and without stairs."""
+    """The part of a room without stairs, and without a ceiling or one at the top of a void."""
     above = [c for c in covers if c.low_y > room.floor_y + MIN_WALL_HEIGHT_M / 2]
     ceilings = [c.area for c in above if c.is_ceiling and c.low_y < level_y + MAX_STOREY_GAP_M]
     floors = plan.union(
@@ -208,7 +208,7 @@ class _WallTops:
             corners = corners_of_surfaces(item.surfaces)
             edges = corners[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2, 3)
             ends = edges[:, :, [0, 2]]
-            # Keep walls that are near the room and high enough.
+            # Keep walls near the room and high enough.
             near = (ends.max(1) > low).all(1) & (ends.min(1) < high).all(1)
             edges = edges[near & (edges[:, :, 1].max(1) > room.floor_y + MIN_WALL_HEIGHT_M)]
             order = np.argsort(-edges[:, :, 1].max(1), kind="stable")[:_MOST_EDGES]

@@ -40,7 +40,7 @@ ClosedShell = tuple[Manifold, list[Patch]]  # the solid, and the patches it was 
 
 
 def patch_from_surface(surface: Surface, item: int) -> Patch:
-    """The surface in double precision, tagged with its item; metric uv if it has none.
+    """The surface in double precision, tagged with its item; without uv, metric uv is added.
 
     item: index of the item in the house. Missing normals are 0, which `surface_from_patch` drops
     again.
@@ -118,7 +118,7 @@ def _shows_a_room(patches: Sequence[Patch]) -> bool:
 
 
 def closed_shells(item: Item, table: TagTable) -> list[Manifold]:
-    """The connected parts of the item that are closed solids.
+    """The closed solids among the connected parts of an item.
 
     Closed means accepted by manifold3d: every edge has two faces with opposite direction. Sheets,
     leaves and open boxes are skipped.

@@ -88,7 +88,7 @@ def cut_openings(
         elif fills:
             plug = patches_from_solid(unite(fills), table)
             plugs[opening.id] = tuple(s for p in plug if (s := surface_from_patch(p)) is not None)
-    # Cut all openings of a part at once.
+    # Cut all openings of a part together.
     idle = [o.id for o in openings if o.id not in plugs]
     cut = [subtract(p.solid, c) for p, c in zip(parts, cutters_of, strict=True)]
     return cut, plugs, idle

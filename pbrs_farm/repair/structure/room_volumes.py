@@ -106,7 +106,7 @@ def without_volumes(
 
 
 def _overlapping(box: F64, volumes: Sequence[RoomVolume]) -> list[RoomVolume]:
-    # Compare all bounds at once: a house has hundreds of joints and rooms.
+    # Compare all bounds in one array operation: a house has hundreds of joints and rooms.
     boxes = np.array([v.bounds for v in volumes]).reshape(-1, 2, 3)
     overlap = np.minimum(box[1], boxes[:, 1]) - np.maximum(box[0], boxes[:, 0])
     return [volumes[k] for k in np.flatnonzero((overlap >= _TOUCH_M).all(1)).tolist()]

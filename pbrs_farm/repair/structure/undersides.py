@@ -38,7 +38,7 @@ class _Stand(NamedTuple):
 
 
 def with_undersides(house: House) -> House:
-    """Split off the undersides of floors that are visible from below, as ceiling items.
+    """Split off the undersides of floors visible from below, as ceiling items.
 
     A floor is visible from below if neither a ceiling nor another floor is between it and a room or
     the ground outside. The new items are appended.

@@ -175,7 +175,7 @@ def with_structure(house: House, structure: Structure) -> tuple[House, list[Remo
     removed = []
     for index, item in enumerate(house.items):
         surfaces = structure.surfaces.get(index, item.surfaces)
-        # Remove walls that are completely inside others.
+        # Remove walls completely inside others.
         if index in structure.surfaces and not surfaces:
             removed.append(Removed(item_id=item.id, name=item.name, reason="nothing left of it"))
         else:

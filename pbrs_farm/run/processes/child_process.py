@@ -96,12 +96,12 @@ class ChildProcess:
         self._replies.close()
 
     def release(self) -> None:
-        """Close its requests' pipe, so that it ends by itself."""
+        """Close the pipe of requests, which makes the process exit."""
         with contextlib.suppress(BrokenPipeError):
             self._requests.close()
 
     def close(self) -> None:
-        """Let it end by itself, which frees its libraries' resources; kill it if it does not."""
+        """Let the process exit, which frees its libraries' resources; kill it if it does not."""
         self.release()
         with contextlib.suppress(subprocess.TimeoutExpired):
             self._process.wait(timeout=_CLOSE_S)

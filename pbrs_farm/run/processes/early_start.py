@@ -37,7 +37,7 @@ def end_untaken() -> None:
 
 
 def child_of(target: str, log: Path) -> ChildProcess:
-    """The live process that was started early for a target, or a new one.
+    """The live process started early for a target, or a new one.
 
     log: its log file from now on, in the file system of temporary files.
     """

@@ -38,7 +38,7 @@ class ProcessLimits:
 
 
 def machine_mb(limits: tuple[Path, ...] = _CGROUP_LIMITS) -> float:
-    """Memory available to this container or machine, in MiB, including memory that is in use.
+    """Memory available to this container or machine, in MiB, including memory in use.
 
     limits: files of cgroups, version 1 or 2; the least number in them counts.
     """

@@ -34,7 +34,7 @@ def run_watched(target: str, words: Sequence[str], say: Callable[[str], None]) -
 
     Where the child is killed: 1, after one line through say with the file and the step it was at.
     """
-    # A file, because not every system passes descriptors on. The child removes its name at once.
+    # A file, because not every system passes descriptors on. The child unlinks it immediately.
     handle, notes = _new_file()
     command = [sys.executable, "-P", "-c", _BOOT, json.dumps(sys.path), notes, target]
     # The terminal sends Ctrl-C to both: the child decides. A handler of ours ends with its exec.

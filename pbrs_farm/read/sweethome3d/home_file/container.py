@@ -24,7 +24,7 @@ MAX_DEPTH = 200  # nested elements
 class Container:
     """The root element <home>, and the source of models and textures.
 
-    parsed: models by content name that are in memory already: those of a home just generated.
+    parsed: models already in memory, by content name: those of a home just generated.
     """
 
     root: Element
@@ -35,7 +35,7 @@ class Container:
 def open_container(data: bytes, file: str, resources: Resources | None) -> Container:
     """Open a home file; resources: the program's own models, for files that refer to them.
 
-    Raises BadHouse for a file that is neither zip nor XML, has no Home.xml, or is unsafe.
+    Raises BadHouse for an unsafe file, one without Home.xml, and any other than zip or XML.
     """
     if data.startswith(b"PK"):
         archive = ZipResources(data, file)
