@@ -1,1 +1,1 @@
-"""The verbs of the `pbrs-farm` command, by what a user wants: to look, to make, to use what was made."""
+"""The verbs of the `pbrs-farm` command, grouped by purpose: look, make, use the output."""

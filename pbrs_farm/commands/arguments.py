@@ -1,6 +1,6 @@
-"""What the verbs share: how they print, and the options that several of them take. Effects: prints.
+"""Printing, and the options that several verbs share. Effects: prints.
 
-It imports little, since every command imports it: a recipe's models only where one is asked for.
+Every command imports this module, so it imports little: the recipe's models only on demand.
 """
 
 from __future__ import annotations
@@ -27,34 +27,36 @@ if TYPE_CHECKING:
     from pbrs_farm.store.object_store import Store
     from workers.client.farm_client import Farm
 
-# of a verb: its exit code, or None for 0
+# function of a verb: returns its exit code, or None for 0
 Handler = Callable[[argparse.Namespace], int | None]
 # (name, handler) -> the verb's parser; verbs.csv has its help
 Verb = Callable[[str, Handler], Parser]
 
-# Help of arguments that name a home, and a view.
+# Help texts of the arguments for a home and for a view.
 HOME: Final = (
     "file of a home or a folder of homes (those in it, not in folders below; `inputs` lists the"
     " formats), example home's name, `builtin`, `made:SEED`, or `plugin:NAME,SEED`"
 )
-_MAX_LINE: Final = 1500  # characters of a warning: a command that reproduces a fault fits
-MAX_SEEDS: Final = 100_000  # of one command
+_MAX_LINE: Final = (
+    1500  # maximum characters of a warning: room for a command that reproduces a fault
+)
+MAX_SEEDS: Final = 100_000  # maximum seeds of one command
 VIEW: Final = "a view's folder: OUT/houses/<house>/views/<view>"
 
 
 def warn(text: str) -> None:
     """Write a line to standard error, after the program's name.
 
-    What a stranger's file put into the text cannot forge a second line; a text of more than 1,500
-    characters is cut. For what a user must see while standard output goes to a file.
+    Use it for messages that a user must see while standard output goes to a file. Control characters
+    in the text cannot forge a second line; a text of more than 1,500 characters is cut.
     """
     sys.stderr.write(f"pbrs-farm: {shown(text, _MAX_LINE)}\n")
 
 
 def echo(text: str = "") -> None:
-    """Write a line, or several, to standard output: what a verb was asked for.
+    """Write one or more lines of a verb's result to standard output.
 
-    Characters that a terminal would obey are shown as escapes. Messages go through `warn`.
+    Control characters are shown as escapes. Messages go through `warn`.
     """
     sys.stdout.write(printable(text) + "\n")
 
@@ -62,7 +64,7 @@ def echo(text: str = "") -> None:
 def echo_json(value: Any) -> None:
     """Write a value as JSON to standard output, for --json: one document, keys sorted, indented by one.
 
-    value: what json.dumps takes. A verb that prints a line per event writes its own.
+    value: any value of json.dumps. A verb that prints a line per event does not use this.
     """
     echo(escaped(json.dumps(value, indent=1, sort_keys=True, ensure_ascii=False)))
 
@@ -76,7 +78,7 @@ def counted(n: int, noun: str) -> str:
 
 
 def echo_notes(notes: Counter[str], out: str) -> None:
-    """Print how many notes of each kind the houses of an output have; nothing where there is none."""
+    """Print the number of notes of each kind in the houses of an output; nothing without notes."""
     if notes:
         kinds = ", ".join(f"{n} {kind}" for kind, n in notes.most_common(8))
         echo(
@@ -85,9 +87,9 @@ def echo_notes(notes: Counter[str], out: str) -> None:
 
 
 def dress_seeds(text: str | None) -> tuple[int, ...]:
-    """The seeds of --dress, each once, in the order in which they are named; none where it is not given.
+    """The distinct seeds of --dress in the order given; empty without the option.
 
-    text: 3, 1..20 or 1,4,7. Raises BadInput for anything else, and for more seeds than a command may have.
+    text: 3, 1..20 or 1,4,7. Raises BadInput for anything else, and for more than MAX_SEEDS seeds.
     """
     if text is None:
         return ()
@@ -98,7 +100,7 @@ def dress_seeds(text: str | None) -> tuple[int, ...]:
 
 
 def at_least(name: str, value: float, least: int) -> None:
-    """Raise BadInput, naming the option, where its value is below the least that makes sense.
+    """Raise BadInput, naming the option, if its value is below the minimum.
 
     at_least("--jobs", args.jobs, 1)
     """
@@ -107,7 +109,7 @@ def at_least(name: str, value: float, least: int) -> None:
 
 
 def add_home(p: argparse.ArgumentParser) -> None:
-    """Add the home that a verb looks at, and where the models lie that its file names.
+    """Add the arguments for a home and for the folder of the models that its file names.
 
     `args.home` is a word of `prepare.source.resolve`, `args.models` a folder or "".
     """
@@ -118,9 +120,9 @@ def add_home(p: argparse.ArgumentParser) -> None:
 
 
 def add_set(p: argparse.ArgumentParser, metavar: str, text: str) -> None:
-    """Add --set, repeatable: fields of the recipe, or of what metavar says.
+    """Add --set, repeatable: fields of the recipe, or of the object that metavar names.
 
-    `args.set` is a list of "path=value"; `fields_set` takes it apart.
+    `args.set` is a list of "path=value", which `fields_set` parses.
     """
     group_of(p, "recipe").add_argument(
         "--set", action="append", default=[], metavar=metavar, help=text
@@ -128,16 +130,16 @@ def add_set(p: argparse.ArgumentParser, metavar: str, text: str) -> None:
 
 
 def home_arguments(homes: Sequence[str], houses: str | None) -> list[str]:
-    """The homes asked for, those of ranges and of folders one by one.
+    """The requested homes, with ranges and folders expanded.
 
-    houses: a list of SUNCG houses, and homes their root alone. Raises BadInput. Of a folder with homes
-    a warning tells which others lie one folder deeper.
+    houses: a list of SUNCG houses; homes is then their root alone. Raises BadInput. Warns of further
+    homes one level below a folder of homes.
     """
     from pbrs_farm.prepare.source import homes_left_below, suncg_list, words_of_homes
 
     if not houses:
         words = words_of_homes(list(homes))
-        # A folder that stays a word has no homes of its own: its error says where they lie.
+        # A folder without homes is not expanded; its error names the folders below it.
         for folder in dict.fromkeys(homes):
             if folder not in words and (unlisted := homes_left_below(Path(folder))):
                 warn(f"{folder}: {unlisted}")
@@ -150,9 +152,9 @@ def home_arguments(homes: Sequence[str], houses: str | None) -> list[str]:
 def fields_set(
     pairs: Sequence[str], expected: str, prefixes: tuple[str, ...] = ("",)
 ) -> dict[str, str]:
-    """The arguments of --set as path -> text, the last of a path where it comes twice.
+    """The arguments of --set as path -> text; the last one wins if a path is repeated.
 
-    expected: what a message says of a wrong one. prefixes: those that a path may begin with. Raises
+    expected: the valid form, for error messages. prefixes: valid beginnings of a path. Raises
     BadInput for an argument without "=" or with another prefix.
     """
     overrides = {}
@@ -165,9 +167,9 @@ def fields_set(
 
 
 def size_of(text: str | None) -> tuple[int, int] | None:
-    """(width, height) in pixels of WxH, None of None.
+    """Parse WxH to (width, height) in pixels; None for None.
 
-    Raises BadInput for anything else, a size of 0 or above 16,384 included.
+    Raises BadInput for anything else, including a size of 0 or above 16,384.
     """
     if text is None:
         return None
@@ -178,17 +180,17 @@ def size_of(text: str | None) -> tuple[int, int] | None:
 
 
 def recipe_of(args: argparse.Namespace | RecipeOptions) -> Recipe:
-    """The recipe that a command's options, or a request, name.
+    """The recipe named by a command's options or by a request.
 
     Short forms such as --noise and --size win over --set, and --set over the recipe's own fields.
-    Raises BadRecipe for a recipe or a field that there is not, BadInput for a file that is none.
+    Raises BadRecipe for an unknown recipe or field, BadInput for a file without a valid recipe.
     """
     from pbrs_farm.core.recipe import recipe_from_name
     from pbrs_farm.formats.recipe_toml import ENDING, recipe_from_toml
     from pbrs_farm.run.request import SHORT_FORMS
 
     overrides = fields_set(args.set, "group.field=value")
-    # Let the options that are short forms of fields win over --set.
+    # Options such as --size override --set.
     size = size_of(args.size)
     if size is not None:
         overrides |= {"image.width_px": str(size[0]), "image.height_px": str(size[1])}
@@ -217,7 +219,7 @@ def recipe_of(args: argparse.Namespace | RecipeOptions) -> Recipe:
 
 
 def store_of(url: str) -> Store:
-    """The store of a URL, or of a folder that exists, with the settings of the environment.
+    """Open the store of a URL or of an existing folder, with the settings of the environment.
 
     Raises BadInput if there is no such folder.
     """
@@ -231,7 +233,7 @@ def store_of(url: str) -> Store:
 
 @contextmanager
 def folder_of(root: str) -> Iterator[Path]:
-    """The files of an output root as a folder: itself, or those of its store."""
+    """An output root as a local folder: the folder itself, or a copy of the store's files."""
     from pbrs_farm.run.output_root import as_files
     from pbrs_farm.settings import settings_from_environment
 
@@ -240,7 +242,7 @@ def folder_of(root: str) -> Iterator[Path]:
 
 
 def put_files(folder: Path, files: Mapping[str, bytes]) -> None:
-    """Write files into a folder, each whole or not at all."""
+    """Write files into a folder, each one atomically."""
     from pbrs_farm.store.folder import FolderStore
 
     store = FolderStore(folder)
@@ -250,20 +252,20 @@ def put_files(folder: Path, files: Mapping[str, bytes]) -> None:
 
 
 def add_farm(p: argparse.ArgumentParser) -> None:
-    """Add the options that every verb of the farm takes: --store and --json.
+    """Add the options of every farm verb: --store and --json.
 
-    submit has its own from workers/job.py.
+    submit declares both in workers/job.py.
     """
-    # Written out: the small verbs import no models.
+    # Not generated from a model: the small verbs import no models.
     p.add_argument("--store", default="", metavar="URL", help="default: $PBRS_STORE")
     p.add_argument("--json", action="store_true", help="for machines")
 
 
 def farm_of(args: argparse.Namespace) -> Farm:
-    """The farm that the environment and --store name; neither Redis nor the store is asked yet.
+    """The farm named by the environment and --store; connects to neither Redis nor the store.
 
-    Reads PBRS_REDIS_URL, PBRS_STORE and their like (workers/config.py). Raises BadInput where one is
-    missing or wrong.
+    Reads PBRS_REDIS_URL, PBRS_STORE etc. (workers/config.py). Raises BadInput if one is missing or
+    wrong.
     """
     from workers.client.farm_client import Farm
     from workers.config import config_from_environment

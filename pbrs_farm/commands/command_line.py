@@ -1,6 +1,6 @@
-"""The parser of the command line: verbs by what a user wants, near names for slips. Effects: prints.
+"""The parser of the command line: verbs by purpose, suggestions for typing errors. Effects: prints.
 
-Options may stand before the verb or after it.
+Options may come before or after the verb.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ _TABLE: Final = Path(__file__).with_name("verbs.csv")
 
 @dataclass(frozen=True, slots=True)
 class VerbRow:
-    """A verb of verbs.csv. group: what a user wants who takes it; module: of pbrs_farm.commands."""
+    """A verb of verbs.csv. group: its heading in the help; module: of pbrs_farm.commands."""
 
     verb: str
     group: str
@@ -40,10 +40,10 @@ class Parser(argparse.ArgumentParser):
     """An ArgumentParser whose help lists verbs in groups."""
 
     options_by_words: Callable[[Parser, Sequence[str] | None], None] | None = None
-    """Of a verb: adds the options that depend on the command's words, as on --to; all of them for None."""
+    """Adds a verb's options that depend on the words given, such as the form of --to; all for None."""
 
     def verbs(self) -> dict[str, Parser]:
-        """Verb -> its parser, in the order in which they were added.
+        """Verb -> its parser, in the order of addition.
 
         Empty for the parser of a verb itself.
         """
@@ -51,7 +51,7 @@ class Parser(argparse.ArgumentParser):
         return dict(actions[0].choices) if actions else {}
 
     def format_help(self) -> str:
-        """The help: of a verb argparse's own, of the command its verbs in groups."""
+        """The help text: argparse's for a verb, the verbs in groups for the command."""
         actions = [a for a in self._actions if isinstance(a, argparse._SubParsersAction)]
         if not actions or actions[0].metavar != "VERB":
             return super().format_help()
@@ -70,10 +70,9 @@ class Parser(argparse.ArgumentParser):
 
 
 def unknown_words(words: Sequence[str], parser: argparse.ArgumentParser) -> str:
-    """What is wrong with words that a verb's parser does not take, as its error message.
+    """Error message for words that a verb's parser does not accept.
 
-    An option that there is not comes with the nearest that there is; without options the first word
-    is one too many.
+    It suggests the closest option for an unknown one; without options it names the first surplus word.
     """
     options = [word for word in words if word.startswith("-")]
     if not options:
@@ -88,11 +87,11 @@ def unknown_words(words: Sequence[str], parser: argparse.ArgumentParser) -> str:
 def verb_first(
     words: Sequence[str], verbs: Sequence[str], parser_of: Callable[[str], argparse.ArgumentParser]
 ) -> list[str]:
-    """The words with the verb in front, where options of the verb stand before it.
+    """Move the verb to the front if some of its options come before it.
 
-    parser_of: a verb's parser, which says how many words each of its options takes.
+    parser_of: a verb's parser, which knows how many words each of its options takes.
     """
-    # A word is the verb only where all before it are options of its own with their values.
+    # A word is the verb only if all words before it are its options and their values.
     if words and words[0].startswith("-"):
         for position, word in enumerate(words):
             if word in verbs and _are_options(words[:position], parser_of(word)):
@@ -101,7 +100,7 @@ def verb_first(
 
 
 def _are_options(words: Sequence[str], parser: argparse.ArgumentParser) -> bool:
-    """Whether the words are options of the parser, each with its values."""
+    """True if the words are options of the parser, each with its values."""
     k = 0
     while k < len(words):
         name, equals, _value = words[k].partition("=")
@@ -111,7 +110,7 @@ def _are_options(words: Sequence[str], parser: argparse.ArgumentParser) -> bool:
         k += 1
         if equals or action.nargs == 0:
             continue
-        # One value, or all up to the next option.
+        # Skip one value, or all up to the next option.
         first = k
         while k < len(words) and not words[k].startswith("-") and (k == first or action.nargs):
             k += 1

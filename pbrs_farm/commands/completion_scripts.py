@@ -1,4 +1,4 @@
-"""Scripts by which bash, zsh and fish complete verbs, options and their choices. No effects."""
+"""Completion scripts for bash, zsh and fish: verbs, options and their choices. No effects."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Final
 
 SHELLS: Final = ("bash", "zsh", "fish")
 
-# Words that argparse does not know as choices: example homes where homes are named, recipes.
+# Completions that argparse does not know: example homes and recipes.
 _HOME_VERBS: Final = ("run", "dress", "repair", "cameras", "submit")
 
 _BASH: Final = """\
@@ -30,7 +30,7 @@ complete -o default -F _pbrs_farm pbrs-farm"""
 
 
 def completion_script(shell: str, verbs: Mapping[str, argparse.ArgumentParser]) -> str:
-    """What the shell reads to complete the command's words: verbs, options, their choices, example homes.
+    """The shell's completion script: verbs, options, their choices, example homes.
 
     shell: one of SHELLS; zsh reads bash's script. verbs: each with its parser.
     """
@@ -54,7 +54,7 @@ def _bash_script(verbs: Mapping[str, argparse.ArgumentParser]) -> str:
 
 
 def _bash_case(pattern: str, words: list[str], then: str = "") -> str:
-    # compgen keeps the words that begin with what is typed.
+    # compgen keeps the words that begin with the typed text.
     reply = f'COMPREPLY=($(compgen -W {shlex.quote(" ".join(words))} -- "$word"))'
     return f"    {pattern}) {reply}{f'; {then}' if then else ''} ;;"
 
@@ -67,7 +67,7 @@ def _fish_lines(verbs: Mapping[str, argparse.ArgumentParser]) -> Iterator[str]:
         of_verb = f"{start} -n '__fish_seen_subcommand_from {verb}'"
         values = dict(_option_choices(parser))
         for option in _options(parser):
-            # -x: nothing but these words may follow the option, no file names.
+            # -x: only these words may follow the option, no file names.
             words = f" -x -a {shlex.quote(' '.join(values[option]))}" if option in values else ""
             yield f"{of_verb} -l {option.removeprefix('--')}{words}"
         if arguments := _arguments(verb, parser):
@@ -79,12 +79,12 @@ def _options(parser: argparse.ArgumentParser) -> list[str]:
 
 
 def _option_choices(parser: argparse.ArgumentParser) -> Iterator[tuple[str, list[str]]]:
-    """Each option that takes one of some words, with those words."""
+    """Each option with a fixed set of values, and those values."""
     from pbrs_farm.core.layers import OPTIONAL
     from pbrs_farm.core.lighting import ALL_MODES
     from pbrs_farm.core.recipe import CAMERA_SOURCES, RECIPE_NAMES
 
-    # Options that take lists declare no choices of their own.
+    # Options that take lists declare no choices.
     choices = {
         "--recipe": list(RECIPE_NAMES),
         "--modes": [mode.value for mode in ALL_MODES],
@@ -99,7 +99,7 @@ def _option_choices(parser: argparse.ArgumentParser) -> Iterator[tuple[str, list
 
 
 def _arguments(verb: str, parser: argparse.ArgumentParser) -> list[str]:
-    """The words a verb's arguments may be: its parts, a list's, homes."""
+    """Completions of a verb's arguments: subcommands, choices of a list, or homes."""
     from pbrs_farm.assets.homes_package import example_homes
 
     words = [str(c) for a in parser._actions if not a.option_strings for c in a.choices or ()]

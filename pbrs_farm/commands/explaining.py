@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from pbrs_farm.sample.camera_source import Sampling
 
 
-# Parts of the time that `dress` takes, roughly; its pictures take the rest.
+# Approximate shares of the time of `dress`; its pictures take the rest.
 _SHARE_OF_CATALOGUE: Final = 0.05
 _SHARE_OF_HOUSE: Final = 0.65
 
@@ -186,7 +186,7 @@ def _before_after(
     tell("before and after", done)
     for n, pair in enumerate(pairs(bare, house, recipe, args.views)):
         caption = f"{house.name}, view {pair.view.id}, bare and dressed"
-        # Licences of homes ask for credit wherever a picture is shown.
+        # Licences of homes require a credit on every picture.
         caption = "; ".join(t for t in (caption, house.source.attribution) if t)
         name = f"before_after{f'_{n + 1}' if n else ''}.png"
         files[name] = before_after_png(pair.before, pair.after, caption)
@@ -233,7 +233,7 @@ def _cameras(args: argparse.Namespace) -> None:
 
     recipe = recipe_of(args)
     house, _report = repaired_house(resolve(args.home, models=args.models), recipe)
-    # Score candidates by the items that rays from them meet.
+    # Score candidates by the items that their rays hit.
     caster = Caster.of_house(house)
     note_step(args.home, "cameras")
     seed = camera_seed(house.id, recipe)
@@ -262,7 +262,7 @@ def write_map(path: Path, house: House, sampling: Sampling) -> None:
 
 
 def _echo_report(report: CameraReport) -> None:
-    """Print each room and, of each of its sectors, the outcome and the rejections by rule."""
+    """Print each room and, for each of its sectors, the outcome and the rejections by rule."""
     for room in report.rooms:
         reason = f": no cameras: {room.reason}" if room.reason else ""
         echo(f"{room.room_id} {shown(room.name)}{reason}")

@@ -20,7 +20,7 @@ _SAY_EVERY_S: Final = 5.0
 
 
 def add_verbs(verb: Verb) -> None:
-    """Add homes, and below it make."""
+    """Add homes and its subcommand make."""
     p = verb("homes", _homes)
     p.add_argument("--fetch", action="store_true", help="download the package now")
     text = "download the furniture to dress and to make homes with (120 MB), too"
@@ -95,7 +95,7 @@ def _make(args: argparse.Namespace) -> int:
     homes, programme = _asked_for(args)
     if not args.empty:
         catalogue_here()
-    # Homes come in the order of their seeds; say how far it is every _SAY_EVERY_S seconds.
+    # Homes arrive in the order of their seeds; print the progress every _SAY_EVERY_S seconds.
     started = last_report = time.monotonic()
     n_new = 0
     _folder(args.out)
@@ -108,7 +108,7 @@ def _make(args: argparse.Namespace) -> int:
         if time.monotonic() - last_report > _SAY_EVERY_S:
             last_report = time.monotonic()
             echo(f"{number} of {len(homes)} homes")
-    # What is neither new nor failed was there from a former run.
+    # Homes neither new nor failed come from an earlier run.
     n_kept = len(homes) - n_new - len(failed)
     text = f"{counted(n_new, 'home')} made in {time.monotonic() - started:.0f} s"
     echo(text + (f", {n_kept} kept" if n_kept else "") + f": {args.out / 'plans.html'}")
@@ -126,7 +126,7 @@ def _make_of_plan(args: argparse.Namespace) -> int:
     from pbrs_farm.read.common.format import PLAN
 
     at_least("--floor", args.floor or 0, 0)
-    # The plan decides the rooms, so wishes about rooms contradict it.
+    # The plan fixes the rooms, so options about rooms contradict it.
     options = [
         f"--{k}" for k in ("rooms", "area", "storeys", "offices", "programme") if getattr(args, k)
     ]
@@ -158,7 +158,7 @@ def _folder(path: Path) -> None:
 
 
 def _asked_for(args: argparse.Namespace) -> tuple[list[MadeHome], Programme | None]:
-    """The homes that the options name; raises BadInput as a word of `run` would."""
+    """The homes named by the options; raises BadInput as the words of `run` do."""
     from pbrs_farm.core.made_home import made_homes
     from pbrs_farm.generate.programme_file import programme_from_json
 
@@ -192,7 +192,7 @@ def _asked_for(args: argparse.Namespace) -> tuple[list[MadeHome], Programme | No
 def catalogue_here() -> Catalogue:
     """The packages' furniture, to make homes with.
 
-    Downloads nothing: raises MachineFailed, with the command that fetches it, where it is not cached.
+    Downloads nothing: raises MachineFailed, with the command that fetches it, if it is not cached.
     """
     from pbrs_farm.prepare.dress_catalogue import catalogue_of_words, has_furniture
 

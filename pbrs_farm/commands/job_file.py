@@ -28,20 +28,20 @@ _TABLES = ("render", "select", "pack")
 
 
 def job_file(words: list[str]) -> dict[str, Any] | None:
-    """The job that a command's one word names, None where it names homes.
+    """Read the job file if the command's one word names one; None if it names homes.
 
     A job is a .toml file with a list `homes`; another TOML file is a home's programme. Raises
-    BadInput for a file that is no TOML, or has tables that a job does not have.
+    BadInput for invalid TOML and for unknown tables.
     """
     if len(words) != 1 or not words[0].endswith(".toml") or not Path(words[0]).is_file():
         return None
     job = _tables(words[0])
-    # A programme of a made home is TOML, too; it names no homes.
+    # The programme of a made home is TOML, too, but lists no homes.
     return _checked(job, words[0]) if "homes" in job else None
 
 
 def job_like(file: str, homes: list[str]) -> dict[str, Any]:
-    """The job of a template with these homes: a job's file whose own homes, if any, do not count.
+    """The job of a template with these homes, which replace those of the file, if any.
 
     Raises BadInput as job_file does.
     """
@@ -69,9 +69,9 @@ def _checked(job: dict[str, Any], file: str) -> dict[str, Any]:
 def submit_arguments(
     job: Mapping[str, Any], args: argparse.Namespace, parser: argparse.ArgumentParser, file: str
 ) -> argparse.Namespace:
-    """The arguments of submit that the job stands for; what was given beside its file counts before it.
+    """The arguments of submit for a job; options on the command line override its file.
 
-    Raises BadInput for an entry that is no option of submit, or does not fit, naming file and entry.
+    Raises BadInput, naming file and entry, for an unknown option of submit or a value that does not fit.
     """
     from workers.job import SubmitRequest
 
@@ -86,8 +86,8 @@ def submit_arguments(
 def option_words(table: Mapping[str, Any], file: str) -> list[str]:
     """A table's entries as words of a command.
 
-    {"split": True, "layers": ["depth"]} -> ["--split", "--layers", "depth"]: true is a flag, false
-    nothing, a list many words. Raises BadInput for a table in the table.
+    {"split": True, "layers": ["depth"]} -> ["--split", "--layers", "depth"]: true becomes a flag,
+    false nothing, a list several words. Raises BadInput for a nested table.
     """
     words: list[str] = []
     for name, value in table.items():

@@ -1,4 +1,4 @@
-"""Verbs that hand labels on: export, pack, classes, label-sheet. Effects: read a folder, write files."""
+"""Verbs that export labels: export, pack, classes, label-sheet. Effects: read a folder, write files."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def add_verbs(verb: Verb) -> None:
 def _add_form_options(p: argparse.ArgumentParser, words: Sequence[str] | None) -> None:
     """Add the options of the form that the words name; of all forms if words is None.
 
-    An option of other forms alone ends the command with an error that names them.
+    An option that only other forms have ends the command with an error that names them.
     """
     from pbrs_farm.export.form import all_forms, form_options, no_such_option
 
@@ -177,7 +177,7 @@ def _pack_views(args: argparse.Namespace) -> None:
     shares = shares_from_text(args.split) if args.split else None
     packing = packing_of(request_from(args, PackOptions), shares, views[:1].modes, args.seed)
     packed = pack(views, args.out, packing, form=args.to, tell=echo)
-    # A run may still go on: name the views that are left out.
+    # The run may still be in progress: name the skipped views.
     if packed.left_out:
         view, why = next(iter(packed.left_out.items()))
         warn(f"{counted(len(packed.left_out), 'view')} left out, {view}: {why}")
@@ -188,7 +188,7 @@ def _pack_views(args: argparse.Namespace) -> None:
 def packing_of(
     options: PackOptions, shares: SplitShares | None, modes: Sequence[str], seed: int = 0
 ) -> Packing:
-    """The packing of these options; modes: if the options name none. BadInput for a wrong colour or size."""
+    """The packing for these options; modes: default if the options name none. BadInput for a wrong colour or size."""
     from pbrs_farm.views.packing.packing_plan import Packing
     from pbrs_farm.views.view_sample import LAYERS
 
@@ -226,7 +226,7 @@ def _is_home(word: str) -> bool:
 
 
 def _home_classes(args: argparse.Namespace) -> int:
-    """Print the class of each piece of a home, and the rule that chose it, without rendering the home."""
+    """Print the class of each item of a home, and the rule that chose it, without rendering the home."""
     from pbrs_farm.core.recipe import ReadFields
     from pbrs_farm.gallery.class_decisions import class_decisions, decisions_text
     from pbrs_farm.prepare.read_source import read_house

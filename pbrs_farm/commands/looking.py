@@ -1,4 +1,4 @@
-"""Verbs that print what the program and the machine are: doctor, inputs, skies, recipes, layers, completion.
+"""Verbs that describe the program and the machine: doctor, inputs, skies, recipes, layers, completion.
 
 Effects: print; skies downloads.
 """
@@ -48,7 +48,7 @@ def _doctor(args: argparse.Namespace) -> int:
         echo_json({"can_run": fine, "findings": [asdict(f) for f in findings]})
         return 0 if fine else 1
     for f in findings:
-        # One line a part, and what to do where it is not fine.
+        # One line per part, with a remedy if it is not ok.
         mark = {"ok": "ok      ", "degraded": "degraded", "missing": "MISSING "}[f.state]
         echo(f"{mark}  {f.part:<20} {f.text}")
         if f.state != "ok" and f.remedy:
@@ -61,7 +61,7 @@ def _doctor(args: argparse.Namespace) -> int:
 
 
 def _verdict(findings: Sequence[Finding], *, is_fine: bool) -> str:
-    """What a machine with these findings can do, in a sentence."""
+    """A sentence on the machine's abilities, given these findings."""
     from pbrs_farm.doctor import GL
 
     if not is_fine:
@@ -110,7 +110,7 @@ def _recipes(args: argparse.Namespace) -> None:
     # Print the recipe as --set takes it, group by group.
     for group, info in Recipe.model_fields.items():
         value = getattr(recipe, group)
-        # Fields of the recipe itself, like the seed, stand alone.
+        # Top-level fields of the recipe, like the seed, have no group.
         if not hasattr(type(value), "model_fields"):
             echo(f"{group} = {json.dumps(value)}")
             continue

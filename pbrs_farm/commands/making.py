@@ -49,7 +49,7 @@ def add_verbs(verb: Verb) -> None:
     p.add_argument("--out", default="out/demo", help="output folder")
     p.add_argument("--bare", action="store_true", help="the home as it was drawn, not dressed")
     add_options(p, RunRequest, recipe="preview")
-    # A stranger's first command ends in seconds.
+    # A first-time user's command ends in seconds.
     p.set_defaults(views=6)
     p.epilog = "six views unless --views asks for others"
 
@@ -108,7 +108,7 @@ def _run(args: argparse.Namespace) -> int:
 
 
 def _folder_of(home: str) -> str:
-    """Where a run goes that is not told: out/ and the home's name, in small letters."""
+    """Default output folder of a run: out/ and the home's name in lower case."""
     name = Path(home.partition(":")[0] if is_made(home) else home).stem
     plain = "".join(c if c.isalnum() or c in "-_" else "-" for c in name.lower()).strip("-")
     return f"out/{plain or 'home'}"
@@ -121,10 +121,10 @@ def run_homes(
     refused: Sequence[tuple[str, str]] = (),
     observe: Observer | None = None,
 ) -> int:
-    """Run the plan on homes and on sources that are known already; the exit code.
+    """Run the plan on homes and on resolved sources; returns the exit code.
 
-    refused: what was asked for and cannot be read, and why. observe: hears of the run beside the
-    user. A wall that repair lost is an error.
+    refused: (input, reason) of inputs that cannot be read. observe: also receives the run's events. A
+    wall lost in repair is an error.
     """
     run = replace(_described(args, homes, sources), refused=refused)
     n_homes = (len(homes) + len(sources)) * max(1, len(run.dress_seeds))
@@ -135,14 +135,14 @@ def run_homes(
 def run_and_report(
     run: Run, n_homes: int, *, as_json: bool, observe: Observer | None = None
 ) -> Summary:
-    """Run it, tell its progress as standard output suits, then what came of it.
+    """Run it, print its progress in the form that suits standard output, then its results.
 
-    n_homes: for the time left. observe: hears each event beside the user. Raises as run_local.
+    n_homes: to estimate the time left. observe: also receives each event. Raises as run_local.
     """
     from pbrs_farm.progress import progress_reporter
     from pbrs_farm.run.local import run_local
 
-    # Say at once which extra is missing, not once a step.
+    # Report a missing extra before the run, not in every step.
     need("mitsuba", "drjit", "pyoidn", "moderngl")
     _warn_of_slowness()
     started = time.monotonic()
@@ -194,7 +194,7 @@ def _described(args: argparse.Namespace, homes: list[str], sources: Sequence[Sou
 
 
 def _warn_of_slowness() -> None:
-    """Warn where only Mitsuba's scalar variant is left, and before kernels are compiled."""
+    """Warn if Mitsuba has only its scalar variant, and before kernels are compiled."""
     from pbrs_farm.operating_system import has_nvidia_driver, kernel_cache
     from pbrs_farm.raycast.variant import MIN_LLVM, find_llvm
 
@@ -213,7 +213,7 @@ def _report(summary: Summary, seconds: float, out: str, *, as_json: bool) -> Non
         echo(_summary_line(summary, seconds))
         return
     lost = f"{counted(len(summary.walls_lost), 'wall')} LOST, " if summary.walls_lost else ""
-    # Where nothing was made, the reason alone is worth a line.
+    # If the run made nothing, print the reason alone.
     if summary.houses or summary.n_done or summary.n_kept or not summary.failures:
         echo(
             f"{counted(len(summary.houses), 'house')}, {counted(summary.n_views, 'view')}: {lost}"
@@ -236,7 +236,7 @@ def _report(summary: Summary, seconds: float, out: str, *, as_json: bool) -> Non
         warn(f"{house}: no view: {reason}")
     for subject, message, command in summary.failures:
         text = message if message.startswith(subject) else f"{subject}: {message}"
-        # A step that failed has printed its message when it happened.
+        # A failed step has already printed its message.
         warn(f"{subject} failed; reproduce: {command}" if command else text)
     if summary.taken_out:
         kinds = " and ".join(counted(n, kind) for kind, n in sorted(summary.taken_out.items()))
@@ -274,7 +274,7 @@ def _demo(args: argparse.Namespace) -> int:
 
         if homes_package.cached() is None:
             warn("fetching the example homes, 17 MB, once")
-        # Without a network the demo still shows something.
+        # Without a network the demo uses the built-in home.
         try:
             homes_package.fetch()
         except (MachineFailed, BadInput) as error:
@@ -282,7 +282,7 @@ def _demo(args: argparse.Namespace) -> int:
             warn("going on with the built-in home")
             home = "builtin"
     args.dress = _demo_dressing(args)
-    # What a visitor sees first is a home by day, whatever its seed draws.
+    # Show a new user the home by day, whatever its seed draws.
     args.set = ["sky.time=day", *args.set]
     from pbrs_farm.gallery.sheet_parts import SheetParts
 
@@ -298,7 +298,8 @@ def _demo(args: argparse.Namespace) -> int:
                 parts.make(event.house_id, event.view_id)
 
         code = run_homes(args, [home], observe=observe)
-        # A demo that made nothing says why; what lies in its folder is an older one's.
+        # If the demo made nothing, write no sheets: any files in its folder are from an earlier
+        # run.
         if not whole - failed:
             return code or 1
         write_sheets(Path(args.out), 24, parts)
@@ -315,7 +316,7 @@ Open {out}/index.html in a browser. What to do next:
 
 
 def _demo_dressing(args: argparse.Namespace) -> str | None:
-    """The seeds that the demo dresses its home by; None where there is nothing to dress it with."""
+    """The seeds for dressing the demo's home; None without furniture to dress it with."""
     from pbrs_farm.assets import furniture_package
     from pbrs_farm.prepare.dress_catalogue import GENERATED, fetch_catalogue
 
@@ -340,13 +341,13 @@ def _step(args: argparse.Namespace) -> None:
     from pbrs_farm.run.step_cache import Work
     from pbrs_farm.run.steps import run_step
 
-    # The stored recipe makes the step as the run did.
+    # Use the stored recipe, to repeat the step of the run.
     if args.step not in STEPS:
         raise BadInput("step", args.step, "no such step", hint=hint_of_choice(args.step, STEPS))
     store = store_of(args.out)
     recipe = recipe_from_json(store.get("recipe.json"), f"{store.url}: recipe.json")
     (source,) = variants(resolve(args.home, models=args.models), [args.dress or recipe.dress.seed])
-    # One process, one house: the cache keeps it for all steps.
+    # One process and one house: the cache keeps the house for all steps.
     work = Work(
         store=store,
         recipe=recipe,
@@ -356,7 +357,7 @@ def _step(args: argparse.Namespace) -> None:
         view_id=args.view,
         layers=tuple(args.layers),
     )
-    # Make first what the step needs of its house, where it is missing.
+    # First make the missing inputs of the step.
     for name in needed_of_house(args.step, source.house_id):
         run_step(name, replace(work, view_id=None))
     outcome = run_step(args.step, work)
@@ -383,13 +384,13 @@ def _objects(args: argparse.Namespace) -> int:
 
 
 def _models_at(paths: Sequence[Path]) -> tuple[list[ObjectModel], list[tuple[str, str]]]:
-    """The models below paths, each once, and (path, why) of those that hold none."""
+    """The distinct models below paths, and (path, reason) of paths without one."""
     from pbrs_farm.read.objects.model_folders import find_models
 
     models: dict[str, ObjectModel] = {}
     refused = []
     for path in paths:
-        # A path without a model costs itself, unless it is the only one.
+        # Skip a path without a model, unless it is the only one.
         try:
             models |= {model.id: model for model in find_models([path])}
         except BadInput as error:

@@ -19,8 +19,8 @@ def add_options(
 ) -> None:
     """Add the options of a model's fields, each to its group of the help.
 
-    group: title for options without a group of their own. defaults: of this verb, by option's name, if
-    they are not the field's.
+    group: title for options without a group. defaults: option name -> default of this verb, if it
+    differs from the field's.
     """
     from pbrs_farm.core.options import flag, options_of
 
@@ -35,9 +35,9 @@ def add_options(
 
 
 def group_of(p: argparse.ArgumentParser, title: str) -> argparse._ArgumentGroup:
-    """The parser's group of options of that title in its help, a new one if there is none.
+    """The parser's help group of that title, created if missing.
 
-    Options of one subject stay together, whichever function adds them.
+    So options of one subject stay together, whichever function adds them.
     """
     for group in p._action_groups:
         if group.title == title:
@@ -63,7 +63,8 @@ def _argparse_words(info: FieldInfo, shown: Option, default: Any) -> dict[str, A
 def request_from(args: argparse.Namespace, model: type[_Request], **fields: Any) -> _Request:
     """The record of parsed arguments; options that a verb lacks keep their defaults.
 
-    fields: those that are no options. Raises BadInput, naming the option, for a value below its limit.
+    fields: values of fields without an option. Raises BadInput, naming the option, for a value below its
+    limit.
     """
     from pbrs_farm.core.options import check_limit, flag, options_of
 

@@ -1,4 +1,4 @@
-"""The verb scatter: models of one's own in homes, and cameras that look at them. Effects: those of rendering."""
+"""The verb scatter: place the user's models in homes, with cameras aimed at them. Effects: those of rendering."""
 
 from __future__ import annotations
 
@@ -119,7 +119,7 @@ def _scatter(args: argparse.Namespace) -> None:
                 notes.update(note.kind for note in scene.house.notes)
                 todo = [c for c in cameras if (scene.id, c.id) not in finished]
                 n_kept += len(cameras) - len(todo)
-                # One by one, so that a killed command loses one view at most.
+                # One by one, so that a killed command loses at most one view.
                 for camera in todo:
                     frame = render(scene, camera, modes=args.modes, layers=args.layers)
                     frame.save(args.out)
@@ -133,7 +133,7 @@ def _scatter(args: argparse.Namespace) -> None:
 
 
 def _homes_of(words: Sequence[str], recipe: Recipe, seeds: Sequence[int]) -> Iterator[Home]:
-    """Each home, dressed by each seed where there are some; one is loaded when the last is done."""
+    """Each home, dressed by each seed if there are any; loaded one at a time."""
     from pbrs_farm.scene.home import load
 
     for word in words:

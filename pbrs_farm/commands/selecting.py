@@ -77,7 +77,7 @@ def _overrides(arguments: list[str]) -> dict[str, str]:
 def _built(
     args: argparse.Namespace, source: Path, histogram: HistogramFields, selection: SelectionFields
 ) -> Reference:
-    """The reference of photographs, read as the options say."""
+    """Build the reference from photographs, read according to the options."""
     from pbrs_farm.curate.reference_build import PhotoOptions, build_reference
 
     options = PhotoOptions(args.depth_scale, args.sun_rgbd, not args.no_crop)
@@ -106,12 +106,12 @@ def _select(args: argparse.Namespace) -> int:
         return _select_by(args)
     recipe = recipe_from_json(store.get("recipe.json"), f"{store.url}: recipe.json")
     fields = _fields(recipe, args)
-    # Read the reference, or build it from photographs as the views' recipe says.
+    # Read the reference, or build it from photographs with the settings of the views' recipe.
     path = args.reference
     is_file = path.is_file() and path.suffix != ".mat"
     reference = read_reference(path) if is_file else _built(args, path, recipe.histogram, fields)
     summary = select(store, reference, fields, reference_name=str(path), run=args.run)
-    # Write the page from the run as it is stored now.
+    # Write the page from the stored run.
     if args.report:
         from pbrs_farm.curate.selection_report import selection_report
 

@@ -46,12 +46,12 @@ from pbrs_farm.views.packing.packing_plan import FORMS
 
 _ENDING: Final = ".toml"
 _TABLES: Final = ("card", "render", "part", "form")
-_SHARD_SIZE: Final = 500  # default views a shard of a set
+_SHARD_SIZE: Final = 500  # default views per shard of a set
 _NAME: Final = re.compile(r"[a-z0-9][a-z0-9_-]{0,40}")
 
 
 class PartOptions(Request, CameraOptions, ModelsOption):
-    """What a part is rendered with: as `run`, for its homes."""
+    """Render options of a part: those of `run`, for its homes."""
 
     select: tuple[str, ...] = option(
         (), "rules by which views are left out of the forms", choices=tuple(REASONS)
@@ -80,7 +80,7 @@ class FormTable(Record):
 
 
 class ViewFormTable(FormTable, ViewOptions):
-    """A table [form.NAME] of `export`; the options of its form come on top."""
+    """A table [form.NAME] of `export`; the options of its form are added to it."""
 
 
 class PackTable(FormTable, PackOptions):
@@ -88,12 +88,12 @@ class PackTable(FormTable, PackOptions):
 
 
 def is_set(word: str) -> bool:
-    """Whether a word names a data set: one that is shipped, whatever lies there, or a .toml file with parts."""
+    """True if a word names a shipped data set (even if a file has that name) or a .toml file with parts."""
     if word in shipped_sets():
         return True
     if not word.endswith(_ENDING) or not Path(word).is_file():
         return False
-    # Another TOML file is a job, or a home's programme; one that is none is told where it is read.
+    # Other TOML files are jobs or programmes of homes; their readers report invalid TOML.
     try:
         return "part" in tomllib.loads(text_from_bytes(read_given(Path(word))))
     except (ValueError, RecursionError):
@@ -101,9 +101,9 @@ def is_set(word: str) -> bool:
 
 
 def set_from_word(word: str) -> DataSet:
-    """The set of that name, or of a user's file.
+    """The data set of that name, or of a user's file.
 
-    Everything in it is checked, and nothing of its homes is read. Raises BadInput with file and place.
+    Checks the whole file, but reads none of its homes. Raises BadInput with file and place.
     """
     if word in shipped_sets():
         return set_from_bytes((SHIPPED / f"{word}{_ENDING}").read_bytes(), f"{word}{_ENDING}")
@@ -114,12 +114,12 @@ def set_from_word(word: str) -> DataSet:
 
 
 def set_from_bytes(data: bytes, file: str) -> DataSet:
-    """The set that a file holds; file is its name, for messages and the set's own name."""
+    """Parse a data set's file; file is its name, for messages and the set's own name."""
     name = Path(file).stem
     if not _NAME.fullmatch(name):
         raise BadInput(file, "", "a set's name is of small letters, digits, - and _")
     try:
-        # As tables of TOML are read: without the byte order mark that some editors write.
+        # Decode without the byte order mark that some editors write.
         tables = tomllib.loads(text_from_bytes(data))
     except (ValueError, RecursionError) as error:
         raise BadInput(file, "", f"is no TOML: {error}") from None
@@ -158,7 +158,7 @@ def _check_tables(tables: Mapping[str, Any], file: str) -> None:
 
 @contextmanager
 def _placed(file: str, place: str) -> Iterator[None]:
-    """Errors within name the file and the place in it."""
+    """Add the file and the place in it to errors raised within."""
     try:
         yield
     except PbrsError as error:
@@ -166,7 +166,7 @@ def _placed(file: str, place: str) -> Iterator[None]:
 
 
 def _part(name: str, table: Mapping[str, Any], common: Mapping[str, Any], file: str) -> SetPart:
-    """A part: the options of [render], then its own; lists of both are joined."""
+    """A part: the options of [render], then those of its table; lists of both are joined."""
     values = values_of_table(common, PartOptions, f"{file} [render]")
     for option_name, value in values_of_table(table, PartTable, f"{file} [part.{name}]").items():
         common_value = values.get(option_name)
@@ -200,7 +200,7 @@ def _form(
         values = {"shard_size": _SHARD_SIZE} | values_of_table(table, PackTable, place)
         with _placed(file, f"form.{name}"):
             pack_table = request_from(argparse.Namespace(**values), PackTable)
-            # Without modes, those of each part.
+            # Without modes, use those of each part.
             packing = packing_of(pack_table, shares, ())
             return SetForm(name, to, _parts_of(pack_table, parts), packing=packing)
     common = options_of(ViewFormTable)
@@ -228,9 +228,9 @@ def _parts_of(table: FormTable, parts: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def options_given(part: SetPart) -> dict[str, Any]:
-    """A part's options for `submit`, by name: those of viewpoints, which it lacks, are fields of the recipe.
+    """A part's options for `submit`, by name; options of viewpoints become fields of the recipe.
 
-    Raises BadInput for a trajectory of the user's, which workers do not have.
+    Raises BadInput for a user's trajectory file, which workers cannot read.
     """
     values = dict(part.values)
     values.pop("select", None)

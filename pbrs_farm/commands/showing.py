@@ -49,13 +49,13 @@ def _board(args: argparse.Namespace) -> None:
     from pbrs_farm.board.serve import bound_socket, default_cache, server_of
     from pbrs_farm.board.sessions import new_token
 
-    # Refuse a wrong root before a port is taken.
+    # Refuse a wrong root before opening a port.
     root = args.root or os.environ.get("PBRS_STORE", "")
     if not root:
         raise BadInput("board", "", "nothing to show", hint="pbrs-farm board OUT, or PBRS_STORE")
     store = store_of(root)
     token = _token(args.token_file) if args.token_file else new_token()
-    # Bind first: only then is the port known if it was given as 0.
+    # Bind first: with port 0 the actual port is known only then.
     listening = bound_socket(args.host, args.port)
     options = BoardOptions(
         cache=args.cache or default_cache(),

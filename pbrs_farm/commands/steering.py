@@ -1,7 +1,7 @@
-"""The farm's verbs that look and steer, and its two services. Effects: Redis, the store, stdout.
+"""The farm's verbs for monitoring and control, and its two services. Effects: Redis, the store, stdout.
 
-Imports little: `status` is asked often, on machines that are busy. None of these verbs imports
-numpy, celery or mitsuba (coordinator and worker do, when they start).
+Imports little: `status` runs often, on busy machines. None of these verbs imports numpy, celery or
+mitsuba (coordinator and worker do, when they start).
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ def add_verbs(verb: Verb) -> None:
     p = farm_verb("rerun", _rerun)
     p.add_argument("task", help="HOUSE/UNIT/STAGE")
     _add_job(p, flag=True)
-    # Verbs that change a job's state take the job alone.
+    # Verbs that change a job's state take only the job.
     for name in ("pause", "resume", "cancel", "reduce"):
         p = farm_verb(name, _steer)
         p.set_defaults(what=name)
@@ -136,7 +136,7 @@ def _add_users(farm_verb: Callable[[str, Handler], argparse.ArgumentParser]) -> 
 
 def _add_job(p: argparse.ArgumentParser, *, flag: bool = False) -> None:
     text = "job id (default: the newest)"
-    if flag:  # of a verb whose positional arguments name tasks
+    if flag:  # for verbs whose positional arguments name tasks
         p.add_argument("--job", default="", help=text)
     else:
         p.add_argument("job", nargs="?", default="", help=text)
@@ -174,13 +174,13 @@ def _show(args: argparse.Namespace, value: Any, text: Callable[[], str]) -> None
 
 def _status(args: argparse.Namespace) -> int:
     farm = farm_of(args)
-    # A farm that was just set up is in order; one whose ledger was lost is not.
+    # No jobs: normal on a new farm, an error if the ledger was lost.
     if not args.job and not farm.ledger.known_jobs() and not farm.lost_jobs():
         n = sum(row["state"] == "alive" for row in farm.workers())
         _show(args, {"jobs": [], "workers": n}, lambda: f"no job yet; {counted(n, 'worker')}")
         return 0
     farm, job = _farm_and_job(args)
-    # Ask again every two seconds while --watch holds and the job is not over.
+    # Poll every two seconds with --watch until the job ends.
     while True:
         status = farm.status(job)
         if args.watch and args.json:

@@ -1,4 +1,4 @@
-"""The verb that puts houses on the farm: submit. Effects: reads homes; the store, Redis, stdout."""
+"""The verb submit: send houses to the farm. Effects: reads homes; the store, Redis, stdout."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def _submit(args: argparse.Namespace) -> int:
 
 
 def _submitted(args: argparse.Namespace, request: SubmitRequest) -> str:
-    """Put the houses on the farm; the job's id, "" after a dry run."""
+    """Send the houses to the farm; returns the job's id, "" after a dry run."""
     from pbrs_farm.prepare.passes import uses_catalogue
     from workers.client.estimate import estimate
     from workers.client.farm_client import completed
@@ -69,7 +69,7 @@ def _submitted(args: argparse.Namespace, request: SubmitRequest) -> str:
     )
 
     spec = _spec(request)
-    # Read the homes: what each is, and where workers will find it.
+    # Resolve the homes, and the paths where workers will read them.
     seeds = dress_seeds(request.dress) or (spec.recipe.dress.seed,)
     entries = entries_from_arguments(
         home_arguments(args.homes, request.houses), seeds, models=request.models
@@ -78,7 +78,7 @@ def _submitted(args: argparse.Namespace, request: SubmitRequest) -> str:
     spec = spec.model_copy(update={"reference": reference[0]})
     houses, refs = [entry for entry, _ref in entries], [ref for _entry, ref in entries]
     _warn_of_paths([ref.location for ref in refs if is_left_in_place(ref)])
-    # Estimate, and touch neither the store nor Redis.
+    # Estimate without access to the store or Redis.
     if request.dry_run:
         plan = estimate(completed(houses, spec)[1], request.slots)
         if request.as_json:
@@ -86,7 +86,7 @@ def _submitted(args: argparse.Namespace, request: SubmitRequest) -> str:
         else:
             echo("\n".join(f"{k:<14}{v}" for k, v in plan.items()))
         return ""
-    # Fail before anything is uploaded where Redis does not answer or no worker has the store.
+    # Fail before any upload if Redis does not answer or no worker has the store.
     farm = farm_of(args)
     farm.ledger.ping()
     farm.check_store()
@@ -115,7 +115,7 @@ def _submitted(args: argparse.Namespace, request: SubmitRequest) -> str:
 
 
 def _submit_file(args: argparse.Namespace, job: dict[str, Any]) -> int:
-    """Submit what a job.toml says; with a table pack, wait for the job's end and pack its views."""
+    """Submit the job of a job.toml; with a table pack, wait for the job's end and pack its views."""
     from workers.job import SubmitRequest
 
     file = args.like or args.homes[0]
@@ -136,7 +136,7 @@ def _submit_file(args: argparse.Namespace, job: dict[str, Any]) -> int:
 
 
 def _submit_set(args: argparse.Namespace) -> int:
-    """Submit a part of a data set; its forms are written by `make`, of what was pulled."""
+    """Submit a part of a data set; after `pull`, `make` writes its forms."""
     from pbrs_farm.commands.set_file import options_given, set_from_word
     from workers.job import SubmitRequest
 
@@ -158,7 +158,7 @@ def _submit_set(args: argparse.Namespace) -> int:
 
 
 def _warn_of_paths(in_place: Sequence[str]) -> None:
-    """Warn of sources that are read where they lie."""
+    """Warn of sources that workers read in place, without an upload."""
     if in_place:
         where = f"{in_place[0]}{' ...' if len(in_place) > 1 else ''}"
         count = counted(len(in_place), "house")
@@ -166,7 +166,7 @@ def _warn_of_paths(in_place: Sequence[str]) -> None:
 
 
 def _spec(request: SubmitRequest) -> JobSpec:
-    """What the job is made with, its houses apart; raises BadInput, BadRecipe."""
+    """The job's settings, without its houses; raises BadInput, BadRecipe."""
     from pbrs_farm.run.request import Wanted, wanted_of
     from workers.client.estimate import seconds_per_view
     from workers.client.farm_client import new_spec

@@ -1,4 +1,4 @@
-"""Verbs that use what was made: sheet, verify, relight, pull. Effects: read and write an output folder."""
+"""Verbs that use an output folder: sheet, verify, relight, pull. Effects: read and write the folder."""
 
 from __future__ import annotations
 
@@ -99,7 +99,7 @@ def _write_films(folder: Path) -> None:
 def write_sheets(folder: Path, max_views: int, parts: SheetParts | None = None) -> None:
     """Write sheet.png and index.html into an output folder and print their paths.
 
-    parts: tiles and cards that were made while the views were.
+    parts: tiles and cards made during rendering.
     """
     from pbrs_farm.gallery.contact_sheet import contact_sheet
     from pbrs_farm.gallery.gallery_page import gallery_pages
@@ -146,7 +146,7 @@ def _verify_light(args: argparse.Namespace) -> int:
     from pbrs_farm.transport.validation.claims import light_claims
 
     variant, claims = choose_variant(), []
-    # Print each claim as it is proved.
+    # Print each result without waiting for the others.
     if not args.json:
         echo(f"{'':<5}{'claim':<63}{'measured':<48}expected")
     for claim in light_claims(variant):
@@ -159,7 +159,7 @@ def _verify_light(args: argparse.Namespace) -> int:
         echo_json({"variant": variant, "claims": rows, "n_failed": n_failed})
     else:
         echo(_claims_line(variant, claims, n_failed))
-    # A claim that fails is the verb's failure.
+    # The verb fails if a claim fails.
     return 1 if n_failed else 0
 
 
@@ -186,7 +186,7 @@ def _relight(args: argparse.Namespace) -> int:
 def _relight_view(args: argparse.Namespace, view: Path) -> int:
     from pbrs_farm.run.relight import relit, unlit_lamps
 
-    # Factors scale radiance: none may be negative.
+    # Factors scale radiance, so they cannot be negative.
     expected = "expected F or R,G,B, numbers that are finite and not negative"
     indoor = _factors("--indoor", args.indoor, expected, args.indoor)
     outdoor = _factors("--outdoor", args.outdoor, expected, args.outdoor)
@@ -195,7 +195,7 @@ def _relight_view(args: argparse.Namespace, view: Path) -> int:
     denoise = not args.no_denoise
     png = relit(view, indoor=indoor, outdoor=outdoor, denoise=denoise, lamps=lamps)
     put_files(out.parent, {out.name: png})
-    # A factor has no effect on lamps that the view does not see.
+    # A factor has no effect on lamps that do not light the view.
     for row in unlit_lamps(view, lamps) if lamps else ():
         warn(f"lamp {row['number']} ({row['item']}) brings no light to this view")
     echo(str(out))
@@ -211,7 +211,7 @@ def _list_lamps(args: argparse.Namespace, view: Path) -> int:
     rows = lamps_of_view(view)
     echo(f"{'lamp':>4} {'share':>6} {'lm':>7}  {'item':<12} {'room':<8} name")
     for row in rows:
-        # A lamp that brings no light to the view has no layer.
+        # A lamp that does not light the view has no layer.
         share = f"{row['share']:.1%}" if row["layer"] else "-"
         place = f"{row['item']:<12} {row['room'] or '-':<8}"
         echo(f"{row['number']:>4} {share:>6} {row['lm']:>7.0f}  {place} {shown(row['name'])}")
@@ -219,7 +219,7 @@ def _list_lamps(args: argparse.Namespace, view: Path) -> int:
 
 
 def _lamp_factor(argument: str) -> LampFactor:
-    """NAME=F or NAME=R,G,B; a name may hold "="."""
+    """Parse NAME=F or NAME=R,G,B; a name may contain "="."""
     from pbrs_farm.run.relight import LampFactor
 
     name, _, text = argument.rpartition("=")
