@@ -1,1 +1,1 @@
-"""Which stored views to keep: reference photographs, selection runs, their report."""
+"""Selection of stored views: reference photographs, selection runs, their report."""

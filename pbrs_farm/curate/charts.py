@@ -19,27 +19,26 @@ _PERCENT: Final = ("0 %", "20 %", "40 %", "60 %", "80 %", "100 %")
 
 
 class SvgPicture:
-    """An SVG picture of width x height pixels; the label is for readers that cannot see it."""
+    """An SVG picture of width x height pixels; the label is its text for screen readers."""
 
     def __init__(self, width: float, height: float, label: str) -> None:
         self.width, self.height = width, height
         self._svg = svg_picture(viewBox=f"0 0 {width} {height}", role="img", aria_label=label)
 
     def add(self, tag: str, content: str = "", **attributes: object) -> None:
-        """Draw an element above what is there, as core.svg.element does."""
+        """Draw an element over the existing ones, as core.svg.element does."""
         element(self._svg, tag, content, **attributes)
 
     def svg(self) -> Markup:
-        """The picture as text, its words escaped.
+        """The picture as SVG text, with its labels escaped.
 
-        To be put into a page: it is marked as safe for templates, since text was escaped when it
-        was drawn.
+        Marked as safe for templates, since labels are escaped when drawn.
         """
         return Markup(svg_text(self._svg))
 
 
 class PlotArea(SvgPicture):
-    """A drawing with a plot area whose positions are shares 0..1 of both axes, upwards."""
+    """A drawing with a plot area; positions in it are shares 0..1 of both axes, y upwards."""
 
     def x(self, share: float) -> float:
         """Horizontal pixel of a share 0..1 of the plot area."""
@@ -50,7 +49,7 @@ class PlotArea(SvgPicture):
         return round(self.height - _BOTTOM - share * (self.height - _TOP - _BOTTOM), 2)
 
     def box(self, at: tuple[float, float, float, float], css: str, style: str = "") -> None:
-        """A rectangle from (x0, y0) to (x1, y1), shares."""
+        """Draw a rectangle from (x0, y0) to (x1, y1), in shares."""
         x0, y0, x1, y1 = at
         width = f"{max(self.x(x1) - self.x(x0), 0):.2f}"
         height = f"{max(self.y(y0) - self.y(y1), 0):.2f}"
@@ -59,21 +58,20 @@ class PlotArea(SvgPicture):
         )
 
     def line(self, points: Sequence[tuple[float, float]], css: str) -> None:
-        """A polyline through shares."""
+        """Draw a polyline through points in shares."""
         self.add(
             "polyline", css=css, points=" ".join(f"{self.x(x)},{self.y(y)}" for x, y in points)
         )
 
     def text(self, at: tuple[float, float], text: str, anchor: str = "start", dy: int = 0) -> None:
-        """A label at a share, moved by dy pixels downwards."""
+        """Draw a label at a position in shares, moved down by dy pixels."""
         self.add("text", text, x=self.x(at[0]), y=self.y(at[1]) + dy, text_anchor=anchor)
 
     def axes(self, x_title: str, x_ticks: Sequence[str], y_ticks: Sequence[str]) -> None:
-        """Ticks at equal steps along both axes and the title of the lower one.
+        """Draw equally spaced ticks along both axes and the title of the lower one.
 
-        At least two ticks an axis, the first at 0 and the last at the end; each of the vertical
-        axis draws a grid line, so call it before the data. Ticks are texts: the scale of the data
-        is the caller's.
+        Each axis needs at least two ticks, the first at 0 and the last at the end. Each vertical tick
+        draws a grid line, so call this before drawing data. Ticks are texts: the caller scales the data.
         """
         for k, tick in enumerate(x_ticks):
             self.text((k / (len(x_ticks) - 1), 0), tick, "middle", 16)
@@ -84,7 +82,7 @@ class PlotArea(SvgPicture):
         self.text((0.5, 0), x_title, "middle", 34)
 
     def threshold(self, value: float) -> None:
-        """A vertical line at value and its number, on the side where there is room."""
+        """Draw a vertical line at value, and its number on the side with room."""
         self.line([(value, 0), (value, 1)], "limit")
         before = value > 0.85
         place = (value + (-0.01 if before else 0.01), 1)
@@ -92,13 +90,12 @@ class PlotArea(SvgPicture):
 
 
 def distribution(scores: F64, is_kept: Bools, threshold: float, title: str) -> Markup:
-    """Scores 0..1 in 50 bars, the kept part of each apart, and the threshold.
+    """Chart of scores 0..1 in 50 bars, with the kept part of each, and the threshold.
 
     scores is (n,) float64, kept (n,) bool of the same views. The axis counts views and is rounded
-    up to four whole steps; without any score the chart is empty but drawn. Scores outside 0..1 are
-    left out.
+    up to four whole steps; without scores the chart is drawn empty. Scores outside 0..1 are ignored.
     """
-    # Count all views and the kept ones by the same bars.
+    # Count all views and the kept ones with the same bin edges.
     edges = np.linspace(0, 1, 51)
     whole, _ = np.histogram(scores, edges)
     good, _ = np.histogram(scores[is_kept], edges)
@@ -115,10 +112,10 @@ def distribution(scores: F64, is_kept: Bools, threshold: float, title: str) -> M
 
 
 def joint(colour: F64, depth: F64, is_kept: Bools, limits: tuple[float, float]) -> Markup:
-    """Colour score against depth score: a cell is darker the more views it holds (log scale).
+    """Chart of colour score against depth score: a cell is darker the more views it holds (log scale).
 
-    A cell that holds both is parted by their shares: a view refused for another reason than its
-    scores is not drawn as a kept one.
+    A cell with both verdicts is split by their shares, since a view may be rejected for a reason
+    other than its scores.
     """
     n, bounds = 50, [[0, 1], [0, 1]]
     cells, _, _ = np.histogram2d(colour, depth, bins=n, range=bounds)
@@ -147,7 +144,7 @@ def joint(colour: F64, depth: F64, is_kept: Bools, limits: tuple[float, float]) 
 def yields(
     curves: Sequence[tuple[str, str, Sequence[float]]], threshold: float, paper: tuple[float, float]
 ) -> Markup:
-    """Share of views above each threshold 0..1: (name, css class, shares at equal steps).
+    """Chart of the share of views above each threshold 0..1: (name, css class, shares at equal steps).
 
     paper: (threshold, share) of the paper's own pictures, drawn as a ring.
     """
@@ -156,7 +153,7 @@ def yields(
     for _name, css, shares in curves:
         frame.line([(k / (len(shares) - 1), v) for k, v in enumerate(shares)], f"curve {css}")
     frame.threshold(threshold)
-    # Key of the curves, lower left.
+    # Legend of the curves, lower left.
     for k, (name, css, _shares) in enumerate(curves):
         y = 0.30 - 0.07 * k
         frame.line([(0.03, y), (0.09, y)], f"curve {css}")
@@ -174,9 +171,9 @@ def mirrored(
 ) -> Markup:
     """Two histograms on one axis: the view's upwards, its reference's downwards.
 
-    colours: of each bin; the page's own where None.
+    colours: of each bin; the page's default colour if None.
     """
-    width, half = 260, 44  # pixels; the axis lies at half
+    width, half = 260, 44  # pixels; the axis is at half
     # Scale both histograms alike, so that they can be compared.
     drawing = SvgPicture(width, 2 * half, label)
     top = max(float(above.max(initial=0)), float(below.max(initial=0)), 1e-9)
@@ -185,7 +182,7 @@ def mirrored(
     for k, (a, b) in enumerate(zip(above, below, strict=True)):
         fill = "" if colours is None else "fill:rgb({},{},{})".format(*colours[k])
         for value, css, up in ((a, "view", True), (b, "other", False)):
-            # Leave out bars that would not be seen.
+            # Leave out bars too small to see.
             height = float(value) / top * (half - 2)
             if height > 0.05:
                 x, y = f"{k * step:.1f}", f"{half - height if up else half + 1:.1f}"

@@ -1,6 +1,6 @@
 """Reads photographs with depth: a folder of pairs, or NYUv2's labelled .mat. Effects: reads files.
 
-docs/selection.md shows the layouts in which pairs are found, at any depth of a folder.
+docs/selection.md shows the supported layouts of pairs, at any depth of a folder.
 """
 
 from __future__ import annotations
@@ -32,12 +32,14 @@ from pbrs_farm.regular_files import (
 )
 from pbrs_farm.selection.reference_set import depth_mm_from_units, sun_rgbd_depth
 
-_RGB_NAMES: Final = ("rgb", "color", "colour", "image", "images")  # of folders
-_DEPTH_NAMES: Final = ("depth_bfx", "depth")  # the preferred first
+_RGB_NAMES: Final = ("rgb", "color", "colour", "image", "images")  # names of colour folders
+_DEPTH_NAMES: Final = ("depth_bfx", "depth")  # names of depth folders, the preferred first
 _RGB_FILES: Final = (".jpg", ".jpeg", ".png", ".bmp")
 _DEPTH_FILES: Final = (".png", ".npy", ".exr")
-_SAME_FORM: Final = 0.02  # of each other, widths over heights of a picture and its depth
-_SUFFIX: Final = re.compile(r"(.+)_(rgb|color|colour|image|depth)", re.IGNORECASE)  # of files
+_SAME_FORM: Final = (
+    0.02  # maximum relative difference between the aspect ratios of a picture and its depth
+)
+_SUFFIX: Final = re.compile(r"(.+)_(rgb|color|colour|image|depth)", re.IGNORECASE)  # names of files
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,11 +58,11 @@ class PhotoFiles:
     id: str
     rgb: Path
     depth: Path
-    depth_scale: float | None = None  # units a metre, where the layout says so
+    depth_scale: float | None = None  # units per metre, if the layout defines it
 
 
 def has_depth(folder: Path) -> bool:
-    """Some picture below a folder is one of depth, by its name or that of its folder."""
+    """True if the folder contains a depth picture, by the name of the file or of its folder."""
     return any(
         path.name.lower() in _DEPTH_NAMES
         if path.is_dir()
@@ -77,13 +79,13 @@ def _names_depth(path: Path) -> bool:
 def pairs_in(folder: Path) -> tuple[PhotoFiles, ...]:
     """Every pair below folder, by id (its path below folder).
 
-    Raises BadInput for a folder without pairs, and for a file whose other half is missing.
+    Raises BadInput for a folder without pairs, and for a file without its other half.
     """
     if not folder.is_dir():
         raise BadInput(folder, "", "no such folder")
     pairs: list[PhotoFiles] = []
     for inner in sorted({folder, *(p for p in folder.rglob("*") if p.is_dir())}):
-        # Lists of times and files pair what two cameras took at their own times (TUM RGB-D).
+        # Lists of times and files pair the pictures of two unsynchronised cameras (TUM RGB-D).
         if tum_frames.is_sequence(inner):
             place = inner.relative_to(folder)
             pairs += [
@@ -91,7 +93,7 @@ def pairs_in(folder: Path) -> tuple[PhotoFiles, ...]:
                 for rgb, depth in tum_frames.frames_of(inner)
             ]
             continue
-        # Look for a folder of pictures beside one of depth.
+        # Look for a colour folder beside a depth folder.
         names = {p.name.lower(): p for p in inner.iterdir() if p.is_dir()}
         rgb = next((names[n] for n in _RGB_NAMES if n in names), None)
         depth = next((names[n] for n in _DEPTH_NAMES if n in names), None)
@@ -108,11 +110,11 @@ def pairs_in(folder: Path) -> tuple[PhotoFiles, ...]:
 
 def _pairs_of_folders(root: Path, inner: Path, rgb: Path, depth: Path) -> list[PhotoFiles]:
     pictures, depths = _photograph_files(rgb, _RGB_FILES), _photograph_files(depth, _DEPTH_FILES)
-    # Pair the only files of two folders whatever they are called (SUN RGB-D).
+    # Pair the only files of two folders regardless of their names (SUN RGB-D).
     if len(pictures) == len(depths) == 1 and pictures.keys() != depths.keys():
         (picture,), (depth_file,) = pictures.values(), depths.values()
         return [PhotoFiles(inner.relative_to(root).as_posix(), picture, depth_file)]
-    # Name the first file whose other half is missing.
+    # Name the first file without its other half.
     for name, path in (pictures | depths).items():
         if name not in pictures or name not in depths:
             lacks = "depth" if name in pictures else "colour"
@@ -123,7 +125,7 @@ def _pairs_of_folders(root: Path, inner: Path, rgb: Path, depth: Path) -> list[P
 
 
 def _photograph_files(folder: Path, endings: tuple[str, ...]) -> dict[str, Path]:
-    # Know pictures by their name without ending.
+    # Index pictures by their name without ending.
     files: dict[str, Path] = {}
     for path in sorted(folder.iterdir()):
         if path.is_file() and path.suffix.lower() in endings:
@@ -140,7 +142,7 @@ def _pairs_by_suffix(root: Path, inner: Path) -> list[PhotoFiles]:
     for path in sorted(p for p in inner.iterdir() if p.is_file()):
         match = _SUFFIX.fullmatch(path.stem)
         if match is None:
-            # NAME.png goes with NAME_depth.png, where there is no NAME_rgb.
+            # NAME.png is paired with NAME_depth.png if there is no NAME_rgb.
             if path.suffix.lower() in _RGB_FILES:
                 plain[path.stem] = path
             continue
@@ -161,10 +163,10 @@ def _pairs_by_suffix(root: Path, inner: Path) -> list[PhotoFiles]:
 
 
 def photo_from_pair(pair: PhotoFiles, *, depth_scale: float | None, sun_rgbd: bool) -> Photo:
-    """The photograph of two files; BadInput naming the file that is wrong.
+    """Read the photograph of two files; raises BadInput naming the invalid file.
 
-    depth_scale: depth units per metre; None = the layout's, else 1000 for whole numbers, 1 for .npy and .exr. A picture
-    of another size than depth, in the same form, is brought to depth's (ScanNet's are).
+    depth_scale: depth units per metre; None = the layout's, else 1000 for integers, 1 for .npy and .exr. A picture
+    with the aspect ratio of its depth but another size is resized to the depth's (as in ScanNet).
     """
     rgb = images.decode_photo(read_given(pair.rgb), str(pair.rgb))
     stored = stored_depth(pair.depth)
@@ -175,7 +177,7 @@ def photo_from_pair(pair: PhotoFiles, *, depth_scale: float | None, sun_rgbd: bo
     if stored.shape != rgb.shape[:2]:
         sizes = f"{stored.shape[1]}x{stored.shape[0]}, the picture {rgb.shape[1]}x{rgb.shape[0]}"
         raise BadInput(pair.depth, "", f"sizes differ: depth is {sizes}")
-    # Bring depth to whole millimetres.
+    # Convert depth to whole millimetres.
     if sun_rgbd:
         if stored.dtype != np.uint16:
             raise BadInput(pair.depth, "", "SUN RGB-D's depth has 16 bits; this file has not")
@@ -186,7 +188,7 @@ def photo_from_pair(pair: PhotoFiles, *, depth_scale: float | None, sun_rgbd: bo
 
 
 def is_same_form(one: tuple[int, ...], other: tuple[int, ...]) -> bool:
-    """Whether two pictures, (H, W, ...) each, are as wide for their height; by 2 % they may differ.
+    """True if two pictures, (H, W, ...) each, have the same aspect ratio within 2 %.
 
     Example:
         >>> is_same_form((480, 640), (968, 1296, 3))
@@ -220,7 +222,7 @@ def _depth_mm(depth: NDArray[Any], scale: float, file: str, place: str) -> NDArr
 
 
 def h5py_for_mats() -> Any:
-    """The module h5py, which reads MATLAB 7.3's files; MachineFailed with what to type where it is missing."""
+    """The module h5py, which reads MATLAB 7.3's files; MachineFailed with the install command if it is missing."""
     try:
         import h5py
     except ImportError:
@@ -233,15 +235,15 @@ class NyuMat:
     """NYUv2's nyu_depth_v2_labeled.mat, read lazily: the file is 2.8 GB.
 
     MATLAB 7.3 is HDF5 with the axes reversed: images (n, 3, 640, 480) uint8 and depths
-    (n, 640, 480) metres. Use as a context manager. Raises BadInput for a file that is truncated,
-    of another MATLAB version, or without these two.
+    (n, 640, 480) metres. Use as a context manager. Raises BadInput for a truncated file, another
+    MATLAB version, or a file without these two arrays.
     """
 
     def __init__(self, path: Path) -> None:
         h5py = h5py_for_mats()
         self.path = path
         try:
-            # Refuse a pipe or a device before a library waits for it.
+            # Refuse a pipe or a device, on which a library would block.
             with open_regular(path, MAX_DIGEST_BYTES):
                 pass
         except OSError as error:
@@ -257,7 +259,7 @@ class NyuMat:
             raise
 
     def _open_fault(self, text: str) -> str:
-        # Tell the usual mistakes apart by the first bytes.
+        # Recognise common mistakes by the first bytes.
         with open_regular(self.path, MAX_DIGEST_BYTES) as file:
             start = file.read(10)
         if start.startswith(b"MATLAB 5.0"):
@@ -291,16 +293,16 @@ class NyuMat:
         return int(self._depths.shape[0])
 
     def photos(self, numbers: Collection[int] | None = None) -> Iterator[Photo]:
-        """The photographs in order, ids from 0001; one at a time in memory. numbers: those alone, from 1.
+        """The photographs in order, ids from 0001; one at a time in memory. numbers: only those, from 1.
 
-        Numbers beyond the last are left out without a word. The picture is (H, W, 3) uint8, depth
-        (H, W) in whole mm. BadInput names the image where the file is damaged.
+        Numbers beyond the last are silently ignored. The picture is (H, W, 3) uint8, depth
+        (H, W) in whole mm. Raises BadInput, naming the image, if the file is damaged.
         """
         chosen = range(1, len(self) + 1) if numbers is None else sorted(numbers)
         for k in (number - 1 for number in chosen if number <= len(self)):
             place = f"image {k + 1}"
             try:
-                # Turn MATLAB's (channel, column, row) round.
+                # Transpose MATLAB's (channel, column, row).
                 rgb = np.ascontiguousarray(np.asarray(self._images[k]).transpose(2, 1, 0))
                 depth = np.asarray(self._depths[k]).T
             except (OSError, RuntimeError):
@@ -309,10 +311,10 @@ class NyuMat:
 
 
 def sha256_of_files(paths: list[Path]) -> str:
-    """sha256 over the files' own, in the order given; of the file itself when there is one.
+    """sha256 over the digests of the files in the given order; a single file's own digest.
 
-    BadInput where a file cannot be read. The names do not count, the order does; no files at all
-    have the digest of no bytes.
+    Raises BadInput if a file cannot be read. The order counts, the names do not; an empty list has
+    the digest of no bytes.
     """
     digests = []
     for path in paths:

@@ -22,7 +22,7 @@ from pbrs_farm.selection.reference_set import (
 
 @dataclass(frozen=True, slots=True)
 class PhotoOptions:
-    """How photographs are read."""
+    """Options for reading photographs."""
 
     depth_scale: float | None = None  # depth units per metre, None = by the file's kind
     sun_rgbd: bool = False  # undo SUN RGB-D's rotation of depth bits
@@ -35,9 +35,9 @@ def build_reference(
     selection: SelectionFields,
     options: PhotoOptions | None = None,
 ) -> Reference:
-    """The reference of a folder of RGB-D pairs, or of NYUv2's labelled .mat.
+    """Build the reference of a folder of RGB-D pairs, or of NYUv2's labelled .mat.
 
-    Raises BadInput naming the file that is wrong; docs/selection.md shows the layouts.
+    Raises BadInput naming the invalid file; docs/selection.md shows the layouts.
     """
     options = options or PhotoOptions()
     if options.depth_scale is not None and not options.depth_scale > 0:
@@ -64,7 +64,7 @@ def _counted(
 ) -> dict[str, Histogram]:
     counted: dict[str, Histogram] = {}
     for photo in photos:
-        # Count what is left without the border; the picture itself is not kept.
+        # Count pixels inside the border; the picture itself is not stored.
         rows, columns = registration_border(photo.rgb) if options.crop else (slice(None),) * 2
         rgb, depth = photo.rgb[rows, columns], photo.depth_mm[rows, columns]
         counted[photo.id] = histogram(rgb, depth, settings)
@@ -72,9 +72,9 @@ def _counted(
 
 
 def read_reference(path: Path) -> Reference:
-    """The reference in a file; BadInput naming it when it is missing or none.
+    """Read a reference file; raises BadInput naming it if it is missing or invalid.
 
-    Also for one of another version: it must be built again, as counts depend on the settings.
+    A file of another version is invalid: counts depend on the settings, so it must be rebuilt.
     """
     hint = "`pbrs-farm reference build` makes one"
     return reference_from_bytes(read_given(path, hint=hint), str(path))

@@ -1,6 +1,6 @@
 """`pbrs-farm select --report`: a run as one HTML page. Effects: reads the store.
 
-The page needs no network and no script: charts are inline SVG, examples are small pictures in it.
+The page needs no network and no script: charts are inline SVG, examples are embedded thumbnails.
 """
 
 from __future__ import annotations
@@ -41,8 +41,8 @@ from pbrs_farm.selection.histograms import coarser_colour, coarser_depth, normal
 from pbrs_farm.selection.reference_set import Reference
 from pbrs_farm.store.object_store import Store
 
-MAX_ROWS: Final = 40  # of a table of houses or room types
-_N_EXAMPLES: Final = 8  # views of either verdict
+MAX_ROWS: Final = 40  # maximum rows of a table of houses or room types
+_N_EXAMPLES: Final = 8  # examples of each verdict
 _SHOWN_COLOURS: Final = 26  # fullest colour bins of a histogram
 
 
@@ -54,10 +54,10 @@ def selection_report(
     run: str = "default",
     photographs: Mapping[str, Path] | None = None,
 ) -> str:
-    """HTML of a run as it stands in the store; _N_EXAMPLES kept and as many rejected views are shown.
+    """HTML of a stored run, with up to _N_EXAMPLES kept and as many rejected views.
 
-    fields: the thresholds the run was judged with. photographs: id -> picture of the reference's
-    photographs, where the user has them: the nearest ones are shown beside each view. Raises
+    fields: the thresholds of the run's verdicts. photographs: id -> file of the reference's
+    photographs, if available; the nearest ones are shown beside each view. Raises
     BadInput when there is no such run.
     """
     table = verdict_table(store, run)
@@ -84,7 +84,7 @@ def selection_report(
 
 
 def _number_cells(summary: SelectionSummary) -> list[tuple[str, str]]:
-    """The large numbers at the top of the page: (number, what it counts)."""
+    """The large numbers at the top of the page: (number, label)."""
     share = summary.kept / summary.views if summary.views else 0.0
     return [
         (f"{summary.views:,}", f"views, houses: {len(summary.houses):,}"),
@@ -105,7 +105,7 @@ def _charts(
 ) -> dict[str, Markup]:
     colour, depth = (scored[k].to_numpy() for k in ("colour_score", "depth_score"))
     is_kept, limits = _is_kept(scored), (fields.min_colour, fields.min_depth)
-    # All curves count views of good quality, as a share of all views: as the card does.
+    # All curves count views of good quality as a share of all views, like the card.
     good = good_scores(table)
     # Curves: (label, CSS class, share of views kept at equal steps of the limit).
     curves = (
@@ -132,7 +132,7 @@ def _tally_table(tallies: Sequence[KeptCount]) -> dict[str, Any]:
 
 
 def _report_credits(store: Store, *shown: Any) -> list[str]:
-    """The attribution lines of the houses whose pictures are shown, each once."""
+    """The distinct attribution lines of the houses whose pictures are shown."""
     lines: dict[str, None] = {}
     for house in dict.fromkeys(h for table in shown for h in table["house"].to_pylist()):
         try:
@@ -165,10 +165,10 @@ def _spread(scored: Any, n: int) -> Any:
 
 
 def _rejected(scored: Any, n: int) -> Any:
-    """n rejected rows, the reasons in turn, of each the views that came nearest first."""
+    """n rejected rows, taking each reason in turn, and for each reason the highest scores first."""
     table = scored.filter(pa.array(~_is_kept(scored)))
     reasons = table["reason"].to_pylist()
-    # Number the views of each reason from the nearest: its turn.
+    # Rank the views within each reason; the rank is the view's turn.
     turns: dict[str, int] = {}
     ranked: list[tuple[int, int, int]] = []  # turn, rank among all, row
     for row in np.argsort(-_worst(table), kind="stable"):
@@ -210,7 +210,7 @@ class _Examples:
         }
 
     def _neighbour(self, name: str) -> str:
-        """A photograph's thumbnail as a data URL, "" where it is not here or cannot be read."""
+        """A photograph's thumbnail as a data URL, "" if it is missing or cannot be read."""
         path = self._photographs.get(name)
         try:
             if path is None:
@@ -221,7 +221,7 @@ class _Examples:
         return _thumbnail_url(pixels)
 
     def _picture(self, row: dict[str, Any], layer: str) -> str:
-        """The layer's thumbnail as a data URL, "" where it cannot be read."""
+        """The layer's thumbnail as a data URL, "" if it cannot be read."""
         key = keys.view_key(row["house"], row["view"], LAYER[layer].file)
         try:
             stored = images.array_from_png(self._store.get(key), key)
@@ -231,7 +231,7 @@ class _Examples:
         return _thumbnail_url(pixels)
 
     def _histograms(self, row: dict[str, Any]) -> list[tuple[Markup | None, str]]:
-        """(chart, nearest photograph) for colour and for depth; no chart where there are none."""
+        """(chart, nearest photograph) for colour and for depth; chart is None without a histogram."""
         names = row["colour_reference"], row["depth_reference"]
         try:
             pack = house_pack(self._store, row["house"], self._mode)
@@ -242,7 +242,7 @@ class _Examples:
         depth = normalised(coarser_depth(pack.depth[place], self._binning.depth))
         like_colour = self._colour[self._places[names[0]]]
         like_depth = self._depth[self._places[names[1]]]
-        # Of the colour bins, show only the fullest of either, in their own colours.
+        # Show only the fullest colour bins of either histogram, in their own colours.
         order = np.argsort(-np.maximum(colour, like_colour), kind="stable")
         fullest = np.sort(order[:_SHOWN_COLOURS])
         shades = bin_colours(self._binning.colour, self._space)[fullest]
@@ -257,15 +257,15 @@ def _thumbnail_url(pixels: Srgb8Image) -> str:
 
 
 def bin_colours(bins: Iterable[int], space: str) -> NDArray[np.uint8]:
-    """(a * b * c, 3) sRGB of the middle of each colour bin, in the order of the counts.
+    """(a * b * c, 3) sRGB of the centre of each colour bin, in the order of the counts.
 
-    bins is the number along each of three channels. For "ycbcr" middles that are no colour are
-    clipped to the nearest values of 0..255; any other space is taken for RGB.
+    bins is the number along each of three channels. For "ycbcr", centres outside the RGB cube are
+    clipped to 0..255; any other space is taken for RGB.
     """
-    # Enumerate the middles, the first channel slowest.
+    # Enumerate the centres, the first channel slowest.
     axes = [(np.arange(n) + 0.5) * 256 / n for n in bins]
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-    # Bring the middle of a YCbCr bin back to RGB (BT.601, full range).
+    # Convert the centre of a YCbCr bin to RGB (BT.601, full range).
     if space == "ycbcr":
         y, cb, cr = grid[:, 0], grid[:, 1] - 128, grid[:, 2] - 128
         grid = np.stack([y + 1.402 * cr, y - 0.344136 * cb - 0.714136 * cr, y + 1.772 * cb], -1)

@@ -1,7 +1,7 @@
 """`pbrs-farm select`: stored histograms -> scores -> verdicts -> selection/<run>.*. Effects: the store's.
 
-A run's scores are kept in its own Parquet file: a house whose histograms are unchanged is never
-scored again, and other thresholds cost no score at all. No picture is opened.
+A run's scores are stored in its Parquet file. Houses with unchanged histograms are not scored
+again, and new thresholds need no new scores. No picture is opened.
 """
 
 from __future__ import annotations
@@ -36,7 +36,9 @@ from pbrs_farm.selection.verdicts import verdicts
 from pbrs_farm.store.laid_out import LaidOutStore
 from pbrs_farm.store.object_store import Store, get_or_none
 
-_METADATA: Final = b"pbrs_farm"  # of the Parquet file: reference and mode of its scores
+_METADATA: Final = (
+    b"pbrs_farm"  # key in the Parquet file's metadata: reference and mode of its scores
+)
 Progress = Callable[[int, int], None]  # (houses done, houses in all)
 
 
@@ -49,16 +51,16 @@ def select(
     run: str = "default",
     progress: Progress | None = None,
 ) -> SelectionSummary:
-    """Score what is new, judge every view, write selection/<run>.parquet, .jsonl, selection.json.
+    """Score new views, judge every view, write selection/<run>.parquet, .jsonl, selection.json.
 
-    A view whose histogram.json is missing or damaged is marked failed and the rest goes on.
-    Raises BadInput when reference was built with other settings than the views' histograms.
+    A view whose histogram.json is missing or damaged is marked failed; the others are unaffected.
+    Raises BadInput if the settings of the reference differ from those of the views' histograms.
     """
     score_mode = Mode(fields.score_mode)
     houses = _houses(store)
     sources = {h: _source(store, h, views, score_mode) for h, views in houses.items()}
     facts = {"reference": reference.digest, "score_mode": str(score_mode)}
-    # Keep the scores that still hold; score the houses that have none.
+    # Keep valid scores; score the houses without any.
     old = _kept_rows(store, run, facts, sources)
     judged = set(old["house"].unique().to_pylist())
     todo = [h for h in sources if h not in judged and houses[h]]
@@ -79,8 +81,8 @@ def select(
 def verdict_table(store: Store, run: str = "default") -> Any:
     """The stored table of a run (scores.SCORES and the columns of verdicts); BadInput if none.
 
-    A pyarrow table, a row a view, rejected ones included with their reason. It is that of the time
-    of `pbrs-farm select`: views rendered since are not in it.
+    A pyarrow table with a row per view, including rejected ones with their reason. It dates from the
+    last `pbrs-farm select`: views rendered since are missing.
     """
     table = _stored_run(store, run)
     if table is None:
@@ -90,18 +92,18 @@ def verdict_table(store: Store, run: str = "default") -> Any:
 
 
 def house_pack(store: Store, house: str, score_mode: Mode) -> HistogramPack:
-    """The histograms of one house, from its pack when that is up to date.
+    """The histograms of one house, from its pack if up to date.
 
-    Out of date, or missing, it is counted anew from the views' histograms.
+    Otherwise it is rebuilt from the views' histograms.
     """
     views = _houses(store, house)[house]
     return _house_pack(store, house, views, _source(store, house, views, score_mode), score_mode)
 
 
 def _houses(store: Store, house: str = "") -> dict[str, dict[str, bool]]:
-    """House id -> view id -> whether it has a histogram.json, in order; of one house where it is named.
+    """House id -> view id -> True if it has a histogram.json, in order; house: only this one.
 
-    A remote store is not listed where a manifest names its views.
+    A remote store is not listed if a manifest names its views.
     """
     manifest = keys.house_key(house, keys.MANIFEST) if house else keys.MANIFEST
     rows = get_or_none(store, manifest) if isinstance(store, LaidOutStore) else None
@@ -119,7 +121,7 @@ def _houses(store: Store, house: str = "") -> dict[str, dict[str, bool]]:
 
 
 def _source(store: Store, house: str, views: Mapping[str, bool], score_mode: Mode) -> str:
-    """Digest of what the house's scores depend on: from its manifest, else from the files."""
+    """Digest of all inputs of the house's scores: from its manifest, else from the files."""
     # The manifest holds the hash of every file: without one, read the files.
     try:
         hashes = sha256_by_key(store.get(keys.house_key(house, keys.MANIFEST)))
@@ -160,7 +162,7 @@ def _records(
     records, failed = [], {}
     for view, has in views.items():
         key = keys.view_key(house, view, "histogram.json")
-        # A view that cannot be read costs itself alone.
+        # An unreadable view does not affect the others.
         try:
             if not has:
                 raise BadInput(key, "", "missing", hint="render the view again")
@@ -190,12 +192,12 @@ def _facts(table: Any) -> dict[str, str]:
 
 
 def _kept_rows(store: Store, run: str, facts: dict[str, str], sources: Mapping[str, str]) -> Any:
-    """The stored scores that still hold: same reference and mode, the house unchanged."""
+    """Valid stored scores: same reference and mode, the house unchanged."""
     table = _stored_run(store, run)
     if table is None or _facts(table) != facts or set(SCORES.names) - set(table.column_names):
         return SCORES.empty_table()
     table = table.select(SCORES.names).cast(SCORES)
-    # Keep the rows of houses whose histograms have the digest they were scored with.
+    # Keep the rows of houses whose histograms still have the digest stored with the scores.
     houses, rows = table["house"].to_numpy(), table["source"].to_numpy()
     holds = np.fromiter(
         (sources.get(h) == s for h, s in zip(houses, rows, strict=True)), bool, len(houses)
@@ -226,7 +228,7 @@ def _write_run(
 
 
 def json_lines(table: Any) -> bytes:
-    """A line of JSON for each row; numbers with at most six decimals, null where not known.
+    """A line of JSON per row; numbers with at most six decimals, null if unknown.
 
     table is a pyarrow table; the keys of a line are in the order of its columns. Works in batches,
     since at the paper's scale the result has hundreds of megabytes.
@@ -235,7 +237,7 @@ def json_lines(table: Any) -> bytes:
     opened = [("{" if k == 0 else ",") + json.dumps(name) + ":" for k, name in enumerate(names)]
     file = io.BytesIO()  # getvalue does not copy: at the paper's scale this is 300 MB
     for batch in table.to_batches(max_chunksize=16384):
-        # Join the columns' texts to a line a row.
+        # Join the columns' texts to one line per row.
         pieces: list[Any] = []
         for head, name in zip(opened, names, strict=True):
             pieces += [head, _json_values(batch.column(name))]
@@ -245,9 +247,9 @@ def json_lines(table: Any) -> bytes:
 
 
 def _json_values(column: Any) -> Any:
-    """The column's values as the text that JSON has for them."""
+    """The column's values as JSON text."""
     if pa.types.is_string(column.type):
-        # Quote each text once: a column has few different ones.
+        # Quote each distinct text once: a column has few.
         encoded = column.dictionary_encode()
         texts = pa.array([json.dumps(t) for t in encoded.dictionary.to_pylist()], pa.string())
         values = texts.take(encoded.indices)

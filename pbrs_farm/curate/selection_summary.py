@@ -18,14 +18,14 @@ from pbrs_farm.selection.verdicts import REASONS
 
 THRESHOLDS: Final = tuple(round(0.01 * k, 2) for k in range(101))
 
-# What the paper kept of its own pictures at 0.70 (section 3.3): 73.0 %.
+# Share of its own pictures that the paper keeps at 0.70 (section 3.3): 73.0 %.
 PAPER_VIEWS: Final = 779_342
 PAPER_KEPT: Final = 568_793
 _OF_CHOICE: Final = {"unlike-colour", "unlike-depth", "room-cap", "class-balance"}
 
 
 class KeptCount(Record):
-    """Views of one house or room type, and how many of them are kept."""
+    """Number of views of one house or room type, and how many of them are kept."""
 
     name: str
     views: int
@@ -68,10 +68,10 @@ def summary_of(
 ) -> SelectionSummary:
     """The summary of a table of verdicts.
 
-    judged is the table of verdicts, a row a view. Statistics of scores are over the views that have
-    one; tallies by house and type of room over all.
+    judged is the table of verdicts, a row per view. Statistics of scores cover the views with a
+    score; tallies by house and type of room cover all.
     """
-    # Views without a score are null there and count in no statistics of scores.
+    # Views without a score have null there and are excluded from the statistics of scores.
     colour, depth = (judged[k].drop_null().to_numpy() for k in ("colour_score", "depth_score"))
     counts = {r["values"]: r["counts"] for r in pc.value_counts(judged["reason"]).to_pylist()}
     modes = pc.value_counts(judged["mode"].filter(judged["colour_score"].is_valid())).to_pylist()
@@ -101,10 +101,10 @@ def summary_of(
 
 
 def good_scores(judged: Any) -> tuple[F64, F64]:
-    """Colour and depth scores of the views that nothing but thresholds, caps and balance can reject.
+    """Colour and depth scores of the views that only thresholds, caps and balance can reject.
 
-    Two float64 arrays of the same views, those without a score left out: what a threshold would
-    choose among. A view that several reasons reject counts only if all of them are of choice.
+    Two float64 arrays of the same views, without those lacking a score: the candidates of a threshold.
+    A view rejected for several reasons counts only if all of them are among these three.
     """
     of_quality = set(REASONS) - _OF_CHOICE
     is_good = [
@@ -116,27 +116,27 @@ def good_scores(judged: Any) -> tuple[F64, F64]:
 
 
 def yield_curve(scores: F64, n_views: int) -> list[float]:
-    """Share of n_views whose score is above each of THRESHOLDS; zeros where there are no scores.
+    """Share of n_views whose score is above each of THRESHOLDS; zeros without scores.
 
     scores is (n,), the lesser of colour and depth for both together; n_views counts all views, also
     those without a score. A score equal to a threshold does not pass it.
     """
     if not len(scores):
         return [0.0] * len(THRESHOLDS)
-    # Count by sorting once: the scores above each threshold.
+    # Sort once to count the scores above each threshold.
     above = len(scores) - np.searchsorted(np.sort(scores), THRESHOLDS, side="right")
     return [round(float(n) / n_views, 6) for n in above]
 
 
 def _quartiles(scores: np.ndarray[Any, np.dtype[np.float64]]) -> tuple[float, ...]:
-    """Minimum, quartiles and maximum; empty where there are no scores."""
+    """Minimum, quartiles and maximum; empty without scores."""
     if not len(scores):
         return ()
     return tuple(round(float(q), 6) for q in np.percentile(scores, (0, 25, 50, 75, 100)))
 
 
 def with_types(judged: Any) -> Any:
-    """The table with types of rooms for their names: "Bedroom 2" and "Chambre" are bedrooms."""
+    """The table with room names replaced by room types: "Bedroom 2" and "Chambre" are bedrooms."""
     names = judged["room_type"].to_pylist()
     kinds = {name: named_kind(name or "") for name in set(names)}
     column = [kind.value if (kind := kinds[name]) else "" for name in names]

@@ -1,7 +1,7 @@
-"""`pbrs-farm select --by`: leaves out views that teach nothing, by rules about what they show.
+"""`pbrs-farm select --by`: rejects uninformative views, by rules about their content.
 
-Effects: reads views of an output folder. Each rule is a number of a view and what it may be at most; a
-view that breaks several is counted for the first. Nothing is compared with photographs here.
+Effects: reads views of an output folder. Each rule measures a number of a view and has a maximum; a
+view that breaks several rules counts for the first. Nothing is compared with photographs here.
 """
 
 from __future__ import annotations
@@ -25,17 +25,17 @@ from pbrs_farm.selection.histogram_pack import BLACK
 from pbrs_farm.selection.quality import picture_quality
 from pbrs_farm.store.object_store import Store
 
-_PLANE_COS: Final = float(np.cos(np.radians(5)))  # between normals of one plane
-_PLANE_M: Final = 0.03  # across it
-_POINTS: Final = 4_800  # of a view, about
-_THING_SHARE: Final = 0.01  # of the picture, from which a thing counts
-_TWIN_M: Final = 1.5  # between eyes beyond which views are no twins
-_TWIN_SHIFT: Final = 0.08  # of the picture's width, by which a twin shows a point elsewhere
+_PLANE_COS: Final = float(np.cos(np.radians(5)))  # minimum cosine between normals of one plane
+_PLANE_M: Final = 0.03  # maximum distance of a point from its plane, metres
+_POINTS: Final = 4_800  # approximate number of sampled points of a view
+_THING_SHARE: Final = 0.01  # minimum share of the picture for an item to count
+_TWIN_M: Final = 1.5  # maximum distance between the cameras of twins, metres
+_TWIN_SHIFT: Final = 0.08  # maximum shift of a point between twins, share of the picture's width
 
 
 @dataclass(frozen=True, slots=True)
 class TeachingRule:
-    """A rule: what it measures of a view, and from what on the view is left out."""
+    """A rule: a measure of a view, and the maximum above which the view is rejected."""
 
     name: str
     reason: str
@@ -45,7 +45,7 @@ class TeachingRule:
 
 @dataclass(frozen=True, slots=True)
 class RuleVerdict:
-    """What the rules say of a view: the first that it breaks, "" where it is kept."""
+    """The verdict on a view. reason: of the first rule that it breaks, "" if it is kept."""
 
     house: str
     view: str
@@ -61,12 +61,12 @@ class RuleVerdict:
 
 
 def plane_share(view: ChosenView) -> float:
-    """Share of the picture that lies on its largest plane; 0 of a picture that sees nothing."""
+    """Share of the picture covered by its largest plane; 0 for a picture without surfaces."""
     points, normals, n = _grid(view)
     if not len(points):
         return 0.0
     offsets = (points * normals).sum(1)
-    # The plane that most share, to about a plane's width; then all that lie on it.
+    # Find the most common plane in coarse bins, then all points within its tolerance.
     cells = np.concatenate([np.rint(normals / 0.1), np.rint(offsets / 0.1)[:, None]], axis=1)
     _cells, cell, counts = np.unique(cells, axis=0, return_inverse=True, return_counts=True)
     largest = cell.reshape(-1) == counts.argmax()
@@ -78,9 +78,9 @@ def plane_share(view: ChosenView) -> float:
 
 
 def cut_share(view: ChosenView) -> float:
-    """Share of the things that the picture's edge cuts; 0 without things.
+    """Share of the items that the picture's edge cuts; 0 without items.
 
-    Things are no walls, floors or ceilings, and cover a hundredth of the picture at least.
+    Walls, floors, ceilings and items below a hundredth of the picture do not count.
     """
     structure = {kind.value for kind in ItemKind if kind.is_structure}
     things = [
@@ -92,17 +92,17 @@ def cut_share(view: ChosenView) -> float:
 
 
 def darkness(view: ChosenView) -> float:
-    """1 where nothing is seen in the view's picture, else 0; 0 without one."""
+    """1 if the view's picture is black, else 0; 0 without a picture."""
     if view.picture is None:
         return 0.0
     return float(picture_quality(view.array(view.picture)).brightness <= BLACK)
 
 
 def twin_share(view: ChosenView, other: ChosenView) -> float:
-    """Share of what a view sees that another shows at nearly the same place of its picture.
+    """Share of a view's points that another view shows at nearly the same pixel.
 
-    Of two pin-holes; 0 for other lenses and for eyes that are far apart. Not symmetric: a wide view
-    may hold all of a narrow one.
+    Only for pinhole cameras; 0 for other lenses and for cameras far apart. Not symmetric: a wide
+    view may contain all of a narrow one.
     """
     i, theirs = intrinsics_of(view.facts), intrinsics_of(other.facts)
     near = np.linalg.norm(pose_opencv(view)[:3, 3] - pose_opencv(other)[:3, 3]) < _TWIN_M
@@ -123,7 +123,7 @@ def twin_share(view: ChosenView, other: ChosenView) -> float:
 
 @lru_cache(maxsize=64)
 def _grid(view: ChosenView) -> tuple[F64, F64, int]:
-    """(N, 3) points in camera axes (x right, y down, z forward), their normals, and of how many pixels."""
+    """(N, 3) points in camera axes (x right, y down, z forward), their normals, and the number of sampled pixels."""
     depth = view.array("depth")
     step = max(1, int(np.sqrt(depth.size / _POINTS)))
     y, x = (g.ravel() for g in np.mgrid[: depth.shape[0] : step, : depth.shape[1] : step])
@@ -143,14 +143,14 @@ RULES: Final = (
     TeachingRule("cut", "cut-things", 0.9, cut_share),
 )
 REASONS: Final = {**{rule.name: rule.reason for rule in RULES}, _TWINS: "twin"}
-"""What --by takes -> why a view is left out, in the order in which it is judged."""
+"""Values of --by -> reason for the rejection, in the order of the checks."""
 
 
 def judged_by(entries: Sequence[ViewEntry], names: Sequence[str]) -> list[RuleVerdict]:
-    """The verdict of each view by the rules of these names; BadInput for a name that is none.
+    """Judge each view by the named rules; raises BadInput for an unknown name.
 
-    Twins are looked for last, in each room among the views that nothing else rejects: of two the one
-    with the smaller id stays. What other cameras of a rig took goes where the view of the first one goes.
+    Twins are checked last, in each room among the views that pass the other rules: of two, the one
+    with the smaller id is kept. Other cameras of a rig get the verdict of its first camera.
     """
     for name in names:
         if name not in REASONS:
@@ -170,9 +170,9 @@ def judged_by(entries: Sequence[ViewEntry], names: Sequence[str]) -> list[RuleVe
 def write_verdicts(
     store: Store, run: str, by: Sequence[str], verdicts: Sequence[RuleVerdict]
 ) -> dict[str, Any]:
-    """Write selection/<run>.jsonl and selection.json; the summary, as selection.json has it.
+    """Write selection/<run>.jsonl and selection.json; returns the summary stored in selection.json.
 
-    by: names of the rules that judged, which may be none. BadInput for a run's name that is none.
+    by: names of the rules applied, may be empty. Raises BadInput for an invalid name of the run.
     """
     key = keys.selection_key(run, "jsonl")
     store.put(key, "".join(verdict.json_line for verdict in verdicts).encode())
@@ -190,7 +190,7 @@ def write_verdicts(
 def _judged(
     entry: ViewEntry, names: Sequence[str], shown: list[ChosenView]
 ) -> tuple[dict[str, float], str]:
-    """A view's numbers and the first reason; one that is kept is put to the others of its room."""
+    """Measure a view; returns its numbers and first reason. A kept view is appended to shown."""
     view, numbers, reason = ChosenView(entry, Choice()), dict[str, float](), ""
     for rule in RULES:
         if rule.name in names:

@@ -1,9 +1,9 @@
-"""Sequences in the layout of the TUM RGB-D benchmark (Sturm et al. 2012): which frames make pairs. Effects: reads files.
+"""Sequences in the layout of the TUM RGB-D benchmark (Sturm et al. 2012), as pairs of frames. Effects: reads files.
 
-<sequence>/rgb.txt and depth.txt have a line `seconds file` a picture, groundtruth.txt a line
-`seconds tx ty tz qx qy qz qw` a pose; other lines are headings. Two cameras take colour and depth at
-their own times, and thirty frames a second are nearly one: of frames that follow each other only
-those are taken between which the camera has moved.
+<sequence>/rgb.txt and depth.txt have a line `seconds file` per picture, groundtruth.txt a line
+`seconds tx ty tz qx qy qz qw` per pose; other lines are headings. The colour and depth cameras are
+not synchronised. Consecutive frames are nearly equal, at thirty a second, so a frame is used only
+after the camera has moved.
 """
 
 from __future__ import annotations
@@ -21,13 +21,11 @@ from pbrs_farm.regular_files import text_given
 DEPTH_LIST: Final = "depth.txt"
 _RGB_LIST: Final = "rgb.txt"
 _POSES: Final = "groundtruth.txt"
-DEPTH_SCALE: Final = 5000.0  # units a metre
-_APART_S: Final = (
-    0.02  # at most, between colour and depth of a pair, as the benchmark's tools have it
-)
-_POSE_APART_S: Final = 0.05  # at most, between a frame and its pose
-_MOVED_M, _TURNED_DEG = 0.1, 10.0  # least, from the last frame that was taken
-_WAIT_S: Final = 1.0  # least, where a pose is not known
+DEPTH_SCALE: Final = 5000.0  # units per metre
+_APART_S: Final = 0.02  # maximum, between colour and depth of a pair, as in the benchmark's tools
+_POSE_APART_S: Final = 0.05  # maximum, between a frame and its pose
+_MOVED_M, _TURNED_DEG = 0.1, 10.0  # minimum motion since the last selected frame
+_WAIT_S: Final = 1.0  # minimum time since the last frame, if a pose is unknown
 
 # fx, fy, cx, cy of the colour cameras by their number (the benchmark's page of file formats).
 _CAMERAS: Final = {
@@ -39,22 +37,22 @@ _CAMERA_NAME: Final = re.compile(r"(?<![a-z])(?:freiburg|fr)([123])(?![0-9])", r
 
 
 def is_sequence(folder: Path) -> bool:
-    """The folder has both lists."""
+    """True if the folder has both lists."""
     return (folder / _RGB_LIST).is_file() and (folder / DEPTH_LIST).is_file()
 
 
 def camera_of_sequence(folder: Path) -> tuple[float, float, float, float] | None:
-    """fx, fy, cx, cy in pixels, by the camera in a sequence's name ("freiburg2", "fr2"); None where it has none."""
+    """fx, fy, cx, cy in pixels of the camera in a sequence's name ("freiburg2", "fr2"); None without one."""
     match = _CAMERA_NAME.search(folder.name) if is_sequence(folder) else None
     return _CAMERAS[match[1]] if match else None
 
 
 def frames_of(folder: Path) -> list[tuple[Path, Path]]:
-    """Colour and depth of each frame that is taken, in the order of time.
+    """Colour and depth of each selected frame, in the order of time.
 
-    A pair are two pictures that are each other's nearest, within 0.02 s. A frame is taken where
-    the camera has moved 0.1 m or turned 10 degrees since the last one, or after a second where its
-    pose is not known. Raises BadInput naming the list and line, or where no two pictures are a pair.
+    A pair is two pictures mutually nearest in time, within 0.02 s. A frame is selected after
+    the camera has moved 0.1 m or turned 10 degrees since the last one, or after a second if its pose
+    is unknown. Raises BadInput naming the list and line, or if there is no pair.
     """
     rgb, depth = _listed(folder / _RGB_LIST), _listed(folder / DEPTH_LIST)
     if not rgb or not depth:
@@ -98,7 +96,7 @@ def _number(word: str) -> float | None:
 
 
 def _poses(folder: Path) -> F64:
-    """(n, 8) seconds, place in metres and unit quaternion, by time; none where there is no file."""
+    """(n, 8) seconds, position in metres and unit quaternion, by time; empty without a file."""
     path, rows = folder / _POSES, []
     if not path.is_file():
         return np.zeros((0, 8))
@@ -116,7 +114,7 @@ def _poses(folder: Path) -> F64:
 
 
 def _apart(seconds: F64, poses: F64) -> list[int]:
-    """Which frames of a sequence are taken: the first, and each that is apart from the last one taken."""
+    """Indices of the selected frames: the first, and each far enough from the last selected one."""
     taken: list[int] = []
     last: F64 | None = None
     for k, now in enumerate(seconds):
@@ -136,7 +134,7 @@ def _apart(seconds: F64, poses: F64) -> list[int]:
 
 
 def _pose_at(seconds: float, poses: F64) -> F64 | None:
-    """(7,) the pose nearest in time; None where none is near."""
+    """(7,) the pose nearest in time; None if it is too far."""
     if not len(poses):
         return None
     k = int(np.abs(poses[:, 0] - seconds).argmin())
