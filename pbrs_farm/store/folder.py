@@ -1,4 +1,4 @@
-"""A store in a folder: each object a file, written whole through a temporary name. Effects: files."""
+"""A store in a folder: a file per object, written atomically through a temporary name. Effects: files."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from pbrs_farm.store.object_store import Head, check_key, check_prefix
 T = TypeVar("T")
 TEMPORARY: Final = ".incomplete"  # folder of unfinished files
 
-# What an OSError's number says of the store.
+# errno values, by their meaning for the store.
 _FULL: Final = {errno.ENOSPC, errno.EDQUOT}
 _UNAVAILABLE: Final = {
     errno.EIO,
@@ -33,9 +33,9 @@ _FORBIDDEN: Final = {errno.EACCES, errno.EPERM, errno.EROFS}
 
 
 class FolderStore:
-    """Objects as files below `root`; rename makes them appear whole, hard link if-absent.
+    """Objects as files below `root`, published by rename, or by hard link for put_if_absent.
 
-    Unfinished files live in `root/.incomplete`, on the same file system, and are never listed.
+    Unfinished files are in `root/.incomplete`, on the same file system, and are never listed.
     fsync: flush the file and its folder before an object counts as written (power loss).
     """
 
@@ -51,7 +51,7 @@ class FolderStore:
         path = self._path(key)
         try:
             temporary = self._write_temporary(data)
-            # Rename over what may be there: a reader sees the old or the new, whole.
+            # Rename over an older file: a reader sees either version whole.
             try:
                 _with_parent(path, lambda: temporary.replace(path))
             except OSError:
@@ -64,11 +64,11 @@ class FolderStore:
     def put_if_absent(self, key: str, data: bytes) -> bool:
         path = self._path(key)
         try:
-            # Spare the write where the object is there already.
+            # Skip the write if the object exists.
             if path.exists():
                 return False
             temporary = self._write_temporary(data)
-            # Let the file system decide: of many writers one makes the link.
+            # The file system decides: of many writers one creates the link.
             try:
                 _with_parent(path, lambda: os.link(temporary, path))
             except FileExistsError:
@@ -121,7 +121,7 @@ class FolderStore:
             raise self._failure(key, error) from error
 
     def sweep(self, older_than_s: float = 24 * 3600.0) -> int:
-        """Remove the files of killed writers that are older than older_than_s; their count.
+        """Remove files of killed writers older than older_than_s; returns their number.
 
         Unfinished files of live writers are younger than a day.
         """
@@ -146,7 +146,7 @@ class FolderStore:
         descriptor = _with_parent(temporary, lambda: create_new(temporary))
         try:
             with os.fdopen(descriptor, "wb", buffering=0) as file:
-                # Unbuffered writes may take a part only.
+                # An unbuffered write may write only a part.
                 view = memoryview(data)
                 while view:
                     view = view[file.write(view) :]
@@ -158,7 +158,7 @@ class FolderStore:
         return temporary
 
     def _flush_folder(self, folder: Path) -> None:
-        # Make the new name last, too: it is the folder's content.
+        # The new name is content of the folder, so flush the folder, too.
         if self._fsync:
             flush_folder(folder)
 
@@ -180,7 +180,7 @@ class FolderStore:
 
     def _failure(self, key: str, error: OSError) -> StoreFailed:
         code = error.errno
-        # Sort by what a caller can do: wait, ask for rights, give up.
+        # Classify by the caller's remedy: wait, ask for permission, give up.
         reason = error.strerror or str(error)
         if code in _FULL:
             return StoreUnavailable(key, f"{self.root} is full: {reason}", hint="free some space")
@@ -192,7 +192,7 @@ class FolderStore:
 
 
 def _with_parent(path: Path, act: Callable[[], T]) -> T:
-    """act(), once more with path's folder made if that was what it lacked."""
+    """Call act(); if path's folder is missing, create it and call act() again."""
     try:
         return act()
     except FileNotFoundError:

@@ -44,9 +44,9 @@ from pbrs_farm.store.pack import (
 )
 
 _ORDER: Final = tuple(GROUPS)
-_HEAD_BYTES: Final = 2**16  # read at first: the index, the markers, small files
-_WHOLE_BYTES: Final = 2**22  # read at first by a task, which needs labels and pictures anyway
-_RECENT_S: Final = 10.0  # an index read so lately is believed
+_HEAD_BYTES: Final = 2**16  # first read: the index, the markers, small files
+_WHOLE_BYTES: Final = 2**22  # first read of a task that needs labels and pictures anyway
+_RECENT_S: Final = 10.0  # an index read within this time is trusted
 _MOST_RECENT: Final = 256
 
 
@@ -72,26 +72,26 @@ class _Task:
 
     n_head: int
     packs: dict[str, Pack | None] = field(default_factory=dict)  # None: no such pack
-    absent: set[str] = field(default_factory=set)  # packs that were not there when first asked for
+    absent: set[str] = field(default_factory=set)  # packs missing at the first request
     objects: dict[str, bytes | None] = field(default_factory=dict)  # markers of the house
     pending: _Pending | None = None
 
 
 class LaidOutStore:
-    """A remote store that reads either layout, and packs output roots that begin in it.
+    """A remote store that reads either layout, and can pack new output roots.
 
-    packs: whether a new root is packed. A root keeps the layout it began with.
+    packs: True to pack new roots. A root keeps its first layout.
     """
 
     def __init__(self, inner: Store, packs: bool = True) -> None:
         self.inner = inner
         self._packs = packs
         self._known: bool | None = None  # packed or not; None: the root is empty
-        self._recent: dict[str, tuple[float, Pack | None]] = {}  # object -> until when, its index
+        self._recent: dict[str, tuple[float, Pack | None]] = {}  # object -> expiry time, its index
         self._task: _Task | None = None
 
     def __reduce__(self) -> tuple[object, ...]:
-        # Caches stay in this process.
+        # Caches are not pickled.
         return LaidOutStore, (self.inner, self._packs)
 
     @property
@@ -104,13 +104,13 @@ class LaidOutStore:
 
     @property
     def is_packed(self) -> bool:
-        """True if the root is packed; False until a root has begun. StoreFailed for a later layout."""
+        """True if the root is packed; False for an empty root. StoreFailed for a later layout."""
         return bool(self._layout())
 
     def _layout(self) -> bool | None:
-        """True if the root is packed, None before it has begun (no recipe in it); then cached."""
+        """True if the root is packed, None while it is empty (no recipe in it); then cached."""
         if self._known is None:
-            # The layout is written before the recipe: ask in the other order.
+            # The layout is written before the recipe, so look for the recipe first.
             has_begun = self.inner.head(keys.RECIPE) is not None
             data = get_or_none(self.inner, LAYOUT)
             if data is not None or has_begun:
@@ -119,10 +119,10 @@ class LaidOutStore:
 
     @contextmanager
     def task(self, *, reads_whole: bool) -> Iterator[LaidOutStore]:
-        """This store for the time of one task, with a cache of markers.
+        """This store for the duration of one task, with a cache of markers.
 
-        The results of a group of steps of a view are written together, at the latest at the end, also if the
-        task fails. reads_whole: packs are read at once, since their pictures are needed.
+        The results of a view's group of steps are written together, at the end of the task at the latest, even if
+        the task fails. reads_whole: the first read fetches packs whole, since the task needs their pictures.
         """
         store = LaidOutStore(self.inner, self._packs)
         store._known = self._layout()
@@ -143,21 +143,21 @@ class LaidOutStore:
     def put_if_absent(self, key: str, data: bytes) -> bool:
         self._refuse_view(key)
         if key == keys.RECIPE and self._packs and self.inner.head(key) is None:
-            # Write the layout before anything else.
+            # Write the layout before any other object.
             row = {"format": FORMAT, "layout": "packed"}
             self.inner.put_if_absent(LAYOUT, (json.dumps(row) + "\n").encode())
         self._forget(key)
         return self.inner.put_if_absent(self._object(key), data)
 
     def put_done(self, key: str, marker: bytes, files: Mapping[str, bytes]) -> None:
-        """Put a step's files and its marker; for a view both at once, in a pack."""
+        """Put a step's files and its marker; those of a view together, in a pack."""
         parts = self._of_view(key)
         if parts is None:
             for file, data in files.items():
                 self.put(file, data)
             self.put_if_absent(key, marker)
             return
-        # Keep it for the pack of its group while the task makes the rest of that.
+        # Hold it for the pack of its group while the task makes the other steps.
         assert parts.view is not None
         group = GROUP_OF_STEP.get(parts.step, parts.step)
         self._flush_unless(parts.house, parts.view, group)
@@ -167,7 +167,7 @@ class LaidOutStore:
         pending.steps[parts.step] = {marker_of(parts.step): marker, **members}
         if task is not None:
             task.pending = pending
-        if task is None or len(GROUPS.get(group, ())) < 2:  # nothing follows
+        if task is None or len(GROUPS.get(group, ())) < 2:  # no other step to wait for
             self._flush(pending)
 
     def get(self, key: str) -> bytes:
@@ -176,7 +176,7 @@ class LaidOutStore:
             return self._get_object(key)
         if (waiting := self._waiting(parts)) is not None:
             return waiting
-        # Once more where a pack was written, or written anew, since its index was read.
+        # Retry if a pack was written or replaced after its index was read.
         for is_fresh in (False, True) if not parts.step else (True, True):
             member = self._found(parts, is_fresh=is_fresh)
             if member is None and is_fresh:
@@ -213,7 +213,7 @@ class LaidOutStore:
         return Head(pack.rows[name][2], whole.modified_s if whole is not None else 0.0)
 
     def list(self, prefix: str = "") -> Iterator[str]:
-        """As Store.list. In a packed root it reads each pack's index, and writes what waits for its pack."""
+        """As Store.list. In a packed root it reads each pack's index, and first writes pending results."""
         check_prefix(prefix)
         self._flush()
         if not self.is_packed:
@@ -229,7 +229,7 @@ class LaidOutStore:
             self._drop(parts)
         # A file of a view goes with its marker.
 
-    # Where a key is.
+    # Object of a key.
 
     def _object(self, key: str) -> str:
         check_key(key)
@@ -251,10 +251,10 @@ class LaidOutStore:
     def _found(
         self, parts: keys.HouseKey, *, is_fresh: bool = False
     ) -> tuple[str, Pack, str] | None:
-        """The object that holds a key, its index, and the key's name there."""
+        """The object that contains a key, its index, and the key's name in it."""
         house, view, name = parts.house, parts.view or "", file_or_marker(parts)
         for group in groups_of(parts):
-            # Without the pack of its group no step of it is done.
+            # Without its group's pack, no step of the group is done.
             place = pack_key(house, view, group)
             pack = self._pack(place, is_fresh=is_fresh)
             if pack is None or name in pack.rows:
@@ -271,7 +271,7 @@ class LaidOutStore:
     # Reading.
 
     def _get_object(self, key: str) -> bytes:
-        """An object of no view; in a task the house's markers and its description are kept."""
+        """An object outside views; a task caches the house's markers and its description."""
         place, task = self._object(key), self._task
         parts = keys.parse_house_key(key) if task is not None else None
         if task is None or parts is None or not (parts.step or parts.file == "house.json"):
@@ -283,7 +283,7 @@ class LaidOutStore:
         return data
 
     def _waiting(self, parts: keys.HouseKey) -> bytes | None:
-        """Data that the task has not written yet. Asking for a later group's marker writes the group before."""
+        """Data that the task has not written yet. A request for a later group's marker writes the earlier group."""
         task = self._task
         if task is None or task.pending is None:
             return None
@@ -299,7 +299,7 @@ class LaidOutStore:
         if task is not None and place in task.packs:
             return task.packs[place]
         if task is not None and _before(place) in task.absent:
-            # Pictures are made from light that was not there: nor were they, or they are stale.
+            # Pictures need light: without its pack they are missing or stale.
             return None
         until, recent = self._recent.get(place, (0.0, None))
         if not is_fresh and until > now:
@@ -311,7 +311,7 @@ class LaidOutStore:
         return pack
 
     def _read(self, place: str) -> Pack | None:
-        # Of the light everybody but the step that made it wants the marker alone.
+        # Of the light, only the step that makes it needs more than the marker.
         is_light = place.rpartition("/")[2].startswith("light.")
         n_head = self._task.n_head if self._task is not None and not is_light else _HEAD_BYTES
         try:
@@ -331,7 +331,7 @@ class LaidOutStore:
             self._recent[place] = (time.monotonic() + _RECENT_S, pack)
             return
         if task.n_head > _HEAD_BYTES:
-            # Pictures of one view at a time are enough.
+            # Cache the pictures of one view at a time.
             view = place.partition("/packs/")[2].partition(".")[2]
             task.packs = {k: p for k, p in task.packs.items() if k.endswith(f".{view}")}
         task.packs[place] = pack
@@ -393,7 +393,7 @@ class LaidOutStore:
     # Writing.
 
     def _flush_unless(self, house: str, view: str, group: str) -> None:
-        """Write what waits unless it is of this group of this view."""
+        """Write pending results unless they belong to this group of this view."""
         pending = self._task.pending if self._task is not None else None
         if pending is not None and (pending.house, pending.view, pending.group) != (
             house,
@@ -447,7 +447,7 @@ class LaidOutStore:
         self._take_out(parts.house, parts.view or "", parts.step)
 
     def _take_out(self, house: str, view: str, step: str) -> None:
-        """Take a step out of the packs that hold it, whole packs at a time; other steps stay."""
+        """Remove a step from the packs that contain it, by rewriting them; other steps stay."""
         group = GROUP_OF_STEP.get(step, step)
         place = pack_key(house, view, group)
         if step != group:
@@ -463,7 +463,8 @@ class LaidOutStore:
             if of != step and member is not None:
                 rest.setdefault(of, {})[name] = member
         self._lose(place)
-        # An empty pack stays where a step of the group has its own: those are found through it.
+        # Keep an empty pack while a step of the group has its own pack: it is found through the
+        # group's.
         if rest or any(self._pack(pack_key(house, view, s)) for s in _others(group, step)):
             self.inner.put(place, pack_bytes(rest))
         else:
@@ -480,7 +481,7 @@ class LaidOutStore:
 
 
 def _before(place: str) -> str:
-    """Of the pack of a view's pictures that of its light, else ""."""
+    """For the pack of a view's pictures, the pack of its light; else ""."""
     folder, _, name = place.rpartition("/")
     return f"{folder}/light.{name.removeprefix('pictures.')}" if name[:9] == "pictures." else ""
 
@@ -516,7 +517,7 @@ def _is_packed(data: bytes) -> bool:
 
 @contextmanager
 def one_task(store: Store, *, reads_whole: bool) -> Iterator[Store]:
-    """The store for the time of one task, whose writes are packed together (LaidOutStore.task).
+    """The store for the duration of one task, whose writes are packed together (LaidOutStore.task).
 
     reads_whole: the task needs labels and pictures of its view, so packs are fetched whole. Any other kind of
     store is yielded unchanged.

@@ -1,4 +1,4 @@
-"""A store in this process's memory, for tests and for looking without writing; its effect is its own state."""
+"""A store in this process's memory, for tests and dry runs; its effect is its own state."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from pbrs_farm.store.object_store import Head, check_key, check_prefix
 
 
 class MemoryStore:
-    """Objects in a dictionary behind a lock; other processes see none but of a pickled copy."""
+    """Objects in a dictionary behind a lock; other processes get a copy when it is pickled."""
 
     def __init__(self) -> None:
         self._objects: dict[str, bytes] = {}  # key -> bytes
         self._lock = threading.Lock()
 
     def __reduce__(self) -> tuple[object, ...]:
-        # A lock is of its process: a copy has its own.
+        # Locks cannot be pickled: a copy has a new one.
         with self._lock:
             return (_store_of, (dict(self._objects),))
 
@@ -52,7 +52,7 @@ class MemoryStore:
     def list(self, prefix: str = "") -> Iterator[str]:
         check_prefix(prefix)
         with self._lock:
-            # Take a copy: the caller may put and delete while it lists.
+            # Copy the keys: the caller may put and delete while it lists.
             found_keys = [key for key in self._objects if key.startswith(prefix)]
         return iter(sorted(found_keys))
 

@@ -9,11 +9,11 @@ from typing import Final, Protocol, runtime_checkable
 
 from pbrs_farm.core.errors import ObjectMissing, StoreFailed
 
-# No leading dot, no slash, nothing that a shell or a URL would take amiss.
+# No leading dot, no slash, no character special to a shell or a URL.
 _SEGMENT: Final = re.compile(r"[A-Za-z0-9_\-+=@,~ ()\[\]!][A-Za-z0-9_.\-+=@,~ ()\[\]!]*")
 _MAX_KEY: Final = 900  # characters; S3 takes 1024 bytes with the prefix
 _MAX_SEGMENT: Final = 200  # characters; file systems take 255 bytes
-LAYOUT: Final = "layout.json"  # there where an output root is packed (store/laid_out.py)
+LAYOUT: Final = "layout.json"  # marks a packed output root (store/laid_out.py)
 CONTENT_TYPES: Final = {
     "png": "image/png",
     "exr": "image/x-exr",
@@ -29,14 +29,14 @@ CONTENT_TYPES: Final = {
 
 @dataclass(frozen=True, slots=True)
 class Head:
-    """Properties of an object that was not read."""
+    """Properties of an object, without its content."""
 
     n_bytes: int
-    modified_s: float = 0.0  # since 1970, by the store's clock; 0 where it keeps none
+    modified_s: float = 0.0  # since 1970, by the store's clock; 0 if it has none
 
 
 class Store(Protocol):
-    """Whole objects under keys. A reader sees all of an object or nothing of it.
+    """Whole objects under keys. A reader sees a complete object or none.
 
     Every method raises StoreFailed with the key, and StoreUnavailable (worth another try) when
     the store did not answer. Keys are relative, "/" between segments, never "..".
@@ -52,9 +52,9 @@ class Store(Protocol):
         ...
 
     def put_if_absent(self, key: str, data: bytes) -> bool:
-        """Write the object unless it exists; True for the one writer who did.
+        """Write the object unless it exists; returns True if this call wrote it.
 
-        Of many writers at once one gets True, so that the answer may decide who goes on.
+        Of many concurrent writers exactly one gets True, so the result can decide which one continues.
         """
         ...
 
@@ -71,15 +71,15 @@ class Store(Protocol):
         ...
 
     def list(self, prefix: str = "") -> Iterator[str]:
-        """Keys of all objects below the folder `prefix` ("" or "a/b/"), at any depth, in no promised order.
+        """Keys of all objects below the folder `prefix` ("" or "a/b/"), at any depth, in no defined order.
 
-        Raises StoreFailed at once for a prefix that does not end with "/". Objects put or deleted meanwhile may
-        be listed or not.
+        Raises StoreFailed immediately for a prefix that does not end with "/". Objects put or deleted meanwhile
+        may be listed or not.
         """
         ...
 
     def delete(self, key: str) -> None:
-        """Remove the object, if it exists. Folders cannot be deleted: list one and delete its keys."""
+        """Remove the object, if it exists. To delete a folder, list it and delete its keys."""
         ...
 
 
@@ -96,7 +96,7 @@ class PackingStore(Store, Protocol):
     """A store with its own way to put a step's results."""
 
     def put_done(self, key: str, marker: bytes, files: Mapping[str, bytes]) -> None:
-        """As the function put_done, for stores in which the files of several steps share one object."""
+        """As the function put_done, for stores where the files of several steps share one object."""
         ...
 
 
@@ -116,10 +116,10 @@ def put_done(store: Store, key: str, marker: bytes, files: Mapping[str, bytes]) 
 
 
 def check_key(key: str) -> str:
-    """The key; StoreFailed when it could name anything outside the store.
+    """Return the key; raises StoreFailed if it could name anything outside the store.
 
-    Refused: empty segments, `..`, a leading dot or slash, characters that a shell or a URL takes amiss, and
-    lengths that S3 or a file system does not hold.
+    Refused: empty segments, `..`, a leading dot or slash, characters special to a shell or a URL, and
+    lengths above the limits of S3 or a file system.
     """
     segments = key.split("/")
     # Refuse empty segments, "." and "..", as well as names too long for S3 or a disk.
@@ -129,7 +129,7 @@ def check_key(key: str) -> str:
 
 
 def check_prefix(prefix: str) -> str:
-    """The prefix, "" or a folder with a trailing slash; StoreFailed for any other, or an invalid segment."""
+    """Return the prefix, "" or a folder with a trailing slash; StoreFailed for any other, or an invalid segment."""
     if prefix and not prefix.endswith("/"):
         raise StoreFailed(prefix, "a prefix to list ends with '/'")
     if prefix:

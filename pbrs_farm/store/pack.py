@@ -1,4 +1,4 @@
-"""A pack: the files of a view's steps as one object, and which object holds a key; no effects."""
+"""A pack: the files of a view's steps as one object, and the object of each key; no effects."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from pbrs_farm.core.errors import StoreFailed
 
 _INDEX: Final = "index.json"
 
-FORMAT: Final = 1  # of layout.json and of packs; a reader refuses a later one
+FORMAT: Final = 1  # version of layout.json and of packs; a reader refuses a later one
 
-# Group -> steps of a view that are written together.
+# Group -> steps of a view written together.
 GROUPS: Final = {
     "labels": ("truth", "opengl_dl", "opengl_il"),
     "light": ("light",),
@@ -28,16 +28,16 @@ TAR_BLOCK: Final = 512
 
 @dataclass(frozen=True, slots=True)
 class Pack:
-    """The index of a pack, and its beginning as far as it was read."""
+    """The index of a pack, and the first bytes read with it."""
 
     rows: Mapping[str, tuple[str, int, int]]  # name -> step, first byte, number of bytes
     head: bytes
 
     def held(self, name: str) -> bytes | None:
-        """The bytes of a member, None if the part that was read ends before it does.
+        """The bytes of a member, None if it extends beyond the bytes in `head`.
 
-        name: as `marker_of` or a file's name below the view's folder gives it; KeyError for one that is not in
-        `rows`. On None read the range of `rows` from the pack's object.
+        name: from `marker_of`, or a file's name below the view's folder; KeyError for one not in `rows`. If None,
+        read the range of `rows` from the pack's object.
         """
         _step, start, n_bytes = self.rows[name]
         end = start + n_bytes
@@ -45,17 +45,17 @@ class Pack:
 
 
 def pack_bytes(steps: Mapping[str, Mapping[str, bytes]]) -> bytes:
-    """The tar of what steps made: step -> name below the view's folder, or of its marker -> bytes.
+    """Pack the results of steps as a tar: step -> name below the view's folder, or of its marker -> bytes.
 
-    Markers come first and then the smallest members, so that one read of the beginning shows what
-    is done. Bytes depend on the members alone (no times, no owners): equal steps give equal packs.
+    Markers come first and then the smallest members, so that one read of the beginning shows the
+    steps done. Bytes depend on the members alone (no times, no owners): equal steps give equal packs.
     An ordinary `tar` opens it.
     """
     files = [
         (name, step, data) for step, members in steps.items() for name, data in members.items()
     ]
     files.sort(key=lambda row: (not row[0].startswith("done/"), len(row[2]), row[0]))
-    # Places count from the index's end, so that its length does not depend on them.
+    # Offsets count from the end of the index, so its length does not depend on them.
     rows, offset = [], 0
     for name, step, data in files:
         offset += TAR_BLOCK
@@ -74,8 +74,8 @@ def pack_bytes(steps: Mapping[str, Mapping[str, bytes]]) -> bytes:
 def pack_from_head(data: bytes, key: str) -> Pack | None:
     """The pack that begins with data; None if its index is longer. StoreFailed for any other object.
 
-    data: the first bytes of the object; key: for messages. On None read more and ask again. A format of a
-    later version raises StoreFailed, too.
+    data: the first bytes of the object; key: for messages. If None, read more and call again. Raises
+    StoreFailed for a later version of the format, too.
     """
     try:
         entry = tarfile.TarInfo.frombuf(data[:TAR_BLOCK], "ascii", "strict")
@@ -112,14 +112,14 @@ def house_folder(house: str) -> str:
 
 
 def pack_key(house: str, view: str, group: str) -> str:
-    """Key of the pack of a view's group of steps (a key of GROUPS), or of a step that is written alone."""
+    """Key of the pack of a view's group of steps (a key of GROUPS), or of a step with its own pack."""
     return f"{house_folder(house)}packs/{group}.{view}.tar"
 
 
 def object_key(key: str) -> str:
-    """The object of a key that does not belong to a view; `key_of_object` is the inverse.
+    """The object of a key outside views; `key_of_object` is the inverse.
 
-    The folders of houses and objects are spread as by `house_folder`; other keys (jobs, reports) stay.
+    The folders of houses and objects are spread as by `house_folder`; other keys (jobs, reports) are unchanged.
     """
     top, _, rest = key.partition("/")
     house, slash, below = rest.partition("/")
@@ -136,10 +136,10 @@ def file_or_marker(at: keys.HouseKey) -> str:
 
 
 def groups_of(at: keys.HouseKey) -> tuple[str, ...]:
-    """The groups that may hold a view's file or marker, the likeliest first.
+    """The groups that may contain a view's file or marker, the likeliest first.
 
-    at: of a file or marker of a view, as `keys` parses it. A marker has one place; a file that
-    plugins may have named is looked for in three.
+    at: of a file or marker of a view, as `keys` parses it. A marker has one group; a file that
+    plugins may have named has three.
     """
     if at.step:
         return (GROUP_OF_STEP.get(at.step, at.step),)
@@ -151,6 +151,6 @@ def groups_of(at: keys.HouseKey) -> tuple[str, ...]:
 
 
 def steps_of(at: keys.HouseKey, group: str) -> tuple[str, ...]:
-    """Steps of a group whose own packs may hold what its pack lacks; for a marker its own step alone."""
+    """Steps of a group whose own packs may contain files missing in its pack; for a marker only its own step."""
     steps = (at.step,) if at.step else GROUPS[group]
     return tuple(step for step in steps if step != group)

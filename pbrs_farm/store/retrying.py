@@ -1,4 +1,4 @@
-"""A store that tries again while another one is unavailable. Effects: those of the store it wraps."""
+"""A store that retries while the store it wraps is unavailable. Effects: those of the wrapped store."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from typing import TypeVar
 from pbrs_farm.core.errors import StoreUnavailable
 from pbrs_farm.store.object_store import Head, Store
 
-T = TypeVar("T")  # what the call gives
+T = TypeVar("T")  # result of the call
 
-_FIRST_PAUSE_S = 0.2  # at most; each further pause is twice as long
+_FIRST_PAUSE_S = 0.2  # maximum; each further pause is twice as long
 
 
 def retry(
@@ -23,11 +23,11 @@ def retry(
     max_pause_s: float = 8.0,
     on_wait: Callable[[str], None] = lambda _reason: None,
 ) -> T:
-    """call(number of earlier tries), again while it raises StoreUnavailable, for timeout_s.
+    """Repeat call(number of earlier tries) while it raises StoreUnavailable, for timeout_s.
 
     Pauses grow exponentially to max_pause_s, each times a random factor of the range jitter.
     """
-    # Try until it works, fails otherwise, or the next pause would end too late.
+    # Try until success, another error, or a pause that would end after the deadline.
     deadline, n_tries = time.monotonic() + timeout_s, 0
     while True:
         try:
@@ -42,9 +42,9 @@ def retry(
 
 
 class RetryingStore:
-    """A store that retries each call of the inner store while that is unavailable.
+    """A store that retries each call while the inner store is unavailable.
 
-    A finished picture survives an outage in memory and is not rendered again. timeout_s: then
+    So a finished picture survives an outage in memory and is not rendered again. After timeout_s
     StoreUnavailable is raised. on_wait: called with the reason before each pause.
     """
 
@@ -75,14 +75,14 @@ class RetryingStore:
         return self._call(lambda: self._store.head(key))
 
     def list(self, prefix: str = "") -> Iterator[str]:
-        # List the whole at once: an iterator could fail half-way, out of reach of a retry.
+        # List everything within the retry: a lazy iterator could fail outside it.
         return iter(self._call(lambda: [*self._store.list(prefix)]))
 
     def delete(self, key: str) -> None:
         self._call(lambda: self._store.delete(key))
 
     def _call(self, act: Callable[[], T]) -> T:
-        # Never pause for less than half: many renderers wait for the same store.
+        # Pause for at least half: many renderers wait for the same store.
         return retry(
             lambda _n: act(),
             self._timeout_s,

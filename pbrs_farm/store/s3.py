@@ -1,8 +1,8 @@
 """A store in an S3 bucket of any vendor, through obstore. Effects: network.
 
 obstore's runtime does not survive a fork: once a process has made a call, every call in its
-children hangs for ever, even through a new store. So this module remembers who called first and
-raises in a child instead, and Celery's parent process forbids itself storage altogether.
+children hangs forever, even through a new store. So this module remembers the first caller and
+raises an error in its children, and Celery's parent process forbids itself all storage.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ from pbrs_farm.store.retrying import retry
 from pbrs_farm.store.secret import Secret
 
 T = TypeVar("T")
-_LIST_CHUNK: Final = 1000  # keys of one request, the most S3 gives
+_LIST_CHUNK: Final = 1000  # maximum keys of one request in S3
 
 
 @dataclass(frozen=True, slots=True)
 class S3Settings:
-    """How an S3 store is reached."""
+    """Connection settings of an S3 store."""
 
     endpoint: str = ""
     region: str = "us-east-1"
@@ -38,14 +38,14 @@ class S3Settings:
     secret_key: Secret = field(default_factory=Secret)
     session_token: Secret = field(default_factory=Secret)
     allow_http: bool = False
-    path_style: bool = True  # https://endpoint/bucket/key, which most vendors want
+    path_style: bool = True  # https://endpoint/bucket/key, required by most vendors
     timeout_s: float = 120.0  # of one request
     retry_timeout_s: float = 60.0  # of one call with its retries
 
 
 @dataclass(slots=True)
 class ForkGuard:
-    """Which process may talk to S3: the first one that did, never its children."""
+    """Allows S3 calls in the first process that makes one, never in its children."""
 
     first_pid: int = 0  # the process that called first, 0 = none yet
     forbidden_pid: int = 0  # the process that must not call, 0 = none
@@ -67,10 +67,10 @@ _guard = ForkGuard()
 
 
 def forbid_in_this_process() -> None:
-    """From now on every S3 call of this very process raises; its children may still call.
+    """Make every further S3 call of this process raise; its children may call.
 
-    For a process that is going to fork: the client's threads do not survive that. It cannot be
-    undone; it holds for this process id, so a child that was forked from here is free.
+    For a process that will fork: the client's threads do not survive a fork. It cannot be undone, but
+    applies to this process id alone, so forked children are not affected.
     """
     _guard.forbidden_pid = os.getpid()
 
@@ -93,7 +93,7 @@ class S3Store:
         self._client: Any = Client(bucket, **_client_options(self._prefix, settings))
 
     def __reduce__(self) -> tuple[object, ...]:
-        # A process that is spawned makes a client of its own.
+        # A spawned process makes a new client.
         return S3Store, (self._bucket, self._prefix, self._settings)
 
     @property
@@ -108,7 +108,7 @@ class S3Store:
             try:
                 self._put(key, data, "create")
             except self._obstore.exceptions.AlreadyExistsError:
-                # An earlier try may have been written though its answer was lost.
+                # An earlier try may have succeeded although its response was lost.
                 return n_tries > 0 and bytes(self._obstore.get(self._client, key).bytes()) == data
             return True
 
@@ -148,7 +148,7 @@ class S3Store:
         )
 
     def _list(self, prefix: str) -> Iterator[str]:
-        # Ask for a request's worth of keys at a time, each a call with retries of its own.
+        # Request keys page by page, so that each page is retried separately.
         last = ""
         while True:
             chunk = self._chunk(prefix, last)
@@ -167,8 +167,8 @@ class S3Store:
         return self._call(prefix.rstrip("/") or "root", first_chunk)
 
     def _call(self, key: str, act: Callable[[int], T]) -> T:
-        """act(number of earlier tries) until it does not fail transiently, with full jitter."""
-        # Refuse before the network is touched.
+        """Call act(number of earlier tries) until it has no transient failure, with full jitter."""
+        # Refuse before any network access.
         check_key(key)
         _guard.enter(key)
 
@@ -181,7 +181,7 @@ class S3Store:
         return retry(once, self._retry_timeout_s)
 
     def _failure(self, key: str, error: Exception) -> StoreFailed:
-        # Sort obstore's errors by what a caller can do about them.
+        # Classify obstore's errors by the caller's remedy.
         kinds = self._obstore.exceptions
         text = " ".join(str(error).split())
         if isinstance(error, FileNotFoundError | kinds.NotFoundError):
@@ -209,7 +209,7 @@ def _client_options(prefix: str, settings: S3Settings) -> dict[str, Any]:
         # Retry in _call alone, so that retry_timeout_s is the only limit.
         "retry_config": {"max_retries": 1, "retry_timeout": timedelta(seconds=settings.timeout_s)},
     }
-    # Leave out what is empty: obstore then takes the environment's.
+    # Omit empty values: obstore then reads the environment.
     secrets = {
         "prefix": prefix,
         "endpoint": settings.endpoint,

@@ -12,7 +12,7 @@ class Secret:
         self._text = text
 
     def reveal(self) -> str:
-        """The text itself, for its receiver. Messages, logs and repr hide it: call this late and do not keep it."""
+        """The text itself, for its receiver. Messages, logs and repr hide it: call this late and do not store it."""
         return self._text
 
     def __bool__(self) -> bool:

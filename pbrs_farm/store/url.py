@@ -1,4 +1,4 @@
-"""From a URL to the store it names; no effects before the store is used."""
+"""Open the store of a URL; no effects before the store is used."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ LAYOUTS: Final = ("files", "packed")
 
 @dataclass(frozen=True, slots=True)
 class StoreSettings:
-    """How stores behave; the URL says where they are."""
+    """Settings of stores, apart from their URL."""
 
-    fsync: bool = False  # of folders
+    fsync: bool = False  # of folder stores
     s3: S3Settings = field(default_factory=S3Settings)
-    # Of roots that begin: "files" or "packed"; "" packs in S3 alone. A root keeps what it began with.
+    # Layout of new roots: "files" or "packed"; "" packs in S3 only. A root keeps its first layout.
     layout: str = ""
 
     def __post_init__(self) -> None:
@@ -47,20 +47,20 @@ def store_from_url(url: str, settings: StoreSettings | None = None) -> Store:
         return _laid_out(S3Store(parts.netloc, parts.path, settings.s3), settings.layout != "files")
     if url and (not parts.scheme or has_drive(url)):
         return _folder(Path(url), settings)
-    # Do not repeat a URL that may hold a password.
+    # Do not repeat a URL that may contain a password.
     shown = f"{parts.scheme}:..." if "@" in url else repr(url)
     hint = "file:///folder, s3://bucket/prefix or memory:"
     raise BadInput(shown, "", "not a store", hint=hint)
 
 
 def _folder(root: Path, settings: StoreSettings) -> Store:
-    """A folder; as a packed root where it is one (a copy of a bucket, say) or is to become one."""
+    """A folder store; a packed root if it is one already (e.g. a copy of a bucket) or is to become one."""
     store, packs = FolderStore(root, fsync=settings.fsync), settings.layout == "packed"
     return _laid_out(store, packs) if packs or (root / LAYOUT).is_file() else store
 
 
 def _laid_out(store: Store, packs: bool) -> Store:
-    # Imported where needed: shards are read without pydantic.
+    # Lazy import: shards are read without pydantic.
     from pbrs_farm.store.laid_out import LaidOutStore
 
     return LaidOutStore(store, packs)
