@@ -1,4 +1,4 @@
-"""Which binning fits a reference set: five are tried on the set, each image left out in turn; no effects.
+"""Choice of the binning for a reference set, by leave-one-out tests of five binnings; no effects.
 
 Merging bins can only raise an intersection, so the finest binning that passes is well defined:
 every coarser one passes too.
@@ -20,14 +20,14 @@ MIN_PASSING: Final = 0.95  # share of the reference's own images that pass at th
 
 
 class Binning(Record):
-    """Bins that are compared: colour per channel, jointly, and depth over the range of settings."""
+    """Histogram bins of a comparison: joint colour bins, and depth bins over the range of the settings."""
 
     colour: tuple[int, int, int]  # bins of each channel
     depth: int
 
     @property
     def n_colour(self) -> int:
-        """Colour bins in all."""
+        """Total number of colour bins."""
         return self.colour[0] * self.colour[1] * self.colour[2]
 
 
@@ -45,7 +45,7 @@ BINNINGS: Final = tuple(
 
 
 class BinningRow(Record):
-    """How a reference's own images score at one binning, each left out in turn."""
+    """Leave-one-out scores of a reference's images at one binning."""
 
     binning: Binning
     colour_passing: float  # share of the images above the threshold
@@ -57,7 +57,7 @@ class BinningRow(Record):
 def binning_table(
     colour: NDArray[np.integer], depth: NDArray[np.integer], *, min_colour: float, min_depth: float
 ) -> tuple[BinningRow, ...]:
-    """A row for each of BINNINGS that the counts colour (n, bins) and depth (n, bins) can be summed to.
+    """A row for each of BINNINGS that the counts colour (n, bins) and depth (n, bins) can be reduced to.
 
     Raises ValueError for fewer than two images.
     """
@@ -65,7 +65,7 @@ def binning_table(
         raise ValueError("a reference needs two images at least: each is compared with the others")
     rows = []
     for binning in BINNINGS:
-        # Leave out binnings that are finer than what was counted.
+        # Skip binnings finer than the counts.
         if max(binning.colour) ** 3 > colour.shape[1] or binning.depth > depth.shape[1]:
             continue
         c = normalised(coarser_colour(colour, binning.colour))
@@ -86,9 +86,9 @@ def binning_table(
 
 
 def finest_passing(rows: Sequence[BinningRow]) -> Binning:
-    """The finest colour bins and the finest depth bins, each by itself, that enough images pass.
+    """The finest colour bins and, separately, the finest depth bins that enough images pass.
 
-    Where not even the coarsest passes, the coarsest.
+    The coarsest if none passes.
     """
     # Rows run from coarse to fine, so the last that passes is the finest.
     colour = [r.binning.colour for r in rows if r.colour_passing >= MIN_PASSING]
@@ -101,10 +101,10 @@ def finest_passing(rows: Sequence[BinningRow]) -> Binning:
 
 
 def table_text(rows: Sequence[BinningRow], chosen: Binning) -> str:
-    """The table as text: "*" marks what was chosen for colour and for depth.
+    """The table as text: "*" marks the chosen colour and depth bins.
 
-    rows go from the coarsest binning to finer ones. A line says so where not even the coarsest lets
-    enough of the photographs pass, in which case it is taken all the same.
+    rows go from the coarsest binning to finer ones. If too few photographs pass even the coarsest, it
+    is used anyway and a line says so.
     """
     lines = ["colour bins      pass  median    depth bins  pass  median"]
     for r in rows:
@@ -116,7 +116,7 @@ def table_text(rows: Sequence[BinningRow], chosen: Binning) -> str:
             f"{r.colour_median:>6.3f}  {d} {r.binning.depth:>8} {100 * r.depth_passing:>5.1f} % "
             f"{r.depth_median:>6.3f}"
         )
-    # Say where not even the coarsest binning lets enough images pass.
+    # Report if too few images pass even the coarsest binning.
     coarsest = rows[0]
     for name, passing in (("colour", coarsest.colour_passing), ("depth", coarsest.depth_passing)):
         if passing < MIN_PASSING:

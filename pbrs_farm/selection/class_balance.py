@@ -1,4 +1,4 @@
-"""Which of the kept views to take so that rare classes are not drowned by walls; no effects."""
+"""Choice among kept views so that rare classes are not drowned by walls; no effects."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ _FLOOR: Final = 0.01  # of a picture: bounds the gain of the first view of a cla
 def class_shares(texts: Sequence[str]) -> F32:
     """(n, 41) share of the picture of each NYU40 class, from "1:0.53 2:0.21" texts.
 
-    Column k is class k; 0 is unknown. A text may be empty, and classes that it does not name have
-    0. ValueError or IndexError for a text of another form: texts come from tables of this package.
+    Column k is class k; 0 is unknown. A text may be empty; missing classes have share 0. Raises
+    ValueError or IndexError for a malformed text: texts come from tables of this package.
     """
     shares = np.zeros((len(texts), N_CLASSES), np.float32)
     for row, text in enumerate(texts):
@@ -32,10 +32,10 @@ def class_shares(texts: Sequence[str]) -> F32:
 def balance_classes(shares: F32, n_views: int) -> Bools:
     """(n,) bool: n_views rows of shares (n, classes) that cover all classes well.
 
-    Greedy for the sum over classes of the logarithm of the share gathered: what a class gains
-    counts less the more there is of it, so views with rare classes go first. The objective is
-    submodular, so greedy comes within 1 - 1/e of the best, and a gain that was computed earlier
-    bounds the present one (Minoux 1978). Ties go to the earlier row.
+    Greedily maximises the sum over classes of the logarithm of the share gathered. A gain in a class
+    counts less the more of it is covered, so views with rare classes go first. The objective is
+    submodular, so greedy comes within 1 - 1/e of the best, and an earlier gain is an upper bound of
+    the present one (Minoux 1978). Ties go to the earlier row.
     """
     # Start from the gain of each view alone, the largest on top of the heap.
     taken = np.zeros(len(shares), bool)
@@ -44,10 +44,10 @@ def balance_classes(shares: F32, n_views: int) -> Bools:
     # (-gain, row): an upper bound, since gains only fall as classes fill up.
     heap = [(-float(gain), row) for row, gain in enumerate(gains)]
     heapq.heapify(heap)
-    # Keep of each view the classes it has, and their shares.
+    # For each view, only the classes in it and their shares.
     sparse = [(np.nonzero(s)[0], s[s != 0].astype(np.float64)) for s in shares]
     for _ in range(min(n_views, len(shares))):
-        # Compute the top view's gain anew; take it if no other bound is above.
+        # Recompute the top view's gain; take it if no other bound is above.
         while True:
             _bound, row = heapq.heappop(heap)
             classes, share = sparse[row]

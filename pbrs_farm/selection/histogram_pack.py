@@ -1,7 +1,7 @@
-"""A house's histograms in one small object: what scoring reads, thousands a second; no effects.
+"""A house's histograms in one small object, the input of scoring (thousands a second); no effects.
 
 A pack is a line of JSON, then the counts of all its views, compressed. It is made from the
-histogram.json files of a house and holds all that they hold for one scored mode per view.
+histogram.json files of a house and contains all their data for one scored mode per view.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _TEXTS: Final = ("views", "rooms", "room_types", "modes", "faults", "classes", "
 
 _OF_PICTURE: Final = ("brightness", "blown")
 _OF_SCENE: Final = ("surface", "near", "n_objects", "noise", "missing_textures")
-# Median luma of a picture in which nothing is seen, whatever the thresholds.
+# Median luma of a picture that counts as black, whatever the thresholds.
 BLACK: Final = 1.5 / 255
 # Columns of HistogramPack.quality: attributes of PictureQuality and SceneQuality.
 QUALITIES: Final = (*_OF_PICTURE, *_OF_SCENE)
@@ -38,18 +38,18 @@ class HistogramPack:
     """The n views of one house as columns."""
 
     house: str
-    source: str  # digest of what the pack was made from
+    source: str  # digest of the pack's sources
     settings: HistogramFields
     views: tuple[str, ...]
     rooms: tuple[str, ...]
     room_types: tuple[str, ...]
-    modes: tuple[str, ...]  # lighting mode that is scored, "" = none
-    faults: tuple[str, ...]  # why the view cannot be scored, "" = it can
+    modes: tuple[str, ...]  # scored lighting mode, "" = not scored
+    faults: tuple[str, ...]  # reason for a missing score, "" = no fault
     classes: tuple[str, ...]  # "1:0.53 2:0.21": share of the picture of each NYU40 class
-    black: tuple[str, ...]  # "mlt_ol opengl_dl": modes in whose picture nothing is seen
-    colour: NDArray[np.uint32]  # (n, colour bins) counts, zero where there are none
+    black: tuple[str, ...]  # "mlt_ol opengl_dl": modes whose picture is black
+    colour: NDArray[np.uint32]  # (n, colour bins) counts, all zero for views without any
     depth: NDArray[np.uint32]  # (n, depth bins) the same
-    quality: F32  # (n, len(QUALITIES)), NaN where not known
+    quality: F32  # (n, len(QUALITIES)), NaN if unknown
 
 
 def pack_house(
@@ -63,8 +63,8 @@ def pack_house(
 ) -> HistogramPack:
     """The pack of a house's records, by view id.
 
-    failed: view id -> why it cannot be read; such views are kept and marked. A view without
-    SCORED_MODE is taken at score_mode, else "unscored". A record of other settings is a ValueError.
+    failed: view id -> reason why it cannot be read; such views are kept and marked. A view without
+    SCORED_MODE is scored at score_mode, else "unscored". Raises ValueError for a record of other settings.
     """
     rows = sorted(records, key=lambda r: r.view)
     if any(r.settings != settings for r in rows):
@@ -107,7 +107,7 @@ def _class_text(record: ViewRecord) -> str:
 
 
 def _black(record: ViewRecord) -> str:
-    # Records of before version 3 of the step hold the scored modes alone.
+    # Records before version 3 of the step have only the scored modes.
     black = (m for m, q in record.picture.items() if q.brightness <= BLACK)
     return " ".join(sorted(str(mode) for mode in black))
 
@@ -133,10 +133,10 @@ def bytes_from_pack(pack: HistogramPack) -> bytes:
 
 
 def pack_from_bytes(data: bytes, name: str) -> HistogramPack:
-    """The pack in an object; BadInput naming it when it is damaged.
+    """The pack in an object; raises BadInput naming it if it is damaged.
 
-    The settings come with it and the lengths of all tables are checked against them. BadInput too
-    for another version of the format. Whether it is up to date is not asked here: compare `source`.
+    The lengths of all tables are checked against the settings stored with them. BadInput also for
+    another version of the format. Does not check if the pack is up to date: compare `source`.
     The arrays are read-only.
     """
     try:
@@ -144,7 +144,7 @@ def pack_from_bytes(data: bytes, name: str) -> HistogramPack:
         head = json.loads(line)
         if head.pop("format") != _FORMAT:
             raise ValueError("another format")
-        # Check that texts and numbers are of as many views as the line says.
+        # Check that texts and numbers have as many views as the line says.
         settings = checked(HistogramFields, head.pop("settings"), name, "settings")
         body = zlib.decompress(rest)
         text = {k: tuple(head[k]) for k in _TEXTS}
@@ -152,7 +152,7 @@ def pack_from_bytes(data: bytes, name: str) -> HistogramPack:
         widths = settings.colour_bins**3, settings.depth_bins, len(QUALITIES)
         if len(body) != 4 * n * sum(widths) or any(len(t) != n for t in text.values()):
             raise ValueError("lengths differ")
-        # Cut the bytes into the three tables of numbers.
+        # Split the bytes into the three tables of numbers.
         ends = np.cumsum([4 * n * w for w in widths])
         return HistogramPack(
             head["house"],
@@ -168,10 +168,10 @@ def pack_from_bytes(data: bytes, name: str) -> HistogramPack:
 
 
 def pack_source(data: bytes) -> str:
-    """Only the `source` of a pack's object, "" if it has none: is it still up to date?
+    """The `source` of a pack's object, to check if the pack is up to date; "" without one.
 
-    Reads the first line alone, without decompressing the numbers. A damaged object gives "", which
-    equals no source, so the pack is made again.
+    Reads the first line only, without decompressing the numbers. A damaged object gives "", which
+    equals no source, so the pack is rebuilt.
     """
     try:
         return str(json.loads(data.partition(b"\n")[0])["source"])

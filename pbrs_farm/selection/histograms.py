@@ -1,7 +1,7 @@
-"""Pictures -> normalised colour and depth histograms, and coarser ones of those; no effects.
+"""Normalised colour and depth histograms of pictures, and their reduction to fewer bins; no effects.
 
 Bin edges are nested powers of two: a histogram at any coarser binning is an exact sum of bins, so
-one stored histogram serves every binning a reference may choose.
+one stored histogram serves every binning of a reference.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ def histogram(
 ) -> Histogram:
     """Histogram of a picture (H, W, 3) uint8 and its depth (H, W) in mm, 0 = unknown.
 
-    Paper section 3.3. The two need not be of one size. Raises ValueError for other shapes.
+    Paper section 3.3. The two may differ in size. Raises ValueError for other shapes.
     """
     return Histogram(colour_counts(rgb_srgb8, settings), depth_counts(depth_mm, settings))
 
@@ -44,7 +44,7 @@ def colour_counts(rgb_srgb8: Srgb8Image, settings: HistogramFields) -> Counts:
     if rgb_srgb8.ndim != 3 or rgb_srgb8.shape[2] != 3 or rgb_srgb8.dtype != np.uint8:
         raise ValueError(f"a picture is (H, W, 3) uint8, got {rgb_srgb8.shape} {rgb_srgb8.dtype}")
     pixels = _ycbcr(rgb_srgb8) if settings.colour_space == "ycbcr" else rgb_srgb8
-    # Join the leading bits of the three channels to the number of a bin.
+    # Combine the leading bits of the three channels to a bin index.
     bits = settings.colour_bins.bit_length() - 1
     index = (pixels[..., 0] >> (8 - bits)).astype(np.uint16)
     for channel in (1, 2):
@@ -54,7 +54,7 @@ def colour_counts(rgb_srgb8: Srgb8Image, settings: HistogramFields) -> Counts:
 
 
 def depth_counts(depth_mm: NDArray[np.integer], settings: HistogramFields) -> Counts:
-    """(depth_bins,) uint32 counts of known depths; beyond either end counts in the end's bin.
+    """(depth_bins,) uint32 counts of known depths; values beyond the range count in the first or last bin.
 
     depth_mm is (H, W) of whole millimetres, 0 = unknown and not counted; the range of the bins is
     settings.depth_min_m to depth_max_m. The counts sum to the pixels of known depth. ValueError for
@@ -93,7 +93,7 @@ def coarser_colour(counts: NDArray[np.generic], shape: tuple[int, int, int]) -> 
     if shape == (n, n, n):
         return counts
     a, b, c = shape
-    # Part each axis into (coarse bin, fine bin within it) and sum the latter.
+    # Split each axis into (coarse bin, fine bin within it) and sum the latter.
     cube = counts.reshape(*counts.shape[:-1], a, n // a, b, n // b, c, n // c)
     return np.asarray(cube.sum(axis=(-5, -3, -1))).reshape(*counts.shape[:-1], a * b * c)
 
@@ -101,8 +101,8 @@ def coarser_colour(counts: NDArray[np.generic], shape: tuple[int, int, int]) -> 
 def coarser_depth(counts: NDArray[np.generic], n_bins: int) -> NDArray[np.generic]:
     """(..., n_bins) sums of neighbouring depth bins of counts (..., bins).
 
-    Exact: a coarser histogram is what counting at the coarser bins gives. Raises ValueError where
-    n_bins does not divide the number of bins.
+    Exact: equals a histogram counted at the coarser bins. Raises ValueError if n_bins does not divide
+    the number of bins.
     """
     if counts.shape[-1] % n_bins:
         raise ValueError(f"{counts.shape[-1]} depth bins cannot be summed to {n_bins}")
@@ -113,9 +113,9 @@ def coarser_depth(counts: NDArray[np.generic], n_bins: int) -> NDArray[np.generi
 
 
 def normalised(counts: NDArray[np.generic]) -> F32:
-    """(..., bins) float32 shares of counts, that sum to 1 over the last axis.
+    """(..., bins) float32 shares of counts, with sum 1 over the last axis.
 
-    All zero where nothing was counted, so that an empty histogram resembles none.
+    All zero if nothing was counted, so that an empty histogram resembles no other.
     """
     total = counts.sum(axis=-1, keepdims=True, dtype=np.float64)
     total[total == 0] = 1.0  # nothing counted: shares of 0

@@ -1,4 +1,4 @@
-"""Quality numbers of a picture and its scene, by which useless views are rejected; no effects."""
+"""Quality numbers of a picture and its scene, for rejecting useless views; no effects."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ from pbrs_farm.formats.histogram_json import (
 )
 from pbrs_farm.selection.histograms import colour_counts, depth_counts
 
-_SATURATED: Final = 254  # of 255: a channel from here on is blown
+_SATURATED: Final = 254  # of 255: a channel at or above it is blown
 
-# Where a view was taken: ids of house, view and room, and the room's name.
+# Place of a view: ids of house, view and room, and the room's name.
 ViewPlace = Mapping[Literal["house", "view", "room", "room_type"], str]
 
 
@@ -35,7 +35,7 @@ def picture_quality(rgb_srgb8: Srgb8Image) -> PictureQuality:
     values; blown is the share of all pixels whose brightest channel is saturated. For pictures as
     developed, not for radiance.
     """
-    # Every second pixel is plenty for a median, and quick.
+    # Every second pixel is enough for a median, and fast.
     r, g, b = (rgb_srgb8[::2, ::2, k].astype(np.uint32) for k in range(3))
     # Find the median by counting, with BT.709 weights in 1/256.
     luma = np.bincount(((54 * r + 183 * g + 19 * b) >> 8).reshape(-1), minlength=256)
@@ -53,9 +53,9 @@ def scene_quality(
     noise: float | None = None,
     missing_textures: int = 0,
 ) -> SceneQuality:
-    """Numbers of a view from its depth (H, W) in mm and the rows "instances" of its view.json.
+    """Quality numbers of a view, from its depth (H, W) in mm and the rows "instances" of its view.json.
 
-    Of a row "kind" (house.ItemKind), "fraction" and, if there, "nyu40" are read.
+    Reads "kind" (house.ItemKind), "fraction" and, if present, "nyu40" of a row.
     """
     # Sum the shares of each class; keep those of each item by its kind.
     classes: dict[int, float] = {}
@@ -86,9 +86,8 @@ def view_record(
 ) -> ViewRecord:
     """The record of a view from its pictures by mode, (H, W, 3) uint8, and depth (H, W) in mm.
 
-    Colour is counted in the mode of the selection where there is a picture of it, else in all
-    modes; brightness in all. depth_mm as of `depth_counts`. At least one picture must be given for
-    a colour score.
+    Colour is counted in the mode of the selection if it has a picture, else in all
+    modes; brightness in all. depth_mm as of `depth_counts`. A colour score needs at least one picture.
     """
     modes = [SCORED_MODE] if SCORED_MODE in pictures else sorted(pictures)
     return ViewRecord(

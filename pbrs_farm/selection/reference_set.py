@@ -1,4 +1,4 @@
-"""The photographs that views are compared with, as histograms: a small file that can be shared.
+"""The reference photographs of a selection, as histograms: a small file that can be shared.
 
 No effects: bytes in, bytes out. The file is an .npz whose bytes depend on its content alone.
 """
@@ -30,23 +30,23 @@ from pbrs_farm.selection.histograms import (
 )
 from pbrs_farm.selection.similarity import Shares
 
-_EPOCH: Final = (1980, 1, 1, 0, 0, 0)  # the earliest a ZIP can say: equal content, equal bytes
+_EPOCH: Final = (1980, 1, 1, 0, 0, 0)  # earliest time in a ZIP: equal content, equal bytes
 
 # A pixel of the registration border has all channels at least WHITE, or at most BLACK.
 WHITE: Final = 245
 BLACK: Final = 10
-_BORDER_SHARE: Final = 0.97  # of a row or column that is border
-_MAX_BORDER: Final = 1 / 8  # of the picture, at each side
+_BORDER_SHARE: Final = 0.97  # minimum share of border pixels in a border row or column
+_MAX_BORDER: Final = 1 / 8  # maximum share of the picture, at each side
 
 
 class ReferenceFacts(Record):
-    """What a reference file says of itself."""
+    """Metadata of a reference file."""
 
     format: Literal["pbrs_farm reference 1"] = "pbrs_farm reference 1"
-    source: str  # name of what it was built from
+    source: str  # name of the folder or file of photographs
     source_sha256: str
     settings: HistogramFields
-    binning: Binning  # the bins that are compared
+    binning: Binning  # bins of the comparison
     table: tuple[BinningRow, ...]  # how the binning was chosen
     ids: tuple[str, ...]  # of the photographs
 
@@ -63,9 +63,8 @@ class Reference:
     def digest(self) -> str:
         """Digest of everything a score depends on.
 
-        The table of binnings that were tried is left out: it explains the choice and changes no
-        score. Scores of views are up to date as long as this and the views' histograms are the
-        same.
+        Excludes the table of tested binnings, which explains the choice and changes no score. Scores of
+        views are up to date as long as this and the views' histograms are unchanged.
         """
         facts = self.facts.model_dump(mode="json", exclude={"table"})
         return keys.digest(facts, keys.sha256(self.colour.tobytes() + self.depth.tobytes()))
@@ -73,15 +72,14 @@ class Reference:
     def colour_shares(self) -> Shares:
         """(n, bins) normalised colour histograms at the chosen binning.
 
-        A row a photograph. Computed at each call from the fine counts; a photograph's row sums to
-        1.
+        A row per photograph, with sum 1. Computed at each call from the fine counts.
         """
         return normalised(coarser_colour(self.colour, self.facts.binning.colour))
 
     def depth_shares(self) -> Shares:
         """(n, bins) normalised depth histograms at the chosen binning.
 
-        A row a photograph, from pixels of known depth alone. Computed at each call from the fine
+        A row per photograph, from pixels of known depth only. Computed at each call from the fine
         counts.
         """
         return normalised(coarser_depth(self.depth, self.facts.binning.depth))
@@ -97,7 +95,7 @@ def reference_from_histograms(
 ) -> Reference:
     """A reference of the photographs ids, with the finest binning 95 % of them pass.
 
-    selection: the thresholds they must pass. source: name and sha256 of what they were read from.
+    selection: the thresholds they must pass. source: name and sha256 of their folder or file.
     Raises BadInput for an empty set, for a single image, and for an image without known depth.
     """
     if len(ids) < 2:
@@ -109,7 +107,7 @@ def reference_from_histograms(
     blind = np.nonzero(depth.sum(axis=1) == 0)[0]
     if len(blind):
         raise BadInput(source[0], ids[int(blind[0])], "no pixel has a known depth")
-    # Choose the finest binning at which the photographs pass themselves.
+    # Choose the finest binning at which the photographs pass their own test.
     table = binning_table(
         colour, depth, min_colour=selection.min_colour, min_depth=selection.min_depth
     )
@@ -127,7 +125,7 @@ def reference_from_histograms(
 def bytes_from_reference(reference: Reference) -> bytes:
     """The reference file: a zip of .npy and JSON; equal references give equal bytes.
 
-    Read by reference_from_bytes. It has no clock and no paths of the machine that made it.
+    Read by reference_from_bytes. It contains no times and no paths of the machine that made it.
     """
     file = io.BytesIO()
     with zipfile.ZipFile(file, "w") as archive:
@@ -146,10 +144,10 @@ def _add(archive: zipfile.ZipFile, name: str, data: bytes) -> None:
 
 
 def reference_from_bytes(data: bytes, name: str) -> Reference:
-    """The Reference of a file; BadInput naming it when it is damaged or none of this version.
+    """The Reference of a file; raises BadInput naming it if it is damaged or of another version.
 
-    A zip archive with reference.json, colour.npy and depth.npy. BadInput too where the tables do
-    not have a row a photograph and the bins that the settings say, or there is no photograph.
+    A zip archive with reference.json, colour.npy and depth.npy. BadInput also if the tables do not
+    have a row per photograph and the bins of the settings, or there is no photograph.
     """
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
@@ -159,7 +157,7 @@ def reference_from_bytes(data: bytes, name: str) -> Reference:
     except (zipfile.BadZipFile, KeyError, ValueError, OSError, EOFError):
         hint = "`pbrs-farm reference build` makes one"
         raise BadInput(name, "", "not a reference file, or damaged", hint=hint) from None
-    # Check that the tables have a row a photograph and the bins of the settings.
+    # Check that the tables have a row per photograph and the bins of the settings.
     n = len(facts.ids)
     shapes = (n, facts.settings.colour_bins**3), (n, facts.settings.depth_bins)
     if n == 0 or (colour.shape, depth.shape) != shapes:
@@ -180,7 +178,7 @@ def check_comparable(reference: Reference, settings: HistogramFields, name: str)
     Colour space and depth range must be equal; the bins may be finer than the reference compares.
     """
     facts = reference.facts
-    # Collect what differs, to name it all at once.
+    # Collect all differences for one message.
     differing = [
         f"{field}: {getattr(facts.settings, field)} there, {getattr(settings, field)} here"
         for field in ("colour_space", "depth_min_m", "depth_max_m")
@@ -200,14 +198,14 @@ def check_comparable(reference: Reference, settings: HistogramFields, name: str)
 def sun_rgbd_depth(stored: NDArray[np.uint16]) -> NDArray[np.uint16]:
     """Depth in mm from SUN RGB-D's files, whose 16 bits are rotated left by 3 (its toolbox).
 
-    Not for files of other datasets, nor for SUN RGB-D's files that its toolbox already turned. 0
+    Not for files of other datasets, nor for SUN RGB-D files already converted by its toolbox. 0
     stays 0, unknown.
     """
     return (stored >> np.uint16(3)) | (stored << np.uint16(13))
 
 
 def depth_mm_from_units(depth: NDArray[Any], units_per_m: float) -> NDArray[np.uint16]:
-    """(H, W) uint16 mm, 0 = unknown, of depth in units_per_m; 65.535 m and beyond is 65535.
+    """Convert depth in units_per_m to (H, W) uint16 mm, 0 = unknown; 65.535 m and beyond is 65535.
 
     Zero and below is unknown. Raises ValueError for NaN and infinity.
     """
@@ -218,18 +216,18 @@ def depth_mm_from_units(depth: NDArray[Any], units_per_m: float) -> NDArray[np.u
 
 
 def registration_border(rgb_srgb8: Srgb8Image) -> tuple[slice, slice]:
-    """Rows and columns that are left when the border is peeled off a registered photograph.
+    """Rows and columns of a registered photograph inside its border.
 
-    Warping colour onto the depth camera leaves edges that are white (NYUv2) or black. A row or
-    column goes while 97 % of it is such; at most an eighth of the picture at each side.
+    Warping colour onto the depth camera leaves white (NYUv2) or black edges. A row or column is
+    removed while 97 % of it is border; at most an eighth of the picture at each side.
     """
     # Mark the pixels that may be border.
     light, dark = (rgb_srgb8 >= WHITE).all(axis=2), (rgb_srgb8 <= BLACK).all(axis=2)
     plain = np.asarray(light | dark)
     height, width = plain.shape
-    top, bottom, left, right = 0, height, 0, width  # what is left, half-open
+    top, bottom, left, right = 0, height, 0, width  # remaining area, half-open
     most_rows, most_columns = int(height * _MAX_BORDER), int(width * _MAX_BORDER)
-    # Peel one row or column a side and turn until nothing changes.
+    # Remove one row or column per side and turn until nothing changes.
     changed = True
     while changed:
         before = (top, bottom, left, right)

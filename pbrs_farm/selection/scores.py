@@ -24,20 +24,20 @@ from pbrs_farm.selection.similarity import best_match
 SCORES: Final[Any] = pa.schema(
     [
         *((name, pa.string()) for name in ("house", "view", "room", "room_type")),
-        ("mode", pa.string()),  # the lighting mode that was scored
-        ("colour_score", pa.float64()),  # best intersection, null where not scored
+        ("mode", pa.string()),  # scored lighting mode
+        ("colour_score", pa.float64()),  # best intersection, null if not scored
         ("depth_score", pa.float64()),
-        ("colour_reference", pa.string()),  # id of the photograph that is most alike
+        ("colour_reference", pa.string()),  # id of the most similar photograph
         ("depth_reference", pa.string()),
         *((name, pa.float32()) for name in QUALITIES),
         ("classes", pa.string()),  # as HistogramPack.classes
         ("black", pa.string()),  # as HistogramPack.black
-        ("fault", pa.string()),  # "", "unscored", or why the view cannot be read
+        ("fault", pa.string()),  # "", "unscored", or reason why the view cannot be read
         ("source", pa.string()),  # digest of the house's histograms
     ]
 )
 
-BATCH_VIEWS: Final = 8192  # scored at once: bounds memory, and keeps the search efficient
+BATCH_VIEWS: Final = 8192  # views per batch: bounds memory, and keeps the search efficient
 
 
 class Scorer:
@@ -55,7 +55,7 @@ class Scorer:
     def score(self, packs: Sequence[HistogramPack]) -> Any:
         """The score table of the packs' views (SCORES).
 
-        Raises BadInput when they were made with settings the reference cannot be compared at.
+        Raises BadInput if the reference cannot be compared at the packs' settings.
         """
         packs = [p for p in packs if p.views]
         if not packs:
@@ -98,8 +98,8 @@ class Scorer:
         """Score tables of a stream of packs, about batch_views rows each.
 
         Packs are not split, so a batch may be larger by most of a pack; the last may be smaller.
-        Lazy: packs are read as tables are asked for, so that the memory needed does not grow with
-        the root. Nothing comes of no packs.
+        Lazy: packs are read on demand, so memory does not grow with the root. Without packs it yields
+        nothing.
         """
         # Gather packs until they fill a batch.
         batch: list[HistogramPack] = []
@@ -116,9 +116,9 @@ class Scorer:
     def _best(
         self, counts: Sequence[NDArray[np.generic]], references: F32, packs: Sequence[HistogramPack]
     ) -> tuple[F64, NDArray[Any]]:
-        """(n,) scores, NaN where not scored, and (n,) reference ids, None there.
+        """(n,) scores, NaN if not scored, and (n,) reference ids, None there.
 
-        counts: of the packs that have a scored view; n counts the views of all packs.
+        counts: of the packs with a scored view; n counts the views of all packs.
         """
         # Search for scored views only, of the packs that counts holds.
         scored = np.array([bool(m) for p in packs for m in p.modes])
@@ -137,24 +137,24 @@ def score(
 ) -> Any:
     """One score table (SCORES) of the packs, sorted by house and view.
 
-    packs: histograms of houses, read one by one. reference: what photographs look like. library:
-    "faiss" or "numpy" for the search, None for faiss where it is installed; scores are the same.
-    Tables of parts may be computed apart and merged (Scorer).
+    packs: histograms of houses, read one by one. reference: the photographs to compare with. library:
+    "faiss" or "numpy" for the search, None for faiss if it is installed; scores are the same.
+    Tables of parts may be computed separately and merged (Scorer).
     """
     return merge_tables(*Scorer(reference, library=library).score_all(packs))
 
 
 def merge_tables(*tables: Any) -> Any:
-    """One score table of several, sorted by house and view; a row in two of them is kept once.
+    """Merge score tables, sorted by house and view; a row in two of them is kept once.
 
     Associative, commutative, and merging a table with itself gives that table. Raises ValueError
-    when two tables say different things of one view.
+    if two tables disagree on a view.
     """
     joined = pa.concat_tables([SCORES.empty_table(), *(t.select(SCORES.names) for t in tables)])
     joined = joined.sort_by([("house", "ascending"), ("view", "ascending")]).combine_chunks()
     if joined.num_rows < 2:
         return joined
-    # Rows of one view stand together now: all but the first are repeats.
+    # Rows of one view are adjacent now: all but the first are repeats.
     again = _same_as_before(joined, "house") & _same_as_before(joined, "view")
     if not again.any():
         return joined

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F32, F64, I64
 
-Shares = F32  # (n, bins), rows sum to 1, or to 0 where nothing was counted
-_BLOCK: Final = 32  # queries of numpy's search at once
-CACHE_BYTES: Final = 512 * 1024  # references that are searched at once
+Shares = F32  # (n, bins), rows sum to 1, or to 0 if nothing was counted
+_BLOCK: Final = 32  # queries per block of numpy's search
+CACHE_BYTES: Final = 512 * 1024  # size of a block of references in the search
 
 
 def intersection(a: NDArray[np.floating], b: NDArray[np.floating]) -> F64:
@@ -37,12 +37,12 @@ def best_match(
     """(n,) largest intersection of each query over all references, and (n,) that reference.
 
     leave_out_self: queries are the references, and none may match itself (needs two at least).
-    library: "faiss" or "numpy"; faiss where it is installed when None. The score is computed
-    again in double precision for the match that was found. An empty query scores 0.
+    library: "faiss" or "numpy"; None for faiss if it is installed. The score of the match is
+    recomputed in double precision. An empty query scores 0.
     """
     if len(references) <= leave_out_self or queries.shape[1] != references.shape[1]:
         raise ValueError(f"cannot match {queries.shape} against {references.shape}")
-    # Find the nearest by single precision.
+    # Find the nearest in single precision.
     library = library or ("faiss" if importlib.util.find_spec("faiss") else "numpy")
     q, r = _on_support(queries, references)
     search = _faiss_nearest if library == "faiss" else _numpy_nearest
@@ -53,7 +53,7 @@ def best_match(
 
 
 def _on_support(queries: Shares, references: Shares) -> tuple[Shares, Shares]:
-    """Both without the bins that no reference has: their minimum is 0 whatever the query holds."""
+    """Both without bins empty in all references: their minimum is 0 for any query."""
     used = references.any(axis=0)
     if used.all():
         return np.ascontiguousarray(queries, np.float32), np.ascontiguousarray(references)
@@ -63,20 +63,20 @@ def _on_support(queries: Shares, references: Shares) -> tuple[Shares, Shares]:
 def _faiss_nearest(q: Shares, r: Shares, leave_out_self: bool) -> I64:
     import faiss
 
-    # Nearest in L1 is best intersection where references hold equal shares; a column that the
-    # queries lack makes up for what an empty reference is short of.
+    # Nearest in L1 is best intersection if all references have equal sums; an extra column, zero in
+    # the queries, fills up the sum of an empty reference.
     short = 1 - r.sum(axis=1, keepdims=True)
     if short.max(initial=0) > 1e-5:
         q = np.ascontiguousarray(np.hstack([q, np.zeros((len(q), 1), np.float32)]))
         r = np.ascontiguousarray(np.hstack([r, short]))
     knn: Any = faiss.knn
     if leave_out_self:
-        # An image among its own two nearest is left out; a duplicate may come before it.
+        # Skip an image among its own two nearest; a duplicate may come before it.
         _, index = knn(q, r, 2, metric=faiss.METRIC_L1)
         first_is_self = index[:, 0] == np.arange(len(q))
         return np.asarray(np.where(first_is_self, index[:, 1], index[:, 0]), np.int64)
 
-    # Take the references in blocks that stay in the cache: each is read once for every query.
+    # Process the references in blocks that fit the cache: each is read once for every query.
     n_rows = max(CACHE_BYTES // (4 * r.shape[1]), 1)
     nearest = np.zeros(len(q), np.int64)
     least = np.full(len(q), np.inf, np.float32)
@@ -91,7 +91,7 @@ def _faiss_nearest(q: Shares, r: Shares, leave_out_self: bool) -> I64:
 def _numpy_nearest(q: Shares, r: Shares, leave_out_self: bool) -> I64:
     nearest = np.empty(len(q), np.int64)
     for start in range(0, len(q), _BLOCK):
-        # Intersect a block of queries with all references at once.
+        # Intersect a block of queries with all references.
         block = q[start : start + _BLOCK]
         score = np.minimum(block[:, None], r[None]).sum(axis=2)
         if leave_out_self:

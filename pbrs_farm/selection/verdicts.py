@@ -1,4 +1,4 @@
-"""Scores -> which views are kept, and why the others are not; no effects.
+"""Verdicts on views from their scores: kept, or rejected with reasons; no effects.
 
 A verdict is a function of the scores and the thresholds alone: other thresholds need no histogram.
 Rejected views are marked, never dropped.
@@ -19,7 +19,7 @@ from pbrs_farm.core.recipe import SelectionFields
 from pbrs_farm.selection.class_balance import balance_classes, class_shares
 from pbrs_farm.selection.histogram_pack import BLACK
 
-# Why a view is rejected, in the order in which the first is named.
+# Reasons for rejecting a view, in order of precedence.
 # fmt: off
 REASONS: Final = (
     "failed", "unscored", "black", "too-dark", "blown", "one-surface", "inside-object", "too-few-objects",
@@ -37,17 +37,17 @@ _NUMBERS: Final = (
 
 
 def verdicts(scores: Any, fields: SelectionFields) -> Any:
-    """The table scores (SCORES) with columns kept (bool), reason (the first of REASONS that holds,
-    "" when kept) and reasons (all of them, with commas).
+    """The table scores (SCORES) with columns kept (bool), reason (the first of REASONS that applies,
+    "" if kept) and reasons (all of them, with commas).
 
     A view is kept when its colour and its depth score are both above their thresholds (paper
-    section 3.3) and no quality number is beyond its own. A number that is not known rejects nothing.
+    section 3.3) and no quality number is beyond its own. An unknown number rejects nothing.
     """
-    # Judge each view by itself: a column per reason.
+    # Judge each view separately: a column per reason.
     rejections = _rejections(scores, fields)
     table = np.stack(list(rejections.values()), axis=1)
     is_kept = np.asarray(~table.any(axis=1), np.bool_)
-    # Judge those that are left against each other.
+    # Compare the remaining views with each other.
     beyond = _beyond_cap(scores, is_kept, fields.per_room_cap)
     is_kept &= ~beyond
     surplus = _surplus(scores, is_kept, fields)
@@ -69,7 +69,7 @@ def _rejections(scores: Any, fields: SelectionFields) -> Mapping[str, Bools]:
     unscored = np.asarray(faults == "unscored", bool)
     failed = np.asarray(faults != "", bool) & ~unscored
     has_scores = ~(failed | unscored)
-    with np.errstate(invalid="ignore"):  # NaN: not known
+    with np.errstate(invalid="ignore"):  # NaN: unknown
         return {
             "failed": failed,
             "unscored": unscored,
@@ -87,11 +87,11 @@ def _rejections(scores: Any, fields: SelectionFields) -> Mapping[str, Bools]:
 
 
 def _black(scores: Any, brightness: F64, fields: SelectionFields) -> Bools:
-    """(n,) bool: nothing is seen in the scored picture or in one of a mode that must not be black."""
+    """(n,) bool: the scored picture is black, or that of a mode that must not be black."""
     black = np.asarray(brightness <= BLACK, bool)
     if fields.black_modes == "scored":
         return black
-    # Of the other modes only their names are stored, with each view.
+    # For the other modes, only the names of black ones are stored with each view.
     black_modes = [set(modes.split()) for modes in scores["black"].to_pylist()]
     light_modes = _LIGHT_MODES if fields.black_modes == "light" else set(Mode)
     return np.asarray(
@@ -100,7 +100,7 @@ def _black(scores: Any, brightness: F64, fields: SelectionFields) -> Bools:
 
 
 def _floats(scores: Any, name: str) -> F64:
-    """(n,) float64; NaN where null. float32 numbers are rounded back to what was stored."""
+    """(n,) float64; NaN for null. float32 numbers are rounded to their stored decimals."""
     values = scores[name].to_numpy()
     if values.dtype == np.float32:
         return np.asarray(np.round(values.astype(np.float64), 6))
@@ -120,7 +120,7 @@ def _beyond_cap(scores: Any, is_kept: Bools, cap: int) -> Bools:
     worse_score = np.minimum(_floats(scores, "colour_score"), _floats(scores, "depth_score"))[rows]
     house, room, view = (_ranks(scores[name])[rows] for name in ("house", "room", "view"))
     order = np.lexsort((view, -worse_score, room, house))
-    # A view's rank in its room: its place less that of the room's first view.
+    # A view's rank in its room: its row minus that of the room's first view.
     starts = np.ones(len(order), bool)
     starts[1:] = (np.diff(house[order]) != 0) | (np.diff(room[order]) != 0)
     first_of_room = np.maximum.accumulate(np.where(starts, np.arange(len(order)), 0))
@@ -129,12 +129,12 @@ def _beyond_cap(scores: Any, is_kept: Bools, cap: int) -> Bools:
 
 
 def _surplus(scores: Any, is_kept: Bools, fields: SelectionFields) -> Bools:
-    """(n,) bool: kept views that are left out so that the classes of the others are balanced."""
+    """(n,) bool: kept views to drop so that the classes of the others are balanced."""
     surplus = np.zeros(len(is_kept), bool)
     if fields.balance == "none" or not is_kept.any():
         return surplus
     rows = np.nonzero(is_kept)[0]
-    # Go by the order of ids, so that ties do not depend on the order of rows.
+    # Sort by ids, so that ties do not depend on the order of rows.
     order = rows[np.lexsort((_ranks(scores["view"])[rows], _ranks(scores["house"])[rows]))]
     shares = class_shares(scores["classes"].take(pa.array(order)).to_pylist())
     taken = balance_classes(shares, round(fields.balance_share * len(order)))
@@ -143,13 +143,13 @@ def _surplus(scores: Any, is_kept: Bools, fields: SelectionFields) -> Bools:
 
 
 def _ranks(column: Any) -> I64:
-    """(n,) the place of each row's text among all texts in order; equal texts share a place."""
+    """(n,) the sort position of each row's text; equal texts share a position."""
     return np.asarray(pc.rank(column.combine_chunks(), tiebreaker="dense"), np.int64)
 
 
 def _reasons_joined(table: Bools) -> list[str]:
-    """(n,) the names of the reasons that hold, with commas."""
-    # Number each combination of reasons, and write each number's text once.
+    """(n,) the names of the reasons that apply, with commas."""
+    # Number each combination of reasons, and write the text of each number once.
     weights = 1 << np.arange(len(REASONS))
     codes = table @ weights
     text = {
