@@ -1,1 +1,1 @@
-"""An output folder in the forms other tools read; export_views.py lists them, a module each."""
+"""Export an output folder in the forms of other tools; export_views.py lists them, a module each."""

@@ -36,7 +36,11 @@ PICTURES: Final = (Mode.MLT_IL_OL, Mode.MLT_OL, Mode.OPENGL_IL, Mode.OPENGL_DL)
 _MODES: Final = tuple(str(mode) for mode in Mode)
 _RADIANCE: Final = "radiance"  # nine tenths of a view's bytes: exported only by name
 _Options = TypeVar("_Options", bound=Record)
-_NEEDED: Final = ("width_px", "height_px", "instances")  # of view.json, by every export
+_NEEDED: Final = (
+    "width_px",
+    "height_px",
+    "instances",
+)  # fields of view.json needed by every export
 _CLASSES: Final = "semantic"  # the layer that a user's classes replace
 # classes of NYU40 for parts of the building; all others are objects
 _STRUCTURE: Final = ("wall", "floor", "ceiling", "door", "window", "otherstructure")
@@ -246,7 +250,7 @@ def k_of_whole_centres(k: list[list[float]]) -> list[list[float]]:
 def depth_within_png(view: ChosenView) -> NDArray[np.uint16]:
     """(H, W) uint16 mm, 0 for nothing and for 65.535 m or more.
 
-    For forms whose readers take every value above 0 for a measured one.
+    For forms whose readers take every value above 0 as a measurement.
     """
     depth = view.array("depth")
     return np.where(depth < np.iinfo(np.uint16).max, depth, np.uint16(0))

@@ -83,7 +83,7 @@ def export(
 
 def finished_entries(folder: Path, selection: str | None = None) -> list[ViewEntry]:
     """The finished views of a folder, or those that selection/<selection>.jsonl keeps; BadInput as export."""
-    # A view is finished when its labels are there.
+    # A view is finished if it has labels.
     entries = [v for v in views_of(folder) if "instances" in v.facts and v.file("instance.png")]
     if selection is None:
         return entries
@@ -159,7 +159,7 @@ def _selected(folder: Path, run: str) -> set[tuple[str, str]]:
     if not file.is_file():
         raise BadInput(file, "", "no such selection", hint="pbrs-farm select makes one")
     try:
-        # A line per view says whether it is kept.
+        # Each line has the view and `kept`.
         rows = [json.loads(line) for line in read_regular(file).splitlines()]
         return {(row["house"], row["view"]) for row in rows if row["kept"]}
     except OSError as error:

@@ -87,7 +87,7 @@ class ViewForm:
 
 @dataclass(frozen=True, slots=True)
 class HomeForm:
-    """A form of homes, as scenes of other simulators; it is listed as a ViewForm is.
+    """A form of homes, as scenes of other simulators; listed like a ViewForm.
 
     write: called with each home and its own empty folder. options: as of a ViewForm; write reads them as
     `home.of(MyOptions)`. remark: a warning for each written home, "" for none. up: the up axis in the
@@ -117,9 +117,9 @@ def form_names() -> tuple[str, ...]:
 
 
 def form_of(name: str) -> Form:
-    """The form of that name; BadInput, naming those there are, for an unknown one.
+    """The form of that name; for an unknown name BadInput, with a list of all forms.
 
-    Raises MachineFailed where a plugin's entry point names no form of its name.
+    Raises MachineFailed if a plugin's entry point names no form of its name.
 
         >>> form_of("coco").has_classes
         True

@@ -23,7 +23,7 @@ from pbrs_farm.geometry.surface_points import spread_points
 GRASPS: Final = "grasps.json"
 LARGEST_M: Final = 0.12  # maximum of an item's second largest side, and of the fingers' span
 FRICTION: Final = 0.3
-_LEAST_M: Final = 0.002  # between fingers
+_LEAST_M: Final = 0.002  # minimum distance between the fingers
 _MOST: Final = 32  # maximum pairs of an item
 _TRIES: Final = 256
 _SPACING_M: Final = 0.004
@@ -40,12 +40,12 @@ class Grasps:
 
     @property
     def widths_m(self) -> F64:
-        """(N,) between the two contacts."""
+        """(N,) distances between the two contacts."""
         return np.asarray(np.linalg.norm(self.points[:, 0] - self.points[:, 1], axis=1))
 
 
 def antipodal_pairs(triangles: F64, seed: int, *, most: int = _MOST) -> Grasps:
-    """Pairs of contacts by which two fingers hold a mesh (F, 3, 3), at most 12 cm apart.
+    """Pairs of contacts for two fingers on a mesh (F, 3, 3), at most 12 cm apart.
 
     Lines start at points drawn by the seed, along the normal or near it; the outermost crossings of a line
     are a pair.

@@ -1,7 +1,8 @@
-"""The rigid bodies of a home: each piece's body, and the parts that joints turn or slide; no effects.
+"""The rigid bodies of a home: each piece's body, and the parts moved by joints; no effects.
 
-They form a tree: a piece's body is at the world, fixed or loose, and its parts are at the body. Every
-form with joints writes this tree; meshes, convex parts, masses and joints are computed here, once.
+They form a tree: the parent of a piece's body, fixed or loose, is the world, and that of its parts is the
+body. Every form with joints writes this tree; meshes, convex parts, masses and joints are computed here,
+once.
 """
 
 from __future__ import annotations

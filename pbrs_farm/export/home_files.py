@@ -30,7 +30,7 @@ def z_up_pose(world_from_local: F64) -> tuple[F64, F64]:
 
 
 def numbers(values: Iterable[float]) -> str:
-    """Numbers as an attribute or element has them."""
+    """Numbers as the text of an attribute or element."""
     return " ".join(f"{float(x):.9g}" for x in values)
 
 

@@ -22,7 +22,7 @@ from pbrs_farm.formats.house_glb import (
 )
 
 _LIGHTS = "KHR_lights_punctual"
-_REPEAT = 10497  # OpenGL's number of a sampler's wrapping
+_REPEAT = 10497  # OpenGL constant of the repeat wrap mode
 
 
 def glb_of_pieces(
@@ -55,7 +55,7 @@ def glb_of_pieces(
     for piece in pieces:
         extras = item_extras(piece.item, piece.instance)
         if house.is_repaired and piece.item.kind is ItemKind.WALL:
-            extras["solid"] = True  # cut by repair: not to be parted by its planes
+            extras["solid"] = True  # cut by repair: not to be split by its planes
         if not in_place:
             extras = {}
         node: dict[str, Any] = {"name": piece.name if in_place else piece.class_name}

@@ -1,4 +1,4 @@
-"""Masks as other tools write them: COCO's run lengths, plain and compressed, and polygons; no effects."""
+"""Masks in the forms of other tools: COCO's run lengths, plain and compressed, and polygons; no effects."""
 
 from __future__ import annotations
 
@@ -8,7 +8,9 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-_TOLERANCE_PX: Final = 0.75  # of a polygon's outline: flattens the steps of a slanting edge
+_TOLERANCE_PX: Final = (
+    0.75  # tolerance of a polygon's outline, smooths the steps of a slanting edge
+)
 
 
 def run_lengths(mask: NDArray[np.bool_]) -> dict[str, list[int]]:
@@ -25,15 +27,14 @@ def run_lengths(mask: NDArray[np.bool_]) -> dict[str, list[int]]:
 
 
 def compressed_runs(mask: NDArray[np.bool_]) -> dict[str, list[int] | str]:
-    """COCO's compressed run lengths of mask (H, W) bool: counts as text, as pycocotools reads them.
+    """COCO's compressed run lengths of mask (H, W) bool: counts as text, for pycocotools.
 
-    Of run_lengths, each count from the fourth on is its difference from the last but one, in digits
-    of 5 bits (maskApi.c).
+    The counts are those of run_lengths; from the fourth on, each is the difference from the last but one,
+    in digits of 5 bits (maskApi.c).
     """
     runs = run_lengths(mask)
     counts, text = runs["counts"], []
     for k, count in enumerate(counts):
-        # From the fourth on, a count is its difference from the last but one.
         text.append(_digits(count - counts[k - 2] if k > 2 else count))
     return {"size": runs["size"], "counts": "".join(text)}
 
@@ -44,7 +45,7 @@ def _digits(value: int) -> str:
     while True:
         digit = value & 0x1F
         value >>= 5
-        # The number ends where the rest is its sign alone.
+        # The number ends when only its sign is left.
         is_last = value == (-1 if digit & 0x10 else 0)
         text.append(chr(48 + digit + (0 if is_last else 0x20)))
         if is_last:
@@ -73,9 +74,9 @@ def _one_ring(part: shapely.Polygon) -> NDArray[np.float64]:
     ring = shapely.get_coordinates(part.exterior)
     for interior in part.interiors:
         hole = shapely.get_coordinates(interior)[:-1]
-        # Cross where they are nearest.
+        # Connect them where they are closest.
         gaps = np.linalg.norm(ring[:, None] - hole[None], axis=-1)
         i, j = np.unravel_index(int(gaps.argmin()), gaps.shape)
         ring = np.concatenate([ring[: i + 1], hole[j:], hole[: j + 1], ring[i:]])
-    # The last corner is the first again.
+    # The last corner repeats the first.
     return np.asarray(ring[:-1])

@@ -1,4 +1,4 @@
-"""Views that belong together, for the forms of sequences: by house, in time, by the cameras of a rig; no effects."""
+"""Groups of views for the forms of sequences: by house, in time, by the cameras of a rig; no effects."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.export.chosen_view import ChosenView
 
-_SAME_ROWS: Final = 1e-6  # of two cameras' rotation, and metres
+_SAME_ROWS: Final = 1e-6  # tolerance of two cameras' rotations, and metres
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -30,7 +30,7 @@ class SequenceFrame:
 
     @property
     def right(self) -> ChosenView | None:
-        """The nearest view to the right of the first whose rows are its rows; None without one."""
+        """The nearest view to the right of the first with the same rows (a rectified pair); None without one."""
         camera_from_world = np.linalg.inv(pose_opencv(self.first))
         by_distance: dict[float, ChosenView] = {}
         for view in self.others.values():
@@ -45,7 +45,7 @@ class SequenceFrame:
 def frames_by_house(views: Sequence[ChosenView]) -> dict[str, list[SequenceFrame]]:
     """House id -> its moments: frames by number, then other views by id.
 
-    Views of other cameras of a rig are put beside its first one's; such a view alone is left out.
+    Views of a rig's other cameras are grouped with that of its first; without it they are left out.
     """
     companions: dict[tuple[str, str], dict[str, ChosenView]] = {}
     for view in views:

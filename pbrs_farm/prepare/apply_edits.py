@@ -1,4 +1,4 @@
-"""A finished house with its edits carried out, in their order. Effects: reads the files they name."""
+"""Apply the edits of a source to its finished house, in order. Effects: reads the files they name."""
 
 from __future__ import annotations
 
@@ -106,13 +106,13 @@ def _place(house: House, edit: PlaceModel | FloatModel, fields: ReadFields) -> H
         materials=(*house.materials, *shape.materials),
         textures={**house.textures, **shape.textures},
         source=source,
-        # Once for a model, however many of it are placed.
+        # Notes of a model appear once, however often it is placed.
         notes=tuple(dict.fromkeys((*house.notes, *shape.notes))),
     )
 
 
 def _at_home(house: House, item: Item) -> Item:
-    """The item with the room and the level its middle is in."""
+    """The item with the room and level of its centre."""
     x, y, z = item.bounds.mean(0)
     rooms = [
         room
@@ -135,7 +135,7 @@ def _remove(house: House, edit: RemoveItems, _fields: ReadFields) -> House:
         replace(opening, item_id=None) if opening.item_id in gone else opening
         for opening in house.openings
     )
-    # Their places stay, empty: labels of all others keep their numbers.
+    # Removed items stay as empty ones, so that the labels of all others keep their numbers.
     items = tuple(
         _emptied(item, k) if item.id in gone else item for k, item in enumerate(house.items, 1)
     )
@@ -317,9 +317,9 @@ def _add_light(house: House, edit: AddLight, _fields: ReadFields) -> House:
 def _with_materials(
     house: House, items: Collection[str], change: Callable[[Material], Material]
 ) -> House:
-    """The house whose items have each their materials changed; other items keep theirs."""
+    """The house with the materials of some items changed; other items keep theirs."""
     materials = list(house.materials)
-    index_of: dict[int, int] = {}  # a changed material, for all items of the edit
+    index_of: dict[int, int] = {}  # material -> changed material, shared by all items of the edit
 
     def one(surface: Surface) -> Surface:
         old = surface.material

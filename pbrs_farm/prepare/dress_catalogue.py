@@ -18,17 +18,17 @@ from pbrs_farm.core.house import Note
 from pbrs_farm.core.recipe import DressFields
 
 NO_FURNITURE = "no-furniture"
-"""The kind of the note that says that the packages' furniture is not there."""
+"""Kind of the note about missing furniture packages."""
 
 
 GENERATED = "generated"
-"""The word of dress.catalogue that leaves the packages out."""
+"""Word of dress.catalogue that excludes the packages."""
 
 
 def fetch_packages(words: str) -> None:
-    """Download the packages of catalogue_of_words where they are not cached; MachineFailed if apt cannot.
+    """Download the packages of catalogue_of_words that are not cached; MachineFailed if apt cannot.
 
-    The user's libraries are read: BadInput for a path that does not exist or is no catalogue.
+    Reads the user's libraries: BadInput if a path does not exist or is not a catalogue.
     """
     paths = [word for word in words.split(":") if word]
     if GENERATED not in paths:
@@ -61,7 +61,7 @@ def own_catalogue(paths: Sequence[Path]) -> Catalogue:
 
 
 def has_furniture() -> bool:
-    """Whether the furniture package is cached, without reading it."""
+    """True if the furniture package is cached; does not read it."""
     return furniture_package.PACKAGE in _cached_names()
 
 
@@ -76,7 +76,7 @@ def _store() -> Path:
 
 
 def _stamp(path: Path) -> int:
-    # A library that changes is read anew.
+    # A changed library is read again.
     return path.stat().st_mtime_ns if path.exists() else 0
 
 
@@ -91,7 +91,7 @@ def _catalogue(libraries: tuple[tuple[Path, int], ...], has_package: bool | None
 def _of_libraries(libraries: tuple[tuple[Path, int], ...], has_package: bool | None) -> Catalogue:
     from pbrs_farm.read.catalogue.read_catalogue import catalogue_from
 
-    # None: no package is wanted.
+    # None: no package needed.
     if has_package is None:
         return catalogue_from((), given=[path for path, _ in libraries], store=_store())
     package, program = furniture_package.cached() if has_package else None, homes_package.cached()
@@ -111,7 +111,7 @@ def _of_libraries(libraries: tuple[tuple[Path, int], ...], has_package: bool | N
 
 
 def catalogue_of(fields: DressFields) -> Catalogue:
-    """The catalogue that a recipe names, read once a process."""
+    """The catalogue of a recipe, read once a process."""
     return catalogue_of_words(fields.catalogue)
 
 

@@ -1,4 +1,4 @@
-"""A source becomes a finished House: the passes of prepare/passes.py, in their order.
+"""Finish the house of a source: the passes of prepare/passes.py, in their order.
 
 Effects: those of the passes. Nothing is written.
 """
@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 
 
 class HouseBeforeEdits:
-    """The last finished house before its edits: homes that differ in edits alone are prepared once.
+    """Cache of the last finished house before its edits: homes that differ only in edits are prepared once.
 
-    A process has one beside its HouseCache, and gives it to finished_house.
+    A process has one beside its HouseCache, and passes it to finished_house.
     """
 
     def __init__(self) -> None:
@@ -37,16 +37,16 @@ class HouseBeforeEdits:
         return self._finished if self._key == cache_key(source, recipe) else None
 
     def keep(self, source: SourceRef, recipe: Recipe, finished: FinishedHouse) -> None:
-        """Keep the finished house of a source without edits, and let the one before go."""
+        """Cache the finished house of a source without edits, and drop the previous one."""
         self._key, self._finished = cache_key(source, recipe), finished
 
     def clear(self) -> None:
-        """Let go of the house."""
+        """Drop the cached house."""
         self._key, self._finished = "", None
 
 
 def _ignore_share(_share: float) -> None:
-    """Nobody asks how far dressing is."""
+    """Ignore the progress of dressing."""
 
 
 def finished_house(
@@ -74,7 +74,7 @@ def finished_house(
     passes = [p for p in PASSES if p.is_needed(source, recipe)]
     if not source.edits:
         return _through(passes, work)
-    # Begin from the house before its edits, and do what these add.
+    # Apply the edits to the house before its edits.
     bare = source.unedited
     before = cache.get(bare, recipe)
     if before is None:
@@ -92,6 +92,6 @@ def _through(passes: Sequence[Pass], work: Preparation) -> FinishedHouse:
 
 
 def repaired_house(source: SourceRef, recipe: Recipe) -> tuple[House, RepairReport]:
-    """As finished_house, without what dressing did."""
+    """As finished_house, without the report of dressing."""
     house, report, _dressing = finished_house(source, recipe)
     return house, report

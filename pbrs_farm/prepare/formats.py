@@ -123,7 +123,7 @@ class _Look:
         self._suffix = path.suffix.lower()
 
     def is_of(self, entry: Format) -> bool:
-        """Whether it is of a format, by its suffix, its keys or the file that makes it a home."""
+        """True if it is of a format, by its suffix, its keys or the file that makes it a home."""
         if entry.main_file:
             is_main = self._path.name == entry.main_file
             return is_main or (self._path / entry.main_file).is_file()
@@ -180,7 +180,7 @@ def _read_plan(given: GivenFile, fields: ReadFields) -> House:
 
 
 def _companions_of_plan(given: GivenFile, files: SourceFiles) -> str:
-    """Digest of the tables that lie beside a plan."""
+    """Digest of the tables beside a plan."""
     if given.path.suffix.lower() != ".json":
         return ""
     folder = given.path.parent

@@ -65,15 +65,15 @@ Furnish = Literal["none", "empty", "sparse"]
 
 # maximum share of the floor under furniture
 _MOST_COVERED: Final[dict[Furnish, float]] = {"none": 0.0, "empty": 0.03, "sparse": 0.2}
-_STANDS_M: Final = 0.5  # what begins higher above the floor hangs
-_FLAT_M: Final = 0.12  # what ends lower can be walked on
+_STANDS_M: Final = 0.5  # minimum bottom height above the floor of a hanging item
+_FLAT_M: Final = 0.12  # maximum height of an item to walk on
 _SMALL_BATH_M2: Final = 2.6
 _LEAST_M2: Final = 1.2
-_LEAST_LIVING_M2, _LEAST_BEDROOM_M2 = 12.0, 7.0  # of a room without a name
+_LEAST_LIVING_M2, _LEAST_BEDROOM_M2 = 12.0, 7.0  # minimum floor areas of a room without a name
 
 
 class _Use(NamedTuple):
-    """How a room of a kind is furnished: as which type of generated plans, by which brief of no type."""
+    """How a kind of room is furnished: as which type of generated plans, or by which brief without a type."""
 
     type: RoomType
     brief: UseWithoutType | None = None
@@ -106,7 +106,7 @@ _SERVED_BY: Final[dict[str, frozenset[int]]] = {
 @dataclass(frozen=True, slots=True)
 class _Storey:
     plan: Plan  # upright
-    angle_rad: float  # by which it was turned
+    angle_rad: float  # rotation of the upright plan
     rooms: tuple[RoomSpace, ...]
     uses: tuple[_Use, ...]
     wanting: tuple[int, ...]  # rooms to furnish
@@ -145,7 +145,7 @@ def _furnished(
                 present={k: _present(storey.rooms[k], mutable) for k in storey.wanting},
             )
             _add(mutable, storey, pieces, catalogue)
-    # Attribution licences (CC-BY) oblige whoever shows the pictures: name their authors.
+    # Attribution licences (CC-BY) require users of the pictures to name the authors.
     owed = sorted(
         {(p.creator or p.library, p.licence) for p in mutable.used.values() if "BY" in p.licence}
     )
@@ -183,7 +183,7 @@ def _storey(
     kinds: Mapping[str, RoomKind],
     most_covered: float,
 ) -> _Storey:
-    """The rooms of a level as a plan, and which of them are to be furnished."""
+    """The rooms of a level as a plan, with the numbers of those to furnish."""
     rooms, shapes, uses = [], [], []
     for room in space.rooms:
         # Furniture touches the walls' faces, wherever the outline was drawn.
@@ -220,7 +220,7 @@ def _use_of(room: RoomSpace, kind: RoomKind) -> _Use:
 
 
 def _present(room: RoomSpace, mutable: MutableHouse) -> list[str]:
-    """Groups of briefs that the room's furniture serves already."""
+    """Groups of briefs already covered by the room's furniture."""
     classes = {mutable.items[n].nyu40 for n in _on_floor(room, mutable)}
     return [name for name, served in _SERVED_BY.items() if served & classes]
 
@@ -228,7 +228,7 @@ def _present(room: RoomSpace, mutable: MutableHouse) -> list[str]:
 def _is_wanting(
     room: RoomSpace, kind: RoomKind, area: float, mutable: MutableHouse, most_covered: float
 ) -> bool:
-    """Whether a room has so little in it that it is to be furnished; notes one of no known use."""
+    """True if a room has too little furniture; adds a note for a room of unknown use."""
     if kind is RoomKind.OUTDOOR or area < _LEAST_M2 or not room.room.has_floor:
         return False
     covered = sum(_ground(mutable.items[n].bounds).area for n in _on_floor(room, mutable))
@@ -275,7 +275,7 @@ def _opening(
 ) -> tuple[PlanOpening, PlanWall]:
     """A door or window, with a wall of the same width."""
     (x, _, z), along = passage.centre.tolist(), passage.along[[0, 2]] * passage.width / 2
-    # The wall's ends in plan, rounded to 0.1 mm as those of made homes are.
+    # The wall's ends in plan, rounded to 0.1 mm as in generated homes.
     start = round(x - float(along[0]), 4), round(z - float(along[1]), 4)
     end = round(x + float(along[0]), 4), round(z + float(along[1]), 4)
     sill, height = max(passage.bottom_y - floor_y, 0.0), passage.top_y - passage.bottom_y
@@ -306,7 +306,7 @@ def _add(
         size = np.ptp(shape.bounds, axis=0)
         scale = np.array([piece.width, piece.height, piece.depth]) / np.maximum(size, 1e-6)
         turn = -(piece.angle_rad - storey.angle_rad)
-        # Bring the middle of its box's base to where it was placed.
+        # Move the centre of the base of its box to the piece's place.
         low, high = shape.bounds * scale
         mx, mz = (low[0] + high[0]) / 2, (low[2] + high[2]) / 2
         x, z = piece.x * cos - piece.z * sin, piece.x * sin + piece.z * cos

@@ -1,6 +1,6 @@
-"""A generated home becomes a House without a file in between: its models go over as arrays. No effects.
+"""Convert a generated home to a House without an intermediate file. No effects.
 
-The House is the one that the home's .sh3d gives, bit by bit, in a fraction of the time: nothing is
+The House is bit by bit the one that the home's .sh3d gives, in a fraction of the time: nothing is
 written as text, packed, unpacked and parsed.
 """
 
@@ -19,9 +19,9 @@ from pbrs_farm.read.sweethome3d.home_file.container import Container
 
 
 def house_of_contents(contents: HomeContents, name: str, sha256: str, fields: ReadFields) -> House:
-    """The house that read_home makes of contents.archive(); Raises BadHouse as it does.
+    """The house that read_home makes of contents.archive(). Raises BadHouse as it does.
 
-    name: of the file that it would be. sha256: of what the home is known by; there is no file.
+    name: of the virtual file. sha256: digest of the home's inputs, since there is no file.
     """
     parsed = {
         path: model
@@ -42,7 +42,7 @@ def _model_of_shape(shape: Shape, max_triangles: int) -> ObjModel | None:
 
 
 def _mesh_of_surface(surface: WrittenSurface) -> Mesh | None:
-    """The mesh of a surface; None where it loses a triangle."""
+    """The mesh of a surface; None if it would lose a triangle."""
     # A corner's position, uv and normal share one index, -1 for an attribute the surface lacks.
     corner = surface.faces.reshape(-1).astype(np.int64)
     none = np.full(len(corner), -1, np.int64)

@@ -33,24 +33,21 @@ if TYPE_CHECKING:
     from pbrs_farm.read.objects.model_folders import ObjectModel
 
 _GENERATED_BY: Final = "home: made by pbrs_farm, CC0"
-_GROUPS_OF_PLUGINS: Final = frozenset(
-    {"read", "dress", "repair"}
-)  # with fields that its homes may set
+_GROUPS_OF_PLUGINS: Final = frozenset({"read", "dress", "repair"})  # fields that its homes may set
 
 Finish: TypeAlias = "Callable[[SourceRef, Recipe], FinishedHouse]"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HomeKind:
-    """A kind of homes that words of a command line name.
+    """A kind of homes named by words of a command line.
 
-    name: SourceRef.kind. is_word: whether a word names such homes. words: a word for each home of a
-    word. source: the source of a word, with the digests of its files. read: the house as its source
-    gives it. finish: of a plugin, instead of `read`: the house after all passes; the function that
-    it is given finishes another source. is_home: False of an object without context, which has no
-    walls to repair and is never dressed. is_of_package: made from an installed package, so that
-    another version of the package is the machine's fault. has_furniture: whether it takes
-    furniture from the package.
+    name: SourceRef.kind. is_word: true for a word of the kind. words: one word for each home of a word.
+    source: the source of a word, with the digests of its files. read: the house in its source's state.
+    finish: for a plugin, instead of `read`: the house after all passes; its function argument finishes
+    another source. is_home: False for an object without context, which has no walls to repair and is
+    never dressed. is_of_package: made from an installed package, so that another version of the package
+    is the machine's fault. has_furniture: true if it takes furniture from the package.
     """
 
     name: str
@@ -109,7 +106,7 @@ def _made_home(word: str) -> MadeHome:
 
 
 def _made_source(word: str, _files: SourceFiles) -> SourceRef:
-    """The source of a home that its seed makes; its companion is the furniture's package."""
+    """The source of a generated home; its companion is the furniture package."""
     from pbrs_farm.assets import furniture_package
 
     home = _made_home(word)
@@ -136,7 +133,7 @@ def _read_made(source: SourceRef, fields: ReadFields) -> House:
     from pbrs_farm.prepare.generated_house import house_of_contents
 
     home = _made_home(source.location)
-    # An empty home needs no package, so that it is made where none can be read.
+    # An empty home needs no package, so it also works where packages cannot be read.
     catalogue = catalogue_of_words("") if home.furniture else EMPTY
     contents = generate_home(home, catalogue).contents
     house = house_of_contents(contents, f"{home.name}.sh3d", source.sha256, fields)

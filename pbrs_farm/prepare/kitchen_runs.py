@@ -21,19 +21,19 @@ from pbrs_farm.core.classes import CABINET, COUNTER, SINK
 from pbrs_farm.core.house import Box, Item
 from pbrs_farm.home.names import words_of_item
 
-MODULE_M: Final = 0.6  # of a usual unit
+MODULE_M: Final = 0.6  # width of a standard unit
 _NARROWEST_M: Final = 0.28  # minimum width of a unit; a smaller rest goes to its neighbour
-_DEPTH_M: Final = 0.62  # of a run along a wall, where a box is deeper
+_DEPTH_M: Final = 0.62  # depth of a run along a wall, for deeper boxes
 _DEPTHS_M: Final = (0.4, 0.96)  # depth of boxes that become one run
 _TOPS_M: Final = (0.7, 1.1)  # a worktop's height above the floor
 _FOOT_M: Final = 0.35  # maximum bottom height of a box on the floor
-_HUNG_M: Final = 1.2  # what begins higher hangs
+_HUNG_M: Final = 1.2  # minimum bottom height of a wall cabinet
 _HUNG_HEIGHTS_M: Final = (0.3, 1.1)
 _HUNG_DEPTH_M: Final = 0.5
 _AT_WALL_M: Final = 0.2
 _ASIDE_M: Final = 0.1  # maximum offset of a unit's centre from the run (accuracy of scans)
 _STANDS_OVER_M: Final = (
-    0.4  # of the middle of a sink's or hob's box above the worktop; higher is a hood
+    0.4  # maximum height of a sink's or hob's centre above the worktop; higher is a hood
 )
 _SINK_M: Final = 0.8
 _COUNTERS: Final = frozenset({"kitchen", "counter", "countertop", "worktop", "island"})
@@ -43,12 +43,12 @@ _BUILT_IN: Final = frozenset({"washing", "washer", "fridge", "refrigerator", "fr
 
 
 class Unit(NamedTuple):
-    """A piece of a run, and the box that it fills; its back at the box's back."""
+    """A piece of a run and its box, aligned at their backs."""
 
     piece: Piece
     box: Box
     scale: F64  # (3,) along the piece's width, height, depth
-    is_invented: bool = False  # the source says nothing of it but that here is a kitchen
+    is_invented: bool = False  # not in the source, added because the room is a kitchen
 
 
 class _Set(NamedTuple):
@@ -179,7 +179,7 @@ def _is_hung(item: Item, floor_y: float) -> bool:
 
 
 def _set_of_kitchen(catalogue: Catalogue, counters: Sequence[Item], house_id: str) -> _Set | None:
-    """A set whose worktop is about as high as the counters are; one home has one."""
+    """A set with a worktop about as high as the counters; the same set for a whole home."""
     by_set: dict[str, dict[str, list[Piece]]] = {}
     for piece in catalogue.of("base_cabinet", "sink", "cooker", "dishwasher", "upper_cabinet"):
         if piece.of_set:
@@ -213,7 +213,7 @@ def _runs_of(
     assert box is not None
     right, front = box.axes[:, 0] * [1, 0, 1], box.axes[:, 2] * [1, 0, 1]
     half = box.half[[0, 2]]
-    # Its long side is its width.
+    # The long side is the width.
     if half[1] > half[0]:
         right, front, half = front, -right, half[::-1]
     low = float(box.centre[1] - box.half[1]) if is_hung else floor_y
@@ -247,7 +247,7 @@ def _runs_of(
     for span, end, way in at_walls:
         if min(x[1] - x[0], z[1] - z[0]) < _DEPTH_M:
             return
-        # A strip along the wall, and less of the box for the next one.
+        # Cut a strip along the wall off the box.
         inner = span[end] - (_DEPTH_M if end else -_DEPTH_M)
         strip = min(inner, span[end]), max(inner, span[end])
         yield run(strip if span is x else (x[0], x[1]), strip if span is z else (z[0], z[1]), -way)
@@ -271,7 +271,7 @@ def _missing(appliances: Sequence[Item]) -> tuple[str, ...]:
 
 
 def _modules_of(run: _Run, appliances: Sequence[Item]) -> list[_Module]:
-    """The run from end to end: what the source puts into it, and cabinets between."""
+    """The modules of a run from end to end: the source's items, and cabinets between."""
     fixed: list[_Module] = []
     inside = [(x, i) for i in appliances if _kind_of(i) and (x := run.along(i)) is not None]
     for x, item in sorted(inside, key=lambda row: row[0]):

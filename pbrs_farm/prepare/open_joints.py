@@ -55,7 +55,7 @@ def keyed(
 
 
 def with_motions(house: House, motions: Sequence[Motion]) -> House:
-    """The house with these motions, instead of those that it has of the same parts."""
+    """The house with these motions, which replace its motions of the same parts."""
     new = {(motion.item, motion.part): motion for motion in motions}
     unchanged = (m for m in house.motions if (m.item, m.part) not in new)
     return replace(house, motions=(*unchanged, *new.values()))

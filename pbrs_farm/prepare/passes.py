@@ -32,10 +32,14 @@ if TYPE_CHECKING:
     from pbrs_farm.repair import RepairReport
 
 PLANS_VERSION: Final = 1
-"""Of what reads floor plans, beside that of reading: raised, it makes no other homes anew."""
-_MAX_ROUNDS: Final = 3  # of repairing a dressed house and hanging anew what lost its wall
-_FURNISH_VERSION: Final = 3  # of furnish_rooms.py, beside that of what furnishes generated homes
-_DRESS_SHARE: Final = 0.7  # of the time that dressing and repair take, about
+"""Version of the readers of floor plans; raising it invalidates no other homes."""
+_MAX_ROUNDS: Final = (
+    3  # maximum rounds of repairing a dressed house and rehanging items that lost their wall
+)
+_FURNISH_VERSION: Final = (
+    3  # version of furnish_rooms.py, in addition to that of furnishing generated homes
+)
+_DRESS_SHARE: Final = 0.7  # approximate share of dressing in the time of dressing and repair
 
 
 class FinishedHouse(NamedTuple):
@@ -52,7 +56,7 @@ class Preparation:
 
     source: SourceRef
     recipe: Recipe
-    tell_share: Callable[[float], None]  # called with the share done of dressing and repair
+    tell_share: Callable[[float], None]  # called with the finished share of dressing and repair
     finish: Callable[[SourceRef, Recipe], FinishedHouse]  # the house of another source
     current: House | None = None
     report: RepairReport | None = None
@@ -111,7 +115,7 @@ def uses_catalogue(source: SourceRef, recipe: Recipe) -> bool:
 
 
 def _is_home(source: SourceRef, _recipe: Recipe) -> bool:
-    # An object without context has no walls to close; a plugin gives its homes finished.
+    # An object without context has no walls to close; a plugin's homes are already finished.
     kind = HOME_KIND.get(source.kind)
     return kind is None or (kind.is_home and kind.finish is None)
 
@@ -159,7 +163,7 @@ def _read_depends(source: SourceRef, recipe: Recipe) -> list[object]:
     kind = HOME_KIND.get(source.kind)
     if kind is None or kind.finish is None:
         return []
-    # Which passes the plugin's home goes through is known once it is made: any may.
+    # The passes of a plugin's home are unknown before it is made, so all versions count.
     return [versions_of_passes(), recipe.digest("dress")]
 
 
@@ -235,7 +239,7 @@ def _dress(work: Preparation) -> Preparation:
     from pbrs_farm.repair.small_repairs import with_rooms_closed, without_persons_and_plants
 
     fields = work.recipe.repair
-    # Nothing makes way for people and plants that repair will take out; lamps hang from ceilings.
+    # Do not clear space for people and plants that repair will remove; lamps hang from ceilings.
     bare, _removed = without_persons_and_plants(work.house, fields)
     bare = with_rooms_closed(bare, fields)
     dressed = dressed_house(
@@ -279,7 +283,7 @@ def _repair(work: Preparation) -> Preparation:
 
 
 def _leave_open(work: Preparation) -> Preparation:
-    """A share of the doors and drawers of a lived-in home left open, drawn by the seed of dressing."""
+    """Leave a share of the doors and drawers of a lived-in home open, by the seed of dressing."""
     from pbrs_farm.prepare.open_joints import left_open
 
     share, seed = work.recipe.dress.open_share, dress_seed(work.source, work.recipe)
@@ -287,7 +291,7 @@ def _leave_open(work: Preparation) -> Preparation:
 
 
 def _float(work: Preparation) -> Preparation:
-    """Things in the air, drawn by the seed of dressing, else by the recipe's."""
+    """Add floating items, by the seed of dressing, else by the recipe's."""
     from pbrs_farm.dress.floating import with_floating_things
 
     share, seed = work.recipe.dress.float_share, _float_seed(work.source, work.recipe)
@@ -295,7 +299,7 @@ def _float(work: Preparation) -> Preparation:
 
 
 def _surround(work: Preparation) -> Preparation:
-    """Streets, gardens and courts before the windows."""
+    """Add streets, gardens and courts outside the windows."""
     from pbrs_farm.dress.content import content
 
     kind, seed = work.recipe.surroundings.kind, work.recipe.seed
@@ -303,7 +307,7 @@ def _surround(work: Preparation) -> Preparation:
 
 
 def _edit(work: Preparation) -> Preparation:
-    """The source's edits, in their order."""
+    """Apply the source's edits, in their order."""
     from pbrs_farm.prepare.apply_edits import apply_edits
 
     return replace(work, current=apply_edits(work.house, work.source, work.recipe.read))
@@ -334,7 +338,7 @@ GROUPS: Final = tuple(
 """Every recipe group that a finished house may depend on."""
 
 STEP_GROUPS: Final = tuple(group for group in GROUPS if group != "dress")
-"""The recipe groups of the step `house`; the fields of dressing are in step_depends where it is done."""
+"""The recipe groups of the step `house`; for a dressed house, step_depends adds the fields of dressing."""
 
 
 def versions_of_passes() -> dict[str, int]:

@@ -28,7 +28,7 @@ from pbrs_farm.read.sweethome3d.home import read_home
 from pbrs_farm.regular_files import digest_of_regular
 
 LEFT_OUT = "plan-left-out"
-"""The kind of the notes of what a machine's plan holds and does not fit."""
+"""Kind of the notes about parts of a machine-made plan that do not fit."""
 
 
 def house_of_plan(given: GivenFile, fields: ReadFields) -> House:

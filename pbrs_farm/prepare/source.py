@@ -32,18 +32,18 @@ from pbrs_farm.read.common.format import Format
 from pbrs_farm.read.common.source_files import SourceFiles
 from pbrs_farm.regular_files import naming_kind, real_path, text_given
 
-_MODEL_SUFFIXES: Final = (".obj", ".sh3f")  # what `objects` reads; a .glb may be a scene
+_MODEL_SUFFIXES: Final = (".obj", ".sh3f")  # files of `objects`; a .glb may be a scene
 # fmt: off
 _UNREAD_SUFFIXES: Final = frozenset({
     ".3dm", ".3ds", ".abc", ".blend", ".dae", ".dwg", ".dxf", ".fbx", ".max", ".mb", ".mtl", ".pln",
     ".ply", ".rvt", ".sdf", ".skp", ".stl",
 })
 # fmt: on
-_MOST_NAMED: Final = 3  # folders of homes that a hint names
+_MOST_NAMED: Final = 3  # maximum number of folders of homes in a hint
 _LONGEST_ID: Final = 255  # bytes of a folder's name
 _DEFAULT_KIND: Final = "sweethome3d"  # of an unrecognised path: its reader explains the problem
 SAVED_SUFFIX: Final = ".home.json"
-"""Of a file of a home with its edits: `saved_home` writes it, `resolve` reads it."""
+"""Suffix of a file of a home with its edits, written by `saved_home` and read by `resolve`."""
 
 _ROOT_HINT: Final = (
     "a SUNCG house is ROOT/house/ID/house.json beside ROOT/room/ID (v1) or ROOT/wall/ID (v2), "
@@ -88,15 +88,15 @@ def _homes_in(folder: Path) -> list[str]:
 
 
 def _home_files(folder: Path) -> Iterator[Path]:
-    """The homes that lie in a folder which is no home itself, in no order."""
+    """The homes in a folder that is not itself a home, in no order."""
     if folder.is_dir() and format_of_file(folder) is None:
         yield from filter(_is_home_file, folder.iterdir())
 
 
 def homes_left_below(folder: Path) -> str:
-    """Which homes of a folder are not taken, since they lie one folder deeper, and what takes them; "" = none.
+    """Message about homes one folder deeper, which are ignored, with a command that includes them; or "".
 
-    They are named and not taken: a model (.glb) below a scene may be a home or its furniture.
+    They are ignored because a model (.glb) below a scene may be a home or its furniture.
     """
     if not folder.is_dir() or format_of_file(folder) is not None:
         return ""
@@ -208,7 +208,7 @@ def _format_at(path: Path) -> Format:
         raise BadHouse(str(path), "", f"{path.suffix} files are not read", hint=hint)
     if path.is_file() and not any(suffix in home_format.suffixes for home_format in formats()):
         raise BadHouse(path, "", "is no home", hint=f"read are {summary()}")
-    # A file that is not there is missing in its format's words.
+    # A missing file gets the error message of its format.
     named = (home_format for home_format in formats() if suffix in home_format.suffixes)
     default = format_of_kind(_DEFAULT_KIND)
     assert default is not None
@@ -216,7 +216,7 @@ def _format_at(path: Path) -> Format:
 
 
 def _parted(word: str) -> tuple[str, str]:
-    """FILE#apartment=ID -> the file and the part of it; a file of that whole name goes first."""
+    """FILE#apartment=ID -> (file, part); a file with that whole name takes precedence."""
     file, _, part = word.rpartition("#")
     is_part = bool(file) and part.startswith(("apartment=", "floor="))
     return (file, part) if is_part and not os.path.exists(word) else (word, "")  # noqa: PTH110

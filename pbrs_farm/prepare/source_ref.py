@@ -58,12 +58,12 @@ class SourceRef(Record):
         return self.model_copy(update={"house_id": bare_id, "edits": ()})
 
     def edited(self, *edits: Edit) -> SourceRef:
-        """The same house with these edits after its own."""
+        """The same house with these edits appended."""
         all_edits = (*self.edits, *edits)
         house_id = edited_id(self.unedited.house_id, all_edits)
         return self.model_copy(update={"house_id": house_id, "edits": all_edits})
 
 
 def home_id(source: SourceRef) -> str:
-    """The id of the source's house as it was drawn, whatever it is dressed by."""
+    """The id of the source's undressed house."""
     return source.unedited.house_id.removesuffix(keys.dressed_id("", source.dress_seed))

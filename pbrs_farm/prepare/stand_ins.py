@@ -37,8 +37,8 @@ STAND_IN: Final = "stand-in"
 
 How = Literal["pieces", "boxes", "none"]
 
-_SCALES: Final = (0.6, 1.6)  # of a model along each of its axes
-_STRETCH: Final = 1.6  # of one axis against another
+_SCALES: Final = (0.6, 1.6)  # range of a model's scale along each axis
+_STRETCH: Final = 1.6  # maximum ratio of the scales of two axes
 _STRETCH_OF_BOARDS: Final = 2.2
 # fmt: off
 _BOARDS: Final = frozenset({
@@ -53,8 +53,8 @@ _FIXTURES: Final = frozenset({
     "washer", "fridge",
 })
 # fmt: on
-_OWN_SCALES: Final = (0.8, 1.25)  # of a fixture whose box no piece fits
-_FAR_SCALES: Final = (0.35, 2.6)  # of such a box against the piece
+_OWN_SCALES: Final = (0.8, 1.25)  # range of scale of a fixture if no piece fits its box
+_FAR_SCALES: Final = (0.35, 2.6)  # range of the ratio of such a box to the piece
 _BASINS: Final = frozenset({"sink", "washbasin"})
 _TALLEST_BASIN_M: Final = 1.3  # taller ones have a mirror
 _RIMS_M: Final = (0.6, 1.1)  # heights of basins' rims above the floor
@@ -65,10 +65,10 @@ _MOST_DROP_M: Final = (
 )
 _NEAR_WALL_M: Final = 0.25  # maximum gap between a back and its wall
 _THIN_M: Final = 0.12
-_AT_TABLE_M: Final = 1.5  # from a chair to the middle of its table
+_AT_TABLE_M: Final = 1.5  # maximum distance from a chair to the centre of its table
 _ON_FLOOR_M: Final = 0.35  # maximum bottom height of a box on the floor
 _MOST_IN_WALL_M: Final = 0.15  # boxes of scans reach into walls
-_IN_WALL_SHARE: Final = 0.06  # of a footprint that may stay outside its room
+_IN_WALL_SHARE: Final = 0.06  # maximum share of a footprint outside its room
 _SEATS: Final = frozenset({"chair", "stool", "office_chair"})
 _TABLES: Final = frozenset({"table", "desk"})
 # fmt: off
@@ -134,7 +134,7 @@ class _Place(NamedTuple):
 
     room: Room
     outline: Polygon
-    area: Polygon  # a hair larger, prepared
+    area: Polygon  # slightly enlarged, prepared
 
 
 def _place(room: Room) -> _Place:
@@ -169,7 +169,7 @@ class _Scene:
         self.in_walls: Counter[str] = Counter()
 
     def notes(self) -> list[Note]:
-        """One note a kind of what became no piece."""
+        """One note per kind of item without a piece."""
         notes = []
         for kind, text, names in (
             ("stand-in-box", "have no piece that fits and are plain boxes", self.boxes),
@@ -196,7 +196,7 @@ class _Scene:
             room = place.room
             if room.id == item.room_id:
                 return place
-            # Many rooms: ask those alone whose bounds are near.
+            # With many rooms, test only those with bounds nearby.
             x0, z0, x1, z1 = place.outline.bounds
             if not room.floor_y - 0.3 <= y <= room.ceiling_y + 0.3:
                 continue
@@ -251,7 +251,7 @@ class _Scene:
         ]
         if not near:
             return None
-        # Feel for it below its ground, off the edges: a round plate has no corners.
+        # Sample heights under the footprint, away from its corners (it may be round).
         spread = np.linspace(-0.4, 0.4, 5)
         across, along = target.axes[[0, 2], 0], target.axes[[0, 2], 2]
         places = [
@@ -360,7 +360,7 @@ def _stand_in(mutable: MutableHouse, item: Item, scene: _Scene) -> None:
 def _chosen(
     item: Item, target: Box, place: _Place | None, scene: _Scene
 ) -> tuple[Box, _Fit] | None:
-    """The piece that fits best, and the box as it looks; None where no piece fits either way."""
+    """The best fitting piece, and the box turned to its front; None if no piece fits."""
     assert scene.catalogue is not None
     group = _group_of(item)
     if group in _BASINS:
@@ -417,7 +417,7 @@ def _own_size(piece: Piece, target: Box) -> _Fit | None:
 
 
 def _fit(piece: Piece, target: Box) -> _Fit | None:
-    """How a piece is scaled to a box; None where it would have to be stretched beyond the limits."""
+    """Scale of a piece for a box; None if the limits of scale forbid it."""
     size = np.array([piece.size[0], piece.size[2], piece.size[1]])  # width, height, depth
     if size.min() <= 0:
         return None
@@ -472,7 +472,7 @@ def _ground(target: Box) -> Polygon:
 
 
 def _inside(target: Box, area: Polygon) -> Box | None:
-    """The box moved off the walls of its room by the least step; None where none is small enough."""
+    """Move the box off the walls of its room by the smallest step; None if over 30 % of it stays outside."""
     ground = _ground(target)
     if area.contains(ground):
         return target
@@ -492,14 +492,14 @@ def _inside(target: Box, area: Polygon) -> Box | None:
 
 
 def _turned(target: Box, *, is_front_given: bool) -> Iterator[Box]:
-    """The box with its front as given, or in each of the ways that it may look: four, two if it is flat."""
+    """The box with its given front, or in each possible orientation: four, two if it is flat."""
     if is_front_given:
         yield target
         return
     width, depth = (float(2 * h) for h in target.half[[0, 2]])
     quarters: Sequence[int] = range(4)
     if min(width, depth) < _THIN_M and max(width, depth) > 2 * min(width, depth):
-        # A flat screen looks across its thin side.
+        # A flat screen faces across its thin side.
         quarters = (0, 2) if depth < width else (1, 3)
     for quarter in quarters:
         right, up, front = target.axes.T
@@ -510,7 +510,7 @@ def _turned(target: Box, *, is_front_given: bool) -> Iterator[Box]:
 
 
 def _front_cost(target: Box, group: str, place: _Place | None, scene: _Scene) -> float:
-    """0 where its back is at a wall or it looks at its table, more where it looks the wrong way."""
+    """0 if its back is at a wall or it faces its table; higher for other fronts and blocked ones."""
     if place is None:
         return 0.0
     front = target.axes[[0, 2], 2]
@@ -538,8 +538,9 @@ def _placed(
     front = target.axes[:, 2]
     turn_rad = float(np.arctan2(front[0], front[2]))
     low, high = shape.bounds * scale
-    # Bring the middle of its base to the middle of the box's, its back to the box's back where it is
-    # deeper than the box; what hangs keeps its top.
+    # Align the centres of the bases; if the piece is deeper than the box, align their backs.
+    # Hanging
+    # items keep their top.
     cos, sin = math.cos(turn_rad), math.sin(turn_rad)
     mx, mz = (low[0] + high[0]) / 2, (low[2] + high[2]) / 2
     base = float(target.centre[1] - target.half[1])
@@ -597,7 +598,7 @@ def _plain_box(mutable: MutableHouse, item: Item, target: Box, place: _Place | N
     r, g, b = _COLOURS.get(name, _PLAIN)
     material = mutable.material(Material(f"stand-in {name}".strip(), diffuse=(r, g, b)))
     half = np.maximum(target.half, 0.005)
-    # Off the floor by a hair, so that no face of it coincides with the floor's.
+    # Slightly off the floor, so that none of its faces coincides with the floor's.
     centre = target.centre + np.array([0.0, 0.001, 0.0])
     surface = box("box", centre, half, material, axes=_right_handed(target.axes))
     return replace(

@@ -1,4 +1,4 @@
-"""dataset.json of packed shards: what they hold, in which units, split and sizes; no effects."""
+"""dataset.json of packed shards: contents, units, splits and sizes; no effects."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pbrs_farm.core.house_split import SplitShares
 from pbrs_farm.views.view_sample import LAYERS, MODES, Size
 
 DATASET_JSON: Final = "dataset.json"
-WHOLE: Final = "all"  # the split of shards that are not split
+WHOLE: Final = "all"  # name of the only split of an unsplit set
 _FORM: Final = "pbrs_farm shards 1"
 
 
@@ -31,19 +31,18 @@ class Shard:
 class Dataset:
     """The part of dataset.json that a reader of shards needs."""
 
-    size: Size | None  # None: each view as large as it was rendered
+    size: Size | None  # None: each view at its rendered size
     modes: tuple[str, ...]
     layers: tuple[str, ...]
     shards: tuple[Shard, ...]
-    shares: SplitShares | None  # None: not split
+    shares: SplitShares | None  # None: unsplit
     classes: tuple[str, ...] = ()  # names of ids 0..40
 
 
 def dataset_json(dataset: Dataset, also: Mapping[str, Any]) -> bytes:
-    """The file. also: what a reader does not need: arrays, class colours, credits, card.
+    """The file's bytes. also: entries for people: arrays, class colours, credits, card.
 
-    also must be JSON values. Shards are in the order given, which is the order in which they are
-    read.
+    also must be JSON values. Shards keep the given order, which is the order of reading.
     """
     row = {
         "form": _FORM,
@@ -61,8 +60,8 @@ def dataset_json(dataset: Dataset, also: Mapping[str, Any]) -> bytes:
 def dataset_from_json(data: bytes, place: str) -> Dataset:
     """The Dataset that dataset_json wrote; BadInput, naming place, for anything else.
 
-    What dataset_json wrote for people is not read. A file of another version is refused by its
-    form, and one with unknown modes or layers, or without shards, too.
+    Entries for people are ignored. Files of another version, with unknown modes or layers, or without
+    shards are refused.
     """
     try:
         row = json.loads(data)

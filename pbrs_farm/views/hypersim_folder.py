@@ -1,8 +1,7 @@
-"""Frames of a folder in the layout of Hypersim, as views: its own or those of `export --to hypersim`.
+"""Frames of a folder in the layout of Hypersim, as views: the original set or `export --to hypersim`.
 
-Effects: reads the folder's files when they are asked for. Pictures are the developed ones
-(tonemap.jpg), else the linear colour by Hypersim's own tone; depth along rays becomes planar, the
-world gets y up, units become metres.
+Effects: reads the folder's files on demand. Pictures are tonemap.jpg, else the linear colour with
+Hypersim's own tone mapping; depth along rays becomes planar, the world gets y up, units become metres.
 """
 
 from __future__ import annotations
@@ -32,7 +31,7 @@ from pbrs_farm.views.views import ViewRef, Views
 
 _SCENES: Final = "ai_*"
 _FRAME: Final = re.compile(r"frame\.(\d{4})\.depth_meters\.hdf5")
-_MODE: Final = "mlt_il_ol"  # of its pictures: all light
+_MODE: Final = "mlt_il_ol"  # mode of its pictures: all light
 _DEPTH_MAX_MM: Final = 65535
 _TILTED: Final = "a tilted projection, which no K describes"
 _LAYER_FILES: Final = {
@@ -46,7 +45,7 @@ _LAYER_FILES: Final = {
     "instance": "semantic_instance",
     "albedo": "diffuse_reflectance",
 }
-"""Layer of core/layers.py -> which file of a frame it is made of."""
+"""Layer of core/layers.py -> its file in a frame."""
 
 
 class HypersimFolder:
@@ -74,7 +73,7 @@ class HypersimFolder:
 
     @cached_property
     def _rows(self) -> dict[str, Mapping[str, str]]:
-        """Scene -> its row of the camera parameters; {} of a folder without the table."""
+        """Scene -> its row of the camera parameters; {} for a folder without the table."""
         return {row["scene_name"]: row for row in _table(self._folder / hypersim.CAMERAS_CSV)}
 
     @cached_property
@@ -345,12 +344,12 @@ _LAYER_OF: Final[Mapping[str, _LayerOf]] = {
 
 
 def is_hypersim(folder: Path) -> bool:
-    """Whether a folder holds scenes in that layout."""
+    """True if a folder holds scenes in that layout."""
     return next(folder.glob(f"{_SCENES}/images/scene_*_geometry_hdf5"), None) is not None
 
 
 def views_of_hypersim(folder: Path) -> Views:
-    """The frames of a folder of scenes; those that no pin-hole saw, or that are not released, are in left_out."""
+    """The frames of a folder of scenes; unreleased frames and those without a pinhole are in left_out."""
     source = HypersimFolder(folder)
     if not source.refs:
         why = next(iter(source.unfit.values()), "no frame has depth_meters")

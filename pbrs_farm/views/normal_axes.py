@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-# Name -> for x, y and z: which published axis it is (0 right, 1 forward, 2 up), and its sign.
+# Name -> published axis (0 right, 1 forward, 2 up) and sign of each of x, y and z.
 AXES: Final[dict[str, tuple[tuple[int, int], ...]]] = {
     "opencv": ((0, 1), (2, -1), (1, 1)),  # right, down, forward
     "opengl": ((0, 1), (2, 1), (1, -1)),  # right, up, backward
@@ -30,7 +30,7 @@ def axes_from_published(axes: str) -> NDArray[np.float32]:
 
 
 def axes_from_axes(to: str, of: str) -> NDArray[np.float32]:
-    """(3, 3) matrix that turns directions: n in the axes `to` = matrix @ n in the axes `of`.
+    """(3, 3) matrix for directions: n in the axes `to` = matrix @ n in the axes `of`.
 
     Names are those of AXES: "opencv", "opengl", "published".
 
@@ -45,11 +45,11 @@ def decode_normal(
 ) -> NDArray[np.float32]:
     """(H, W, 3) float32 normals in the axes of that name, of unit length within 3e-5; 0 if not valid.
 
-    stored is (H, W, 3) uint16 with 0..65535 for -1..1 in published axes; valid is (H, W), and what
-    it leaves out becomes (0, 0, 0). KeyError for axes of an unknown name.
+    stored: (H, W, 3) uint16, 0..65535 for -1..1 in published axes. valid: (H, W); other pixels become
+    (0, 0, 0). KeyError for axes of an unknown name.
     """
     normal = np.empty(stored.shape, np.float32)
-    # Each published channel becomes an axis, turned round where the sign says.
+    # Each published channel becomes an axis, with its sign.
     for axis, (channel, sign) in enumerate(AXES[axes]):
         component = normal[..., axis]
         np.multiply(stored[..., channel], np.float32(sign * 2 / 65535), out=component)

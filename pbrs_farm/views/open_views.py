@@ -1,4 +1,4 @@
-"""Opens an output root, shards or a folder of Hypersim, wherever they lie. Effects: reads the store."""
+"""Open an output root, shards or a folder of Hypersim, local or remote. Effects: reads the store."""
 
 from __future__ import annotations
 
@@ -15,9 +15,8 @@ from pbrs_farm.views.views import Views
 def open_views(place: str | Path | Store) -> Views:
     """The views of an output root, of shards that `pbrs-farm pack` wrote, or of a Hypersim folder.
 
-    place: a folder, file:///folder, s3://bucket/prefix, or a Store. Nothing but names is read
-    before a view is asked for. Raises BadInput where there is no view, StoreFailed where the store
-    does not answer.
+    place: a folder, file:///folder, s3://bucket/prefix, or a Store. Reads only names until a view is
+    requested. Raises BadInput if there is no view, StoreFailed if the store does not answer.
 
         >>> frame.save("opened")
         >>> pf.open("opened")[0].size
@@ -26,12 +25,12 @@ def open_views(place: str | Path | Store) -> Views:
     store = place if not isinstance(place, str | Path) else store_from_url(str(place))
     if isinstance(store, FolderStore) and not store.root.is_dir():
         raise BadInput(place, "", "no such folder")
-    # Imported where needed: shards are read without pydantic and OpenImageIO.
+    # Imported on demand: shards are read without pydantic and OpenImageIO.
     if store.head("dataset.json") is not None:
         from pbrs_farm.views.shard_set import views_of_shards
 
         return views_of_shards(store)
-    from pbrs_farm.core import keys  # needs pydantic, which readers of shards do without
+    from pbrs_farm.core import keys  # needs pydantic, unlike the reader of shards
 
     if isinstance(store, FolderStore) and not (store.root / keys.FOLDERS[0]).is_dir():
         from pbrs_farm.views.hypersim_folder import is_hypersim, views_of_hypersim

@@ -1,11 +1,11 @@
-"""PNG <-> arrays with zlib and numpy alone: of the filters rows may have, "up" and none; no effects.
+"""PNG <-> arrays with zlib and numpy alone; row filters "up" and "none" only; no effects.
 
-Shards are written and read so, and the labels of a view are stored so: each row as its difference
-from the row above, which compresses labels best and is undone a row at a time. 16 bits stay 16. Where zlib-ng is
-installed it inflates: the same bytes in a seventh of zlib's time.
+The format of shards and of a view's labels: each row as its difference from the row above, which
+compresses labels best and is decoded a row at a time. 16 bits stay 16. zlib-ng, if installed, inflates
+the same bytes in a seventh of zlib's time.
 
-Not left to a library, because reading is what training waits for. A 640x480 picture takes, here (with
-zlib-ng), by OpenImageIO and by Pillow: normals 2.8 (0.8), 15 ms, and not at all (Pillow makes 16-bit
+Not left to a library, because training waits for reading. Times for a 640x480 picture, here (with
+zlib-ng), by OpenImageIO and by Pillow: normals 2.8 (0.8), 15 ms, and unsupported (Pillow makes 16-bit
 RGB 8 bits); colour 10 (9), 20 and 23 ms.
 """
 
@@ -30,11 +30,11 @@ def _inflating_library() -> Any:
     return zlib_ng
 
 
-inflating: Final = _inflating_library()  # zlib, or what does the same faster
+inflating: Final = _inflating_library()  # zlib, or a faster equivalent
 _SIGNATURE: Final = b"\x89PNG\r\n\x1a\n"
-_CHANNELS: Final = {0: 1, 2: 3}  # PNG's colour type: grey, RGB
+_CHANNELS: Final = {0: 1, 2: 3}  # PNG colour type (grey, RGB) -> channels
 _NONE, _UP = 0, 2  # filters
-_LEVEL: Final = 6  # of zlib
+_LEVEL: Final = 6  # zlib compression level
 _MAX_PIXELS: Final = 16384 * 16384
 _STRIP_BYTES: Final = 100_000
 _DAMAGED: Final = "cannot be read as a picture: damaged or truncated"
@@ -43,14 +43,14 @@ _DAMAGED: Final = "cannot be read as a picture: damaged or truncated"
 def png_of_rows(array: NDArray[np.uint8]) -> bytes:
     """PNG bytes of (H, W) or (H, W, 3) uint8, or uint16; equal arrays give equal bytes.
 
-    Every row is stored as its difference from the one above, which `array_of_rows` undoes quickly;
-    any PNG reader can read it. Other types and numbers of channels are not handled.
+    Every row is stored as its difference from the one above, which `array_of_rows` decodes quickly;
+    any PNG reader can read it. Other types and numbers of channels are not supported.
     """
     height, width = array.shape[:2]
     kind = 0 if array.ndim == 2 else 2
     big_endian = np.ascontiguousarray(array, array.dtype.newbyteorder(">"))
     rows = big_endian.view(np.uint8).reshape(height, -1)
-    # Put the filter's number before each row's difference from the row above.
+    # The filter's number comes before each row's difference.
     lines = np.empty((height, rows.shape[1] + 1), np.uint8)
     lines[:, 0] = _UP
     lines[0, 1:] = rows[0]
@@ -62,9 +62,9 @@ def png_of_rows(array: NDArray[np.uint8]) -> bytes:
 
 
 def array_of_rows(png: bytes, place: str) -> NDArray[Any] | None:
-    """(H, W) or (H, W, 3) uint8 or uint16 of a PNG; None where its rows are filtered otherwise.
+    """(H, W) or (H, W, 3) uint8 or uint16 of a PNG; None if its rows have other filters.
 
-    Raises BadInput, naming place, where it is no PNG or is damaged.
+    Raises BadInput, naming place, if it is damaged or not a PNG.
     """
     width, height, bits, kind, interlaced, data = _png_parts(png, place)
     if bits not in (8, 16) or kind not in _CHANNELS or interlaced:
@@ -73,18 +73,18 @@ def array_of_rows(png: bytes, place: str) -> NDArray[Any] | None:
     shape = (height, width) if kind == 0 else (height, width, 3)
     pixels = np.empty(shape, dtype.newbyteorder("="))
     table = pixels.reshape(height, -1)
-    # Undo some rows at a time: they stay in the processor's cache.
+    # Decode strips of rows that fit the processor's cache.
     n_row = table.shape[1] * dtype.itemsize
     n_strip = max(_STRIP_BYTES // (n_row + 1), 1)
-    rows = np.zeros((n_strip + 1, n_row), np.uint8)  # the first is the last of the strip above
+    rows = np.zeros((n_strip + 1, n_row), np.uint8)  # rows[0]: last row of the strip above
     first = 0
     for lines in _inflated(data, height, n_row + 1, n_strip, place):
-        # Look at the filters: rows that take their left neighbour are left to others.
+        # Rows with other filters are left to a PNG library.
         filters = lines[:, 0]
         is_up = filters == _UP
         if not (is_up | (filters == _NONE)).all():
             return None
-        # Add each row to the one above it, where it is a difference.
+        # Add each difference to the row above.
         for differs, above, line, row in zip(is_up.tolist(), rows, lines[:, 1:], rows[1:]):
             np.add(above if differs else 0, line, out=row)
         n = len(lines)
@@ -127,7 +127,7 @@ def _inflated(
         n = min(n_strip, n_lines - first) if first > 0 else 1
         yield np.frombuffer(_some(inflate, data, n * n_line, place), np.uint8).reshape(n, n_line)
         data = inflate.unconsumed_tail
-    # Ask for one byte more than there may be, so that a bomb stays small.
+    # Request one byte more than expected, so that a decompression bomb stays small.
     if _some(inflate, data, 1, place, may_lack=True) or not inflate.eof:
         raise BadInput(place, "", _DAMAGED)
 

@@ -1,4 +1,4 @@
-"""Samples flipped, cropped, resized and in other axes: normals and K follow the picture; no effects."""
+"""Flip, crop and resize samples, and change their axes: normals and K follow the picture; no effects."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from pbrs_farm.views.view_sample import Sample
 
 
 def flip(sample: Sample) -> Sample:
-    """The view in a mirror: left and right change places in every array.
+    """Mirror the view: swap left and right in every array.
 
-    Normals turn their x round and K's cx moves, so that the sample is what a camera would see of
-    the mirrored room.
+    The x of normals changes its sign and K's cx moves, so that the sample is a valid view of the
+    mirrored room.
     """
     width = sample.size[0]
     arrays: dict[str, Any] = {n: a[:, ::-1] for n, a in sample.arrays().items()}
     if sample.normal is not None:
-        # In all axes that have a name x points right.
+        # x points right in all named axes.
         arrays["normal"] = arrays["normal"] * np.array([-1, 1, 1], np.float32)
     k = sample.K.copy()
     k[0, 2] = width - k[0, 2]
@@ -48,9 +48,9 @@ def crop(sample: Sample, left: int, top: int, width: int, height: int) -> Sample
 
 
 def resize(sample: Sample, width: int, height: int) -> Sample:
-    """The sample on another grid: colour by area, boundaries where any is, all other labels nearest.
+    """Resample the sample: colour by area, boundaries if the cell contains any, all other labels nearest.
 
-    K is scaled, also where the sides' ratio changes.
+    K is scaled, also if the aspect ratio changes.
     """
     full_width, full_height = sample.size
     if (full_width, full_height) == (width, height):
@@ -73,25 +73,25 @@ def resize_k(
 ) -> NDArray[np.float32]:
     """K (3, 3) of a picture of size `of` (width, height) for the same picture of size `to`.
 
-    float32 comes back. Pixel centres lie at +0.5, so the principal point scales as the size does.
-    Not for a crop, which moves it.
+    Returns float32. Pixel centres are at +0.5, so the principal point scales with the size. Not for a
+    crop, which moves it.
     """
     scale = np.array([to[0] / of[0], to[1] / of[1], 1], np.float64)
     return np.asarray(k.astype(np.float64) * scale[:, None], np.float32)
 
 
 def with_axes(sample: Sample, axes: str) -> Sample:
-    """The sample with its normals in the axes of that name; itself where they are already.
+    """The sample with its normals in the axes of that name; unchanged if they are already.
 
-    axes: "opencv", "opengl" or "published". Values are moved and negated, never rounded.
+    axes: "opencv", "opengl" or "published". Values are swapped and negated, never rounded.
     """
     if sample.normal is None or sample.axes == axes:
         return replace(sample, axes=axes)
     matrix = axes_from_axes(axes, sample.axes)
-    # The axes change places and signs only: pick them, so that no bit is rounded.
+    # Index and negate instead of multiplying, so that no bit is rounded.
     columns, signs = np.abs(matrix).argmax(1), matrix.sum(1)
     normal = sample.normal[..., columns] * signs
-    # Keep a zero a zero without a sign.
+    # Turn -0 into 0.
     return replace(sample, axes=axes, normal=np.asarray(normal + np.float32(0), np.float32))
 
 

@@ -1,7 +1,7 @@
-"""Which file of a shard holds which array of a view, written and read; no effects.
+"""Encode and decode the files of a view in a shard; no effects.
 
-Arrays of 8 bits are PNGs that zlib and numpy undo, colour a JPEG where it was packed so; arrays of
-16 bits are .npz without a clock, which no picture decoder can make 8 bits of.
+8-bit arrays are PNGs readable with zlib and numpy, colour a JPEG if packed as such; 16-bit arrays
+are .npz without a timestamp, which no picture decoder can reduce to 8 bits.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from pbrs_farm.core.errors import BadInput
 from pbrs_farm.views.png_rows import array_of_rows, png_of_rows
 from pbrs_farm.views.stored_layers import Stored
 
-_DATE: Final = (1980, 1, 1, 0, 0, 0)  # the first a zip file can hold
+_DATE: Final = (1980, 1, 1, 0, 0, 0)  # the earliest date of a zip file
 _LEVEL: Final = 6
 
-# Array -> the part that holds it; colour is <mode>.png or <mode>.jpg.
+# Array -> its part; colour is <mode>.png or <mode>.jpg.
 _PARTS: Final = {
     "normal": "normal.npz",
     "valid": "normal.npz",
@@ -36,8 +36,8 @@ _PARTS: Final = {
 def npz_of_arrays(arrays: Mapping[str, NDArray[Any]]) -> bytes:
     """.npz bytes; equal arrays give equal bytes.
 
-    In the order given, with a fixed date for each member; compressed. Arrays of objects are a
-    ValueError.
+    In the order given, with a fixed date for each member; compressed. Raises ValueError for arrays of
+    objects.
     """
     whole = io.BytesIO()
     with zipfile.ZipFile(whole, "w", zipfile.ZIP_DEFLATED, compresslevel=_LEVEL) as archive:
@@ -51,7 +51,7 @@ def npz_of_arrays(arrays: Mapping[str, NDArray[Any]]) -> bytes:
 
 
 def arrays_of_npz(data: bytes, place: str) -> dict[str, NDArray[Any]]:
-    """Name -> array; BadInput, naming place, where data is no .npz or is damaged.
+    """Name -> array; BadInput, naming place, if data is damaged or not an .npz.
 
     Arrays of objects are refused, so a file from a stranger runs no code.
     """
@@ -73,8 +73,8 @@ def arrays_of_npz(data: bytes, place: str) -> dict[str, NDArray[Any]]:
 def label_parts(stored: Stored) -> dict[str, bytes]:
     """Part -> bytes of a view's labels, in a fixed order.
 
-    stored has a view's arrays by name as they lie in a root; those that it does not have make no
-    part. The picture is not among them.
+    stored: a view's arrays by name, as in a root; missing arrays make no part. The picture is not
+    included.
     """
     parts: dict[str, bytes] = {}
     for part in dict.fromkeys(_PARTS.values()):
@@ -86,10 +86,10 @@ def label_parts(stored: Stored) -> dict[str, bytes]:
 
 
 def part_of_array(name: str, mode: str, parts: Collection[str]) -> str:
-    """The part that holds an array of a view that has these parts.
+    """The part with an array of a view.
 
-    For colour the JPEG where there is one, else the PNG; parts are the names of those that the view
-    has. KeyError for an array that no part holds.
+    parts: names of the view's parts. For colour the JPEG if present, else the PNG. KeyError for an
+    array without a part.
     """
     if name != "colour":
         return _PARTS[name]
@@ -97,10 +97,10 @@ def part_of_array(name: str, mode: str, parts: Collection[str]) -> str:
 
 
 def arrays_of_part(names: Sequence[str], part: str, data: bytes, place: str) -> Stored:
-    """The arrays of those names in a part; BadInput, naming place, where it is damaged.
+    """The arrays of those names in a part; BadInput, naming place, if it is damaged.
 
-    place is what messages call it. BadInput also for a name that the part lacks, or a PNG that
-    `pack` did not write.
+    place: name for messages. BadInput also for a name missing in the part, or a PNG not written by
+    `pack`.
     """
     if part.endswith(".npz"):
         arrays = arrays_of_npz(data, place)
@@ -116,7 +116,7 @@ def arrays_of_part(names: Sequence[str], part: str, data: bytes, place: str) -> 
 
 def _jpeg_array(data: bytes, place: str) -> NDArray[np.uint8]:
     """(H, W, 3) uint8 of a JPEG, by Pillow: one decoder, the same bits on every machine."""
-    from PIL import Image  # a shard of PNGs is read without it
+    from PIL import Image  # not needed for shards of PNGs
 
     try:
         with Image.open(io.BytesIO(data), formats=["JPEG"]) as picture:

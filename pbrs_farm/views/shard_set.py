@@ -34,9 +34,9 @@ _N_OPEN: Final = 8  # maximum number of open shards
 
 
 class ShardSet:
-    """Packed shards in a folder or a store; a ViewSource, and readable by shard and place.
+    """Packed shards in a folder or a store; a ViewSource, and readable by shard and index.
 
-    Files are mapped in a folder; from elsewhere a shard comes whole and some are kept.
+    Files in a folder are memory-mapped; shards from elsewhere are downloaded whole, and some are cached.
     """
 
     def __init__(self, store: Store) -> None:
@@ -45,12 +45,12 @@ class ShardSet:
         place = f"{self._place}/{DATASET_JSON}"
         self.dataset: Dataset = dataset_from_json(store.get(DATASET_JSON), place)
         self._open: OrderedDict[str, OpenShard] = OrderedDict()
-        self._at: dict[ViewRef, tuple[Shard, int]] = {}  # filled when views are asked for by name
+        self._at: dict[ViewRef, tuple[Shard, int]] = {}  # filled by the first access by name
         for shard in self.dataset.shards:
             self._check_size(shard)
 
     def __getstate__(self) -> dict[str, Any]:
-        # A map cannot be sent to a process: shards are opened again there.
+        # A map cannot be sent to another process, which opens the shards again.
         return {**self.__dict__, "_open": OrderedDict()}
 
     @property
@@ -68,7 +68,7 @@ class ShardSet:
         return shards
 
     def check(self, request: SampleRequest) -> None:
-        """Raise BadInput where the shards do not hold what request asks for."""
+        """Raise BadInput if the shards lack a requested layer or mode."""
         dataset = self.dataset
         for layer in request.layers:
             if layer != "colour" and layer not in dataset.layers:
@@ -79,11 +79,10 @@ class ShardSet:
             raise BadInput(self.url, "", f"no pictures in {request.mode} light", hint=hint)
 
     def read_at(self, shard: Shard, view: int, request: SampleRequest) -> Sample:
-        """The Sample of a view by its place in a shard.
+        """The Sample of a view by its index in a shard.
 
-        The quick way to go through shards in their order; by name there is `read`, which needs the
-        list of all views. BadInput for a place beyond the views, or where an array asked for was
-        not packed.
+        The fast way to read shards in order; `read`, by name, needs the list of all views. BadInput for
+        an index beyond the views, or if a requested array was not packed.
         """
         opened = self._opened(shard)
         if view >= len(opened.views):
@@ -103,8 +102,8 @@ class ShardSet:
     def refs(self) -> tuple[ViewRef, ...]:
         """All views by name: opens every shard once.
 
-        Sorted, houses before objects; kept afterwards. Slow over a network, since each shard is
-        opened: `read_at` does without.
+        Sorted, houses before objects; cached. Slow over a network, since each shard is opened; `read_at`
+        does not need it.
         """
         if not self._at:
             for shard in self.dataset.shards:
@@ -149,7 +148,7 @@ class ShardSet:
         return self.read_at(*self._at[ref], request)
 
     def shard_of(self, ref: ViewRef) -> Shard:
-        """The shard that holds a view."""
+        """The shard of a view."""
         return self._at[ref][0]
 
     def split_of(self, ref: ViewRef, shares: SplitShares | None) -> str:
@@ -179,7 +178,7 @@ class ShardSet:
             return self._open[shard.file]
         opened = OpenShard(self._bytes(shard), f"{self._place}/{shard.file}")
         self._open[shard.file] = opened
-        # Let go of the one that was not used for longest.
+        # Close the least recently used shard.
         if len(self._open) > _N_OPEN:
             self._open.popitem(last=False)
         return opened

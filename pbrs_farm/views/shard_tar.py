@@ -1,4 +1,4 @@
-"""Tar shards: samples written without a clock, members read by offset. Effects: write_samples writes.
+"""Tar shards: samples written without timestamps, members read by offset. Effects: write_samples writes.
 
 The form is POSIX ustar with plain files only, which webdataset, tar and Python's tarfile read. Members
 are found by their headers' offsets alone: tarfile takes nine times as long over a mapped shard.
@@ -22,7 +22,7 @@ Buffer = bytes | memoryview
 
 @dataclass(frozen=True, slots=True)
 class Member:
-    """A file of a tar: where its bytes lie."""
+    """A file of a tar and the position of its bytes."""
 
     name: str
     at: int
@@ -32,8 +32,8 @@ class Member:
 def write_samples(path: Path, samples: Iterable[tuple[str, Mapping[str, bytes]]]) -> None:
     """Write samples, (key, part -> bytes) each, as `<key>.<part>` in their order; equal samples give equal bytes.
 
-    A dot of a key is written as `_`: webdataset takes what follows the first one for the part. Files
-    have mode 644, no owner, time 0. Raises BadInput for a name above 100 bytes.
+    Dots in a key are written as `_`, since webdataset starts the part after the first dot. Files have
+    mode 644, no owner, time 0. Raises BadInput for a name above 100 bytes.
     """
     with tarfile.open(path, "w", format=tarfile.USTAR_FORMAT) as tar:
         for key, parts in samples:
@@ -47,10 +47,10 @@ def write_samples(path: Path, samples: Iterable[tuple[str, Mapping[str, bytes]]]
 
 
 def members_of_tar(tar: Buffer, place: str) -> Iterator[Member]:
-    """The files of a tar in its order; BadInput, naming place, where it is damaged or cut short.
+    """The files of a tar in its order; BadInput, naming place, if it is damaged or cut short.
 
-    Only plain files with short names, as `pack` writes them: not a reader for any tar. Lazy; the
-    file's bytes are not read, only headers.
+    Only plain files with short names, as `pack` writes them: not a reader for any tar. Lazy; reads
+    only headers, not the files' bytes.
     """
     position = 0
     while position + _BLOCK <= len(tar):
@@ -66,15 +66,15 @@ def members_of_tar(tar: Buffer, place: str) -> Iterator[Member]:
             raise BadInput(place, f"byte {position}", "not a shard: damaged") from None
         yield Member(name, position + _BLOCK, n_bytes)
         position += _BLOCK + n_bytes + (-n_bytes % _BLOCK)
-    # Two empty blocks were to come.
+    # A tar ends with two empty blocks.
     raise BadInput(place, "", "ends too soon: truncated", hint="copy or pack it again")
 
 
-Parts = dict[str, Member]  # a view's parts by what follows its key
+Parts = dict[str, Member]  # a view's parts by the name after its key
 
 
 class OpenShard:
-    """One tar, mapped or in memory, and where each view's parts lie."""
+    """One tar, mapped or in memory, and the positions of each view's parts."""
 
     def __init__(self, tar: Buffer, place: str) -> None:
         self._tar = tar

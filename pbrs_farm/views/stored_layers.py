@@ -22,7 +22,7 @@ Stored = dict[str, NDArray[Any]]  # array name -> (H, W) or (H, W, 3)
 
 @dataclass(frozen=True, slots=True)
 class StoredArray:
-    """How an array is stored: its type, unit, what a pixel without a value holds, the view's file."""
+    """How an array is stored: type, unit, value of empty pixels, and the view's file."""
 
     dtype: str
     unit: str
@@ -47,7 +47,7 @@ STORED: Final = {
 
 @dataclass(frozen=True, slots=True)
 class ViewFacts:
-    """Which view it is and what its camera is, at the size it is stored in."""
+    """A view's id and camera, at its stored size."""
 
     house: str
     view: str
@@ -58,7 +58,7 @@ class ViewFacts:
 
     @property
     def id(self) -> str:
-        """<house>/<view>, one of its kind in a root."""
+        """<house>/<view>, unique in a root."""
         return f"{self.house}/{self.view}"
 
     def k_at(self, size: Size) -> NDArray[np.float64]:
@@ -70,8 +70,8 @@ class ViewFacts:
 def facts_from_json(row: Any, place: str) -> ViewFacts:
     """ViewFacts of view.json, or of a packed view's; BadInput, naming place, for anything else.
 
-    Checks that K is (3, 3), the pose (4, 4) and the size at least 1 pixel, and nothing else of the
-    row. A view without a room has "".
+    Checks only that K is (3, 3), the pose (4, 4) and the size at least 1 pixel. The room of a view
+    without one is "".
     """
     try:
         k, pose = (
@@ -89,7 +89,7 @@ def facts_from_json(row: Any, place: str) -> ViewFacts:
 
 
 def array_names(layers: tuple[str, ...]) -> tuple[str, ...]:
-    """The arrays that layers are read from: valid comes with normal.
+    """The arrays needed for layers: valid comes with normal.
 
     In the order of layers, each once.
 
@@ -101,10 +101,9 @@ def array_names(layers: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def check_array(name: str, array: NDArray[Any], size: Size, place: str) -> NDArray[Any]:
-    """array itself, where it has the type and size it must have; BadInput, naming place, if not.
+    """The array unchanged, if it has the right type and size; BadInput, naming place, if not.
 
-    What was stored in 16 bits and comes in 8, or as 8 bits spread over 16, was ruined by a program
-    on the way: never used.
+    Refuses a 16-bit array reduced to 8 bits, or to 8 bits spread over 16, by a program on the way.
     """
     want = STORED[name]
     shape = (size[1], size[0], 3) if want.channels == 3 else (size[1], size[0])
@@ -145,7 +144,7 @@ def _resized(name: str, array: NDArray[Any], width: int, height: int) -> NDArray
 
 
 def sample_of_stored(facts: ViewFacts, stored: Stored, request: SampleRequest) -> Sample:
-    """The Sample of a view's stored arrays, at the size asked for.
+    """The Sample of a view's stored arrays, at the requested size.
 
     Depth becomes float32 metres (0 = nothing), normals unit vectors in request.axes, boundary and
     valid bool; colour, class40 and instance stay as stored. K follows the size.
@@ -155,7 +154,7 @@ def sample_of_stored(facts: ViewFacts, stored: Stored, request: SampleRequest) -
     arrays: dict[str, Any] = {
         n: stored[n] for n in ("colour", "class40", "instance") if n in stored
     }
-    # Turn whole numbers into metres, unit vectors and yes or no.
+    # Convert whole numbers to metres, unit vectors and booleans.
     if "depth" in stored:
         arrays["depth"] = stored["depth"].astype(np.float32) / np.float32(1000)
     if "boundary" in stored:

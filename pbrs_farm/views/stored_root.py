@@ -35,7 +35,7 @@ from pbrs_farm.views.stored_layers import (
 from pbrs_farm.views.view_sample import MODES, Sample, SampleRequest
 from pbrs_farm.views.views import ViewRef, Views
 
-_TABLE: Final = "view.json"  # written when all else of a view is there
+_TABLE: Final = "view.json"  # the last file written of a view
 _CAMERAS: Final = "cameras.json"
 
 
@@ -44,7 +44,7 @@ class StoredRoot:
 
     def __init__(self, store: Store) -> None:
         self._store = store
-        # A folder is named in messages as people write it.
+        # Messages show a folder as a path, not a URL.
         self._place = str(store.root) if isinstance(store, FolderStore) else store.url
         self._facts: dict[ViewRef, ViewFacts] = {}  # filled on demand
         self._files = _files_of_views(store)
@@ -61,7 +61,7 @@ class StoredRoot:
 
     @property
     def unfinished(self) -> dict[str, str]:
-        """id -> why, of views that a run has begun only."""
+        """id -> reason, for unfinished views of a run."""
         return {r.id: f"no {_TABLE}" for r, files in self._files.items() if _TABLE not in files}
 
     def lacks(self, ref: ViewRef, request: SampleRequest) -> str:
@@ -99,7 +99,7 @@ class StoredRoot:
         for name in array_names(request.layers):
             key = keys.view_key(ref.house, ref.view, _file(name, request.mode))
             place = f"{self.url}/{key}"
-            # Labels are undone here; other PNGs, by other filters, are left to OpenImageIO.
+            # Decode labels here; PNGs with other filters are left to OpenImageIO.
             data = self._get(key)
             array = array_of_rows(data, place)
             array = array_from_png(data, place) if array is None else array
@@ -119,7 +119,7 @@ class StoredRoot:
     def kept_by(self, run: str) -> frozenset[ViewRef]:
         key = keys.selection_key(run, "jsonl")
         try:
-            # A line per view says whether it is kept.
+            # Each line has the view and `kept`.
             rows = [json.loads(line) for line in self._store.get(key).splitlines()]
             return frozenset(ViewRef(row["house"], row["view"]) for row in rows if row["kept"])
         except ObjectMissing:
@@ -131,8 +131,7 @@ class StoredRoot:
     def credits(self, houses: Iterable[str]) -> tuple[str, ...]:
         """The lines that every product of these houses must carry, each once.
 
-        In the order of the houses; of dressed homes those of the whole root, since they are kept in
-        one file.
+        In the order of the houses. Dressed homes add the credits of the whole root, which share one file.
         """
         lines = [attribution(self._store, house) for house in houses]
         # Dressed homes have their credits in a separate file.
@@ -149,7 +148,7 @@ class StoredRoot:
             return None
 
     def source_of(self, house: str) -> dict[str, str]:
-        """Where a house came from and under which terms, as its house.json says; {} where none does."""
+        """Origin and terms of a house, from its house.json; {} if missing."""
         try:
             row = json.loads(self._get(keys.house_key(house, "house.json")))["source"]
             return {str(name): str(value) for name, value in row.items()}
@@ -248,10 +247,10 @@ def _copy_cameras(of: Store, to: Store, house: str) -> None:
 
 
 def views_of_root(store: Store) -> Views:
-    """The finished views of an output root; those a run has begun only are in left_out.
+    """The finished views of an output root; unfinished views are in left_out.
 
-    BadInput where the folder has no finished view, with a word about views that a run has begun.
-    Lists the store once; files are read when they are asked for.
+    BadInput if the folder has no finished view, with a word about unfinished ones. Lists the store once;
+    files are read on demand.
     """
     root = StoredRoot(store)
     refs = root.refs
@@ -268,7 +267,7 @@ def _file(name: str, mode: str) -> str:
 
 
 def _files_of_views(store: Store) -> dict[ViewRef, set[str]]:
-    """View -> its files. A folder is looked at; elsewhere the root's manifest, where there is one."""
+    """View -> its files, by listing a folder; for other stores from the manifest, if present."""
     files: dict[ViewRef, set[str]] = {}
     for key in _keys_of(store):
         place = keys.parse_house_key(key)

@@ -43,12 +43,12 @@ class Sample:
 
     @property
     def size(self) -> Size:
-        """Width and height of the first array there is, in pixels; (0, 0) without any."""
+        """Width and height of the first array, in pixels; (0, 0) without arrays."""
         first = next(iter(self.arrays().values()), np.zeros((0, 0)))
         return int(first.shape[1]), int(first.shape[0])
 
     def arrays(self) -> dict[str, NDArray[Any]]:
-        """The arrays there are, by field; valid beside normal.
+        """The arrays that are not None, by field; valid beside normal.
 
         The arrays themselves, not copies, in the order of LAYERS.
         """

@@ -37,12 +37,12 @@ class ViewRef:
 
     @property
     def is_object(self) -> bool:
-        """A single model without context, not a view of a house."""
+        """True for a single model without context, False for a view of a house."""
         return self.house.startswith("object_")
 
 
 class ViewSource(Protocol):
-    """Where views are read from: an output root in a store, or shards. Can be sent to a process."""
+    """A source of views: an output root in a store, or shards. Can be sent to a process."""
 
     @property
     def url(self) -> str:
@@ -54,11 +54,11 @@ class ViewSource(Protocol):
         ...
 
     def modes(self, ref: ViewRef) -> tuple[str, ...]:
-        """The lighting modes the view has a picture of."""
+        """The lighting modes of the view's pictures."""
         ...
 
     def facts(self, ref: ViewRef) -> ViewFacts:
-        """The view's camera; BadInput where it cannot be read."""
+        """The view's camera; raises BadInput if it cannot be read."""
         ...
 
     def table(self, ref: ViewRef) -> dict[str, Any]:
@@ -66,11 +66,11 @@ class ViewSource(Protocol):
         ...
 
     def read(self, ref: ViewRef, request: SampleRequest) -> Sample:
-        """The arrays asked for; BadInput where one is missing, damaged or of the wrong type."""
+        """The requested arrays; raises BadInput if one is missing, damaged or of the wrong type."""
         ...
 
     def layers(self, ref: ViewRef) -> tuple[str, ...]:
-        """The layers the view has, by the names of core/layers.py; of shards those packed."""
+        """The view's layers, by the names of core/layers.py; for shards, the packed ones."""
         ...
 
     def layer(self, ref: ViewRef, name: str) -> NDArray[Any]:
@@ -78,11 +78,11 @@ class ViewSource(Protocol):
         ...
 
     def kept_by(self, run: str) -> frozenset[ViewRef]:
-        """The views that a selection keeps; BadInput where there is no such run."""
+        """The views that a selection keeps; raises BadInput if there is no such run."""
         ...
 
     def split_of(self, ref: ViewRef, shares: SplitShares | None) -> str:
-        """The split the view's house falls into; shares None: as packed, else 80/10/10."""
+        """The split of the view's house; shares None: as packed, else 80/10/10."""
         ...
 
     def save(self, refs: Sequence[ViewRef], place: str | Path) -> None:
@@ -116,7 +116,7 @@ class Frame:
 
     @property
     def modes(self) -> tuple[str, ...]:
-        """The lighting modes it has a picture of.
+        """The lighting modes of its pictures.
 
         >>> frame.modes
         ('opengl_dl',)
@@ -188,7 +188,7 @@ class Frame:
 
     @property
     def colour(self) -> NDArray[np.uint8]:
-        """(H, W, 3) sRGB of the best mode there is: mlt_il_ol, else mlt_ol, else an OpenGL mode.
+        """(H, W, 3) sRGB of the best available mode: mlt_il_ol, else mlt_ol, else an OpenGL mode.
 
         >>> frame.colour.shape, frame.colour.dtype
         ((48, 64, 3), dtype('uint8'))
@@ -378,7 +378,7 @@ class Frame:
 class Views(Sequence[Frame]):
     """Frames of one source, in the order of their ids.
 
-    left_out: id -> why, of views that `only` looked at and could not keep.
+    left_out: id -> reason, for views that `only` had to omit.
 
         >>> views = pf.render(home, [camera], modes=[])
         >>> len(views)
@@ -476,7 +476,7 @@ class Views(Sequence[Frame]):
 
     @property
     def homes(self) -> tuple[str, ...]:
-        """The ids of houses (and objects without context) there are views of.
+        """The ids of the views' houses (and objects without context).
 
         >>> views.homes == (home.id,)
         True
@@ -485,7 +485,7 @@ class Views(Sequence[Frame]):
 
     @property
     def modes(self) -> tuple[str, ...]:
-        """The lighting modes that some view has.
+        """The lighting modes of at least one view.
 
         >>> views.modes
         ('opengl_dl',)

@@ -1,1 +1,1 @@
-"""The forms of export: a module a form, which is called as the form and ends `FORM = ...`."""
+"""The forms of export: one module per form, named like the form and ending in `FORM = ...`."""

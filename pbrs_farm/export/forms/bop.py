@@ -121,11 +121,11 @@ def _write_models(folder: Path, meshes: dict[str, _ModelMesh], numbers: dict[str
 
 
 def _diameter(points: F64) -> float:
-    """The largest distance of two vertices."""
+    """The largest distance between two vertices."""
     try:
         points = points[ConvexHull(points).vertices]
     except QhullError:
-        points = np.unique(points, axis=0)[:2000]  # flat: of its vertices themselves
+        points = np.unique(points, axis=0)[:2000]  # flat: use the vertices themselves
     return float(pdist(points).max())
 
 
@@ -202,7 +202,7 @@ def _write_scene(
 def _masks(
     view: ChosenView, item: Item, instance: int, cut_outs: CutOuts
 ) -> tuple[NDArray[Any], NDArray[Any]]:
-    """(H, W) bool where the item is when alone, and where it is seen."""
+    """(H, W) bool masks of the item alone, and of its visible part."""
     facts = view.facts
     (fx, _skew, cx), (_zero, fy, cy), _last = facts["K"]
     intrinsics = Intrinsics(facts["width_px"], facts["height_px"], fx, fy, cx, cy)

@@ -68,7 +68,7 @@ def _image(view: ChosenView, number: int, out: Path) -> dict[str, Any]:
         "view": view.id,
         **camera_facts(view.facts),
     }
-    # Copy the picture of the best mode there is.
+    # Copy the picture of the best available mode.
     if view.picture is not None:
         name = f"images/{view.house.id}/{view.id}.png"
         (out / name).parent.mkdir(parents=True, exist_ok=True)

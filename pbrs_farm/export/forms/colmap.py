@@ -14,8 +14,8 @@ from pbrs_farm.export.chosen_view import Choice, ChosenView, intrinsics_of, requ
 from pbrs_farm.export.form import Convention, ViewForm
 from pbrs_farm.export.sequences import pose_opencv, required_picture
 
-_STEP_PX: Final = 16  # between the pixels of a view that give points
-_NO_POINT: Final = ("0.5 0.5 -1",)  # points of a view without a surface: a pixel of no point
+_STEP_PX: Final = 16  # spacing of the pixels of a view with points
+_NO_POINT: Final = ("0.5 0.5 -1",)  # points of a view without a surface: a pixel without a point
 
 
 def write_colmap(views: list[ChosenView], out: Path, _choice: Choice) -> None:

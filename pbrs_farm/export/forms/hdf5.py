@@ -36,7 +36,7 @@ def write_hdf5(views: list[ChosenView], out: Path, _choice: Choice) -> None:
                     file.create_dataset(name, data=value, compression="gzip")
         row = {"file": f"{number}.hdf5", "house": view.house.id, "view": view.id}
         index.append(json.dumps(row))
-    # Say which view each file holds.
+    # The index names the view of each file.
     (out / "index.jsonl").write_text("\n".join(index) + "\n", "utf-8")
 
 
@@ -51,7 +51,7 @@ def _h5py() -> Any:
 
 def _datasets(view: ChosenView) -> dict[str, NDArray[Any] | str]:
     data: dict[str, NDArray[Any] | str] = {}
-    # The last written is the first of PICTURES.
+    # The first of PICTURES is written last.
     for mode in reversed(PICTURES):
         if view.has(mode):
             data[str(mode)] = data["colors"] = view.array(mode)

@@ -1,10 +1,10 @@
-"""The layout of the Hypersim data set (Roberts et al. 2021), which many programs load depth and light from.
+"""The layout of the Hypersim data set (Roberts et al. 2021), a common input for training on depth and light.
 
     ai_VVV_NNN/images/scene_cam_XX_{final_hdf5,final_preview,geometry_hdf5}/frame.IIII.<what>
     ai_VVV_NNN/_detail/{metadata_scene.csv,metadata_cameras.csv,cam_XX,mesh}
     metadata_images_split_scene_v1.csv  metadata_camera_parameters.csv  index.csv  README.md
 
-Effects: reads views, writes files. formats/hypersim.py says what its cameras and files are.
+Effects: reads views, writes files. formats/hypersim.py describes its cameras and files.
 """
 
 from __future__ import annotations
@@ -39,10 +39,10 @@ from pbrs_farm.regular_files import MAX_SCENE_BYTES, read_regular
 from pbrs_farm.run.relight import linear_aovs
 from pbrs_farm.transport.develop.mode_pictures import denoise_aovs
 
-_MOST_SCENES: Final = 999  # of a volume
-_MOST_LIGHT: Final = 65504.0  # of a half float
+_MOST_SCENES: Final = 999  # scenes of a volume
+_MOST_LIGHT: Final = 65504.0  # maximum of a half float
 _INT16: Final = 32767
-_INDEX: Final = "index.csv"  # ours: which view each frame is
+_INDEX: Final = "index.csv"  # not in Hypersim: the view of each frame
 _CREDITS: Final = "ATTRIBUTION.txt"
 _SPLIT_FIELDS: Final = (
     "scene_name",
@@ -183,7 +183,7 @@ def _parameters(scene: str, view: ChosenView) -> dict[str, Any]:
 
 
 def _frame(view: ChosenView) -> dict[tuple[str, str], NDArray[Any] | bytes]:
-    """(folder, name) -> what a frame's file holds: an array of HDF5, or a JPEG."""
+    """(folder, name) -> the content of a frame's file: an array for HDF5, or a JPEG."""
     light, geometry = _light(view), _geometry(view)
     files: dict[tuple[str, str], NDArray[Any] | bytes] = {}
     for name, array in light.items():
@@ -240,7 +240,7 @@ def _in_world(local: F32, pose: F64, turn: F64) -> F32:
 
 
 def _light(view: ChosenView) -> dict[str, NDArray[np.float16]]:
-    """color, and of intrinsic layers what there is; color == reflectance x illumination + residual where all are.
+    """color and the available intrinsic layers; with all of them, color == reflectance x illumination + residual.
 
     No residual is negative (`intrinsic_parts`).
     """
@@ -258,7 +258,7 @@ def _light(view: ChosenView) -> dict[str, NDArray[np.float16]]:
 
 
 def _colour(view: ChosenView) -> F32 | None:
-    """(H, W, 3) linear radiance of the light that the picture shows, as denoised as the picture; None without any."""
+    """(H, W, 3) linear radiance of the picture, denoised like it; None without any."""
     file = view.entry.file(RADIANCE_EXR)
     if file is None:
         return None
@@ -292,7 +292,7 @@ def _table(file: Path) -> list[dict[str, str]]:
 
 
 def join_splits(out: Path, splits: tuple[str, ...], _choice: Choice) -> None:
-    """Join the splits to one root, as the data set has it, and write the card."""
+    """Join the splits to one root, as in Hypersim, and write the card."""
     names = (hypersim.SPLIT_CSV, hypersim.CAMERAS_CSV, _INDEX)
     tables: dict[str, list[dict[str, Any]]] = {name: [] for name in names}
     credits: dict[str, None] = {}

@@ -20,9 +20,9 @@ _SEEN: Final = 0  # of the layers of occlusion
 def write_kitti(views: list[ChosenView], out: Path, _choice: Choice) -> None:
     """image_2/ (the left, or a rig's first camera) and image_3/ (right), disp_*_0/, flow_*/, calib/.
 
-    <6 digits>_10.png is a frame, <6 digits>_11.png the next one of its sequence. `occ` has every
-    surface, `noc` those that the other picture sees. index.txt: number, house, view. Whatever a
-    view lacks is left out; BadInput where none has flow or disparity.
+    <6 digits>_10.png is a frame, <6 digits>_11.png the next one of its sequence. `occ` has every surface,
+    `noc` only those visible in the other picture. index.txt: number, house, view. Files without data are
+    omitted; BadInput if no view has flow or disparity.
     """
     rows: list[str] = []
     for house, frames in frames_by_house(views).items():
@@ -73,9 +73,9 @@ def _labels(view: ChosenView) -> dict[str, bytes]:
 def kitti_flow(flow: NDArray[np.float32], valid: NDArray[np.bool_]) -> NDArray[np.uint16]:
     """(H, W, 3) uint16: 64 x + 2**15, 64 y + 2**15, 1; 0 in all three where not valid (H, W).
 
-    flow is (H, W, 2) px, x right and y down, from the first picture to the second. Flow beyond what
-    16 bits hold (512 px) is marked as not valid. The order of channels is that of KITTI's files,
-    read as RGB.
+    flow is (H, W, 2) px, x right and y down, from the first picture to the second. Flow beyond the range
+    of 16 bits (512 px) is marked as not valid. The order of channels is that of KITTI's files, read as
+    RGB.
     """
     steps = np.rint(flow.astype(np.float64) * 64) + 2**15
     valid = valid & ((steps >= 0) & (steps <= 65535)).all(-1)

@@ -1,9 +1,9 @@
-"""Corners of rooms in panoramas, as LayoutNet and HorizonNet train from.
+"""Corners of rooms in panoramas, the training data of LayoutNet and HorizonNet.
 
     img/<house>__<view>.png  label_cor/<house>__<view>.txt
 
 Effects: reads views, writes files. Pictures are turned upright and along the room's walls, as those
-programs want them; a label is the polygon of the camera's room, at its floor and at its nominal
+programs need them; a label is the polygon of the camera's room, at its floor and at its nominal
 ceiling.
 """
 
@@ -36,9 +36,9 @@ def write_layoutnet(views: list[ChosenView], out: Path, _choice: Choice) -> None
     """img/ (1024 x 512) and label_cor/.
 
     A label has two lines a corner, `x y_ceiling` and `x y_floor`, corner by corner to the right, the
-    least x first; pixels count from the centre of the first one. Other views than panoramas (lens
-    equirect), those without a picture and those whose room's polygon does not enclose them are named
-    in left_out.txt; BadInput where all are.
+    least x first; pixels count from the centre of the first one. left_out.txt names views that are not
+    panoramas (lens equirect), have no picture, or are outside their room's polygon; BadInput if no view
+    remains.
     """
     shown = [view for view in views if _is_fit(view)]
     if not shown:
@@ -119,7 +119,7 @@ def corner_pixels(view: ChosenView, axes: F64) -> F64:
     local = (_corners(view) - pose_opencv(view)[:3, 3]) @ axes
     plane = equirect_of_directions(local.reshape(-1, 3)).reshape(-1, 2, 2)
     pixels = (plane / [2 * np.pi, np.pi] + 0.5) * [WIDTH_PX, HEIGHT_PX] - 0.5
-    pixels[:, 1, 0] = pixels[:, 0, 0]  # one above the other, to the last bit
+    pixels[:, 1, 0] = pixels[:, 0, 0]  # exactly above each other
     # Around an eye inside it a polygon turns once: to the right, or else backwards.
     steps = np.diff(plane[:, 0, 0], append=plane[:1, 0, 0])
     turned = np.sum((steps + np.pi) % (2 * np.pi) - np.pi)

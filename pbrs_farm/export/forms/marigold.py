@@ -41,12 +41,12 @@ _LISTS: Final = {
 def write_marigold(views: list[ChosenView], out: Path, _choice: Choice) -> None:
     """Write the files above.
 
-    A line is a sample, its paths count from the list's folder. Depth is uint16 PNG, mm along the
-    axis, 0 = nothing or 65.535 m and more. Normals are float32 (H, W, 3), unit, x right, y up,
-    z towards the camera, 0 for nothing; a view without `normal` is in the list of depth alone. A view with `albedo`, `shading` and `residual` is a sample of light, as Marigold has it of
-    Hypersim: float32 (H, W, 3), linear, none negative. One with `albedo`, `roughness` and `metallic`
-    is a sample of materials, as Marigold has it of InteriorVerse. Views without a picture are named
-    in left_out.txt; BadInput where all are.
+    A line is a sample; its paths are relative to the list's folder. Depth is uint16 PNG, mm along the axis,
+    0 = nothing or 65.535 m and more. Normals are float32 (H, W, 3), unit, x right, y up, z towards the
+    camera, 0 for nothing; a view without `normal` is in the list of depth alone. A view with `albedo`,
+    `shading` and `residual` is a sample of light, like Marigold's of Hypersim: float32 (H, W, 3), linear,
+    not negative. One with `albedo`, `roughness` and `metallic` is a sample of materials, like Marigold's of
+    InteriorVerse. left_out.txt names views without a picture; BadInput if no view has one.
     """
     lines: dict[str, list[str]] = {name: [] for name in _LISTS}
     shown = [view for view in views if view.picture is not None]
@@ -76,7 +76,7 @@ def write_marigold(views: list[ChosenView], out: Path, _choice: Choice) -> None:
 
 
 def _write_lighting(view: ChosenView, out: Path) -> list[str]:
-    """Write albedo, shading and residual; their paths, [] of a view without."""
+    """Write albedo, shading and residual; returns their paths, [] for a view without them."""
     parts = intrinsic_parts(view)
     if parts is None:
         return []
@@ -87,7 +87,7 @@ def _write_lighting(view: ChosenView, out: Path) -> list[str]:
 
 
 def _write_appearance(view: ChosenView, out: Path) -> list[str]:
-    """Write albedo (sRGB), material (linear; R roughness, G metallic, B 0) and the mask of what counts."""
+    """Write albedo (sRGB), material (linear; R roughness, G metallic, B 0) and the mask of valid pixels."""
     if not all(view.has(name) for name in ("albedo", "roughness", "metallic", "valid")):
         return []
     parts = "albedo_{}.png", "material_{}.exr", "mask_{}.png"

@@ -216,7 +216,7 @@ def _light(body: ET.Element, lamp: Lamp, turn: F64, place: F64) -> None:
 
 
 def _settle(model: _Model, path: Path) -> list[str]:
-    """Place the loose bodies where they come to rest; returns the names of those fixed instead."""
+    """Move the loose bodies to their rest poses; returns the names of those fixed instead."""
     from pbrs_farm.quiet_mujoco import mujoco
 
     fixed: list[str] = []

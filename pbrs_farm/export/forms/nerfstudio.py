@@ -71,7 +71,7 @@ def _frame(view: ChosenView, folder: Path) -> dict[str, Any]:
         "cx": k[0, 2],
         "cy": k[1, 2],
     }
-    # Coefficients go by OpenCV's names.
+    # Coefficients have OpenCV's names.
     lens = intrinsics_of(facts).lens
     row |= dict(zip(COEFFICIENTS[lens.model], lens.coefficients, strict=True))
     files = {"images": view.data(picture)}

@@ -1,9 +1,9 @@
-"""Point clouds: a binary PLY a view, a point for each pixel that sees a surface.
+"""Point clouds: a binary PLY a view, a point for each pixel with a surface.
 
     <house>/<view>.ply
 
-Effects: reads views, writes files. A vertex has x y z in metres of the home's world (y up), and
-what the view has of: red green blue of its picture, nx ny nz in world axes, label and instance.
+Effects: reads views, writes files. A vertex has x y z in metres of the home's world (y up) and, if the
+view has them, red green blue of its picture, nx ny nz in world axes, label and instance.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from pbrs_farm.export.chosen_view import Choice, ChosenView, intrinsics_of
 from pbrs_farm.export.form import Convention, ViewForm
 from pbrs_farm.export.sequences import pose_opencv
 
-_FARTHEST_MM: Final = 65535  # of depth.png: so far, or farther
+_FARTHEST_MM: Final = 65535  # value of depth.png for this depth or more
 _TYPES: Final = {"float32": "float", "uint8": "uchar", "uint16": "ushort"}  # PLY's names
 
 
@@ -39,7 +39,9 @@ def write_ply(views: list[ChosenView], out: Path, choice: Choice) -> None:
 
 
 def point_cloud(view: ChosenView) -> NDArray[np.void]:
-    """(N,) records of the pixels that see a surface, row by row: x y z float32, and where the view has them red green blue, nx ny nz, label, instance."""
+    """(N,) records of the pixels with a surface, row by row: x y z float32, and if available red green blue,
+    nx ny nz, label, instance.
+    """
     points, is_seen = _seen_points(view)
     columns: dict[str, NDArray[Any]] = dict(zip("xyz", points.astype(np.float32).T, strict=True))
     if view.has("normal"):
@@ -77,7 +79,7 @@ def _header(view: ChosenView, choice: Choice, vertices: NDArray[np.void]) -> byt
 
 
 def _seen_points(view: ChosenView) -> tuple[F64, Mask]:
-    """(N, 3) points in the world, metres, and (H, W) the pixels that they are of."""
+    """(N, 3) points in the world, metres, and the (H, W) mask of their pixels."""
     if view.has("position"):
         position = view.array("position")
         is_seen = np.asarray(view.array("depth") > 0) & np.isfinite(position).all(-1)

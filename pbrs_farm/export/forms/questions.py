@@ -42,11 +42,11 @@ _SCHEMA: Final = pa.schema(
 
 
 def write_questions(views: list[ChosenView], out: Path, choice: Choice) -> None:
-    """Write questions, answers and references of views, and the pictures and films they are about.
+    """Write questions, answers and references of views, and their pictures and films.
 
-    A walk is one film and its questions are about all of it; every other view is a picture. Views
-    without a picture, and models without a home, are left out. BadInput
-    where a house is damaged, MachineFailed for walks without PyAV.
+    A walk is one film and its questions are about all of it; every other view is a picture. Views without
+    a picture, and models without a home, are left out. Raises BadInput for a damaged house, MachineFailed
+    for walks without PyAV.
     """
     shown = [view for view in views if view.picture is not None]
     asker, questions, media = Asker(), [], {}
@@ -66,7 +66,7 @@ def write_questions(views: list[ChosenView], out: Path, choice: Choice) -> None:
 
 
 def _write_medium(clip: Clip, out: Path) -> str:
-    """The clip's picture or film, at the place where readers of VSI-Bench look: <dataset>/<scene_name>."""
+    """The clip's picture or film, at the path of VSI-Bench's readers: <dataset>/<scene_name>."""
     mode = required_picture(clip.views[0], "questions")
     if not clip.is_walk:
         name = f"{DATASET}/{clip.name}.png"
@@ -101,7 +101,7 @@ def _write_rows(questions: Sequence[Question], media: dict[str, str], out: Path)
 
 
 def _conversation(number: int, question: Question, medium: str) -> dict[str, Any]:
-    """A record as LLaVA and SIMS-V train on: what a person says, what the model should say."""
+    """A training record of LLaVA and SIMS-V: the person's question and the model's answer."""
     text, answer = question.text, question.ground_truth
     if question.options:
         text = "\n".join([text, *question.options])

@@ -15,7 +15,7 @@ import numpy as np
 from pbrs_farm.export.chosen_view import Choice, ChosenView, require_lens
 from pbrs_farm.export.form import Convention, ViewForm
 
-# Layer -> where the published data has it.
+# Layer -> its path in the published data.
 FILES: Final = {
     "mlt_il_ol": "mlt_v2/{house}/{id}_mlt.png",
     "opengl_il": "opengl_ver2/{house}/{id}_color.png",

@@ -136,7 +136,7 @@ class _World:
 
 
 def _model_names(pieces: Iterable[Piece]) -> list[str]:
-    """The pieces' names, made different from those of SDF and the building."""
+    """The pieces' names, different from reserved names of SDF and the building's."""
     taken, names = set(_RESERVED), []
     for piece in pieces:
         name = piece.name

@@ -1,4 +1,4 @@
-"""TAP-Vid's form: films with point tracks, as its DAVIS file holds them. Effects: reads views, writes files.
+"""TAP-Vid's form: films with point tracks, as in its DAVIS file. Effects: reads views, writes files.
 
 Doersch et al. 2022, TAP-Vid: A Benchmark for Tracking Any Point in a Video.
 """

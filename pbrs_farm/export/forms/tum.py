@@ -16,7 +16,7 @@ from pbrs_farm.export.form import Convention, ViewForm, name_left_out
 from pbrs_farm.export.sequences import frames_by_house, pose_opencv, required_picture
 from pbrs_farm.images import png_from_array
 
-_STEPS_PER_M: Final = 5000  # of TUM's depth
+_STEPS_PER_M: Final = 5000  # steps per metre of TUM's depth
 
 
 def write_tum(views: list[ChosenView], out: Path, _choice: Choice) -> None:

@@ -250,7 +250,7 @@ class _Stage:
             mesh.CreateFaceVertexIndicesAttr(triangles.ravel().tolist())
             mesh.CreateSubdivisionSchemeAttr("none")
             mesh.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(np.stack([points.min(0), points.max(0)])))
-            mesh.CreatePurposeAttr("guide")  # seen by physics alone
+            mesh.CreatePurposeAttr("guide")  # for physics only
             UsdPhysics.CollisionAPI.Apply(mesh.GetPrim())
             UsdPhysics.MeshCollisionAPI.Apply(mesh.GetPrim()).CreateApproximationAttr("convexHull")
 

@@ -13,9 +13,9 @@ from pbrs_farm.installation import need
 
 
 def write_usdz(home: ExportedHome, folder: Path) -> None:
-    """<house id>.usdz, which holds its textures.
+    """<house id>.usdz, which includes its textures.
 
-    Written by way of a .usdc in a temporary folder. Needs the module pxr; MachineFailed where the
+    Written by way of a .usdc in a temporary folder. Needs the module pxr; raises MachineFailed if the
     package could not be written.
     """
     need("pxr")

@@ -69,13 +69,13 @@ def _box_lines(view: ChosenView) -> Iterable[str]:
 
 
 def numbered_objects(view: ChosenView) -> Iterable[tuple[int, dict[str, Any]]]:
-    """The instances that count as objects, each with its class's number.
+    """The instances counted as objects, each with its class's number.
 
-    Numbers count classes from 0 in the order of class_names, as YOLO wants, and are not the
-    classes' ids. Nothing, walls, floors and ceilings are left out of NYU40's.
+    Numbers count classes from 0 in the order of class_names, as YOLO wants, and are not the classes' ids.
+    With NYU40's classes, nothing, walls, floors and ceilings are left out.
     """
     numbers = {k: number for number, k in enumerate(view.choice.class_names)}
-    # Of a user's classes every one counts: the table says which.
+    # All user-defined classes count: the table selects them.
     none = _NO_BOX if view.choice.classes is None else (0,)
     for row in view.facts["instances"]:
         class_id = view.class_of(row)
@@ -99,8 +99,8 @@ def names_lines(choice: Choice) -> list[str]:
 def write_yaml(out: Path, splits: tuple[str, ...], fields: list[str]) -> None:
     """Write data.yaml: the folders of the splits, if any, and lines of other fields.
 
-    Folders count from data.yaml's own. Ultralytics wants train and val: one that has no home is
-    the other's, and a comment says so.
+    Folders are relative to data.yaml. Ultralytics needs train and val: if one has no home, it uses the
+    other's folder, and a comment says so.
     """
     folders = {name: f"{name}/images" for name in splits} or {"train": "images", "val": "images"}
     remarks = [] if splits else ["# without --split, train and val are all views"]

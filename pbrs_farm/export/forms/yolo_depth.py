@@ -19,9 +19,8 @@ _FIELDS: Final = ["nc: 1", "names:", "  0: depth", "depth_scale: 1000"]
 def write_yolo_depth(views: list[ChosenView], out: Path, _choice: Choice) -> None:
     """images/<house>__<view>.png and depth/<house>__<view>.png, or .npy.
 
-    PNG: uint16, mm along the axis, 0 where there is nothing or it is 65.535 m away or more. NPY
-    where depth_z is exported and depth is not: float32 metres, 0 = nothing. BadInput for a lens
-    whose depth runs along the ray.
+    PNG: uint16, mm along the axis, 0 for nothing or for 65.535 m and more. NPY if depth_z is exported and
+    depth is not: float32 metres, 0 = nothing. Raises BadInput for a lens whose depth runs along the ray.
     """
     write_pictures_beside(views, out, "depth", _depth)
 

@@ -25,7 +25,7 @@ def _polygon_lines(view: ChosenView) -> Iterable[str]:
     instance = view.array("instance")
     height, width = instance.shape
     for number, row in numbered_objects(view):
-        # The mask fills its box: look nowhere else.
+        # Crop to the box of the mask.
         x0, y0, x1, y1 = row["box2d"]
         for ring in mask_polygons(instance[y0:y1, x0:x1] == row["id"]):
             shares = (ring + np.array([x0, y0])) / np.array([width, height])

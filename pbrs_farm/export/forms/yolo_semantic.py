@@ -16,14 +16,14 @@ from pbrs_farm.export.form import Convention, ViewForm
 from pbrs_farm.export.forms.yolo import names_lines, write_pictures_beside, write_yaml
 from pbrs_farm.images import png_from_array
 
-_IGNORED: Final = 255  # of a mask: no loss, no metric
+_IGNORED: Final = 255  # mask value without loss or metric
 
 
 def write_yolo_semantic(views: list[ChosenView], out: Path, choice: Choice) -> None:
     """images/<house>__<view>.png and masks/<house>__<view>.png.
 
-    A mask is uint8: the class's number in data.yaml (NYU40 id - 1; of a user's table its place among
-    the ids), 255 where nothing is or it has no class. BadInput for more than 255 classes.
+    A mask is uint8: the class's number in data.yaml (NYU40 id - 1; for a user's table its index among the
+    ids), 255 for pixels without a surface or class. Raises BadInput for more than 255 classes.
     """
     if len(choice.class_names) > _IGNORED:
         problem = f"{len(choice.class_names)} classes: a mask holds {_IGNORED}"

@@ -1,4 +1,4 @@
-"""croissant.json: what MLCommons' readers need of the Parquet files. Effects: reads the files."""
+"""croissant.json: description of the Parquet files for MLCommons' readers. Effects: reads the files."""
 
 from __future__ import annotations
 

@@ -32,7 +32,7 @@ class HomeFacts:
 
     id: str
     n_views: int
-    licence: str  # "" where its source names none
+    licence: str  # "" if its source names none
     author: str
 
 
@@ -44,15 +44,15 @@ class RootFacts:
     credits: tuple[str, ...]  # lines that every product must carry
     recipe: Recipe | None  # None: the root holds none
     sizes: tuple[tuple[int, int], ...]  # as rendered, width and height
-    hfov_deg: tuple[float, ...]  # least and most of the pin-holes, horizontal; () without one
+    hfov_deg: tuple[float, ...]  # minimum and maximum of the pinholes, horizontal; () without one
     pixels_of_class: Mapping[str, int]  # most frequent first
     origins: tuple[str, ...]  # of the cameras
     n_warned: int  # views with a warning
-    n_left_out: int  # views that lack something
+    n_left_out: int  # unfinished views, and views without a layer
 
 
 def root_facts(views: Views, root: StoredRoot) -> RootFacts:
-    """The facts of these views, by the tables of each."""
+    """The facts of these views, from their tables."""
     pixels, origins, sizes = Counter[str](), set[str](), set[tuple[int, int]]()
     hfov_deg, n_warned = [], 0
     for ref in views.refs:
@@ -84,7 +84,7 @@ def root_facts(views: Views, root: StoredRoot) -> RootFacts:
 
 
 def dataset_description(packing: Packing, credits: Sequence[str]) -> dict[str, Any]:
-    """The fields of dataset.json that readers of other makers need."""
+    """The fields of dataset.json that third-party readers need."""
     colours = [bytes(row).hex() for row in NYU40_COLOURS.tolist()]
     arrays = {
         name: {

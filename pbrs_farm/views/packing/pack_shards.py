@@ -34,7 +34,7 @@ class Packed:
     n_views: dict[str, int]  # split -> views
     n_files: int
     n_bytes: int
-    left_out: dict[str, str]  # id of a view -> why
+    left_out: dict[str, str]  # id of a view -> reason
 
 
 @checked_call
@@ -61,7 +61,7 @@ def pack(
     source, left_out = views.source, dict(views.left_out)
     if not isinstance(source, StoredRoot):
         raise BadInput(source.url, "", "is packed already", hint="pack the output folder itself")
-    # Leave out what lacks any of the pictures or labels.
+    # Leave out views without all pictures and labels.
     for request in packing.requests():
         views = views.only(request=request)
         left_out |= views.left_out

@@ -15,7 +15,7 @@ from pbrs_farm.views.views import ViewRef
 
 
 def packed_view(root: StoredRoot, ref: ViewRef, packing: Packing) -> dict[str, bytes]:
-    """Part name -> bytes of a view, json first; BadInput where a file is missing or damaged."""
+    """Part name -> bytes of a view, json first; BadInput if a file is missing or damaged."""
     facts = root.facts(ref)
     size = packing.size or facts.size
     labels, pictures = stored_parts(root, ref, packing, size)

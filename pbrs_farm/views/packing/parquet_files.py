@@ -24,11 +24,11 @@ _ROWS_A_GROUP: Final = 20  # 50 MB of labels at 640x480
 
 
 def write_parquet(source: StoredRoot, plan: ShardPlan, packing: Packing, out: Path) -> Path:
-    """data/<split>-<number>-of-<number>.parquet: a row a view.
+    """Write data/<split>-<number>-of-<number>.parquet, a row a view.
 
-    Pictures are columns of type Image, labels of type Array2D (normals Array3D) in the type they are
-    stored in. camera is JSON: size, K and pose as in docs/formats/view_json.md. Raises BadInput where the views
-    of a file are not of one size: an array column has one shape.
+    Pictures are columns of type Image, labels of type Array2D (normals Array3D) in their stored type.
+    camera is JSON: size, K and pose as in docs/formats/view_json.md. Raises BadInput if the views of a
+    file differ in size: an array column has one shape.
     """
     file = out / "data" / f"{plan.split}-{plan.number:05d}-of-{plan.n_shards:05d}.parquet"
     file.parent.mkdir(exist_ok=True)
@@ -76,7 +76,7 @@ def _parquet_row(
 
 
 def _table(rows: list[dict[str, Any]]) -> pa.Table:
-    """A table whose metadata says which columns are pictures and arrays, where `datasets` looks for it."""
+    """A table with metadata for `datasets`: the columns of pictures and arrays."""
     columns: dict[str, pa.Array] = {}
     features: dict[str, dict[str, Any]] = {}
     for name, first in rows[0].items():

@@ -1,4 +1,4 @@
-"""README.md of packed views: what they are, how to load them, credits and limits; no effects."""
+"""README.md of packed views: contents, loading, credits and limits; no effects."""
 
 from __future__ import annotations
 
