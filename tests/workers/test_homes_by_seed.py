@@ -18,7 +18,7 @@ from pbrs_farm.store import MemoryStore, Store
 from tests.workers.redis_server import RedisServer
 from tests.workers.small_farm import REAL_RUNNER, SmallFarm
 from workers.client.farm_client import completed, new_spec
-from workers.house_files import entries_from_arguments, needed_plugins
+from workers.house_files import entries_from_arguments, has_own_furniture, needed_plugins
 from workers.ids import GEOMETRY, GL, LIGHT, REDUCE, job_key
 from workers.job import JobSpec
 from workers.node.house_runner import HouseRunner
@@ -103,7 +103,11 @@ def test_a_worker_without_the_furniture_takes_it_from_the_store_for_a_made_home(
 ) -> None:
     monkeypatch.setenv("PBRS_CACHE", str(tmp_path / "cache"))
     monkeypatch.setattr(homes_package, "cached", object)
-    ((entry, _ref),) = entries_from_arguments(["made:2,furniture=none"])
+    ((entry, empty),) = entries_from_arguments(["made:2,furniture=none"])
+    furnished = empty.model_copy(update={"location": "made:2"})
+    assert (has_own_furniture(empty), has_own_furniture(furnished)) == (False, True)
+    # b"deb" is no package, so the home that is made has no furniture.
+    monkeypatch.setattr("workers.node.house_runner.has_own_furniture", lambda _source: True)
     name = f"{furniture_package.PACKAGE}_{furniture_package.TESTED_VERSION}_all.deb"
     store = MemoryStore()
     store.put(f"jobs/sources/{name}", b"deb")
