@@ -42,7 +42,7 @@ class Certificate(Record):
     n_views: int
     counts: dict[str, Count]  # check -> its count
     failures: tuple[str, ...]  # "check: place: what", at most MAX_LISTED per check
-    notes: tuple[str, ...] = ()  # oddities that are no failure
+    notes: tuple[str, ...] = ()  # oddities, not counted as failures
     coincident: tuple[Coincidence, ...] = ()  # most pixels first
     looked_at: tuple[str, ...] = ()  # "file (views): how"
     not_looked_at: tuple[str, ...] = ()  # the same, and facts that no file holds
@@ -132,7 +132,7 @@ class Tally:
             listed.append(f"{check}: {shown(place, MAX_PLACE)}: {shown(fault, MAX_MESSAGE)}")
 
     def note(self, text: str) -> None:
-        """Report an oddity that is no failure."""
+        """Report an oddity, which is not counted as a failure."""
         self.notes.append(shown(text, MAX_MESSAGE))
 
     def expect(self, check: str, place: str, holds: bool | np.bool_, fault: str) -> bool:

@@ -146,7 +146,7 @@ _WANTED: Final = {
 
 
 def sentence(fault: ErrorDetails) -> str:
-    """One of pydantic's errors as a sentence of our own.
+    """A pydantic error as one plain sentence.
 
     Errors of our validators keep their sentence; common kinds of pydantic's have sentences here, others give
     the expected and the actual value.

@@ -187,7 +187,7 @@ def _checked_number(word: str, option: str) -> int:
 def _checked_range(word: str, text: str, most: int) -> tuple[int, int]:
     ends = range_of(text)
     if ends is None:
-        raise BadInput(word, text[:40], "is no number and no range LOW..HIGH", hint=_HINT)
+        raise BadInput(word, text[:40], "is neither a number nor a range LOW..HIGH", hint=_HINT)
     low, high = ends
     if low > high:
         raise BadInput(word, text, "runs downwards", hint=f"{high}..{low}")

@@ -198,16 +198,16 @@ def _format_at(path: Path) -> Format:
         text, hint = _of_folder(path)
         raise BadHouse(path, "", text, hint=hint)
     if suffix == ".json" and path.is_file():
-        hint = f"read are {summary()}; {_ROOT_HINT}"
-        raise BadHouse(path, "", "is no house by itself", hint=hint)
+        hint = f"supported: {summary()}; {_ROOT_HINT}"
+        raise BadHouse(path, "", "not recognised as a house", hint=hint)
     if suffix in _MODEL_SUFFIXES:
         hint = f"`pbrs-farm objects {path} --out DIR` renders single models"
         raise BadHouse(str(path), "", "is a model or a library of models, no home", hint=hint)
     if suffix in _UNREAD_SUFFIXES:
-        hint = f"export it as .glb; read are {summary()}"
+        hint = f"export it as .glb; supported: {summary()}"
         raise BadHouse(str(path), "", f"{path.suffix} files are not read", hint=hint)
     if path.is_file() and not any(suffix in home_format.suffixes for home_format in formats()):
-        raise BadHouse(path, "", "is no home", hint=f"read are {summary()}")
+        raise BadHouse(path, "", "is no home", hint=f"supported: {summary()}")
     # A missing file gets the error message of its format.
     named = (home_format for home_format in formats() if suffix in home_format.suffixes)
     default = format_of_kind(_DEFAULT_KIND)
@@ -311,5 +311,5 @@ def _of_folder(folder: Path) -> tuple[str, str]:
     elif any(next(folder.glob(f"*{suffix}"), None) for suffix in _MODEL_SUFFIXES):
         hint = f"`pbrs-farm objects {folder} --out DIR` renders single models"
     else:
-        hint = f"read are {summary()}"
+        hint = f"supported: {summary()}"
     return "holds no house.json and no home file", hint

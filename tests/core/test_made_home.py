@@ -25,8 +25,8 @@ def test_a_word_says_all_of_its_home() -> None:
 @pytest.mark.parametrize(
     ("word", "part"),
     [
-        ("made:", "no number"),
-        ("made:x", "no number"),
+        ("made:", "neither a number nor a range"),
+        ("made:x", "neither a number nor a range"),
         ("made:9..3", "downwards"),
         ("made:99999999999", "above 2147483647"),
         ("made:1,rooms=5", "above 4"),
@@ -40,7 +40,7 @@ def test_a_word_says_all_of_its_home() -> None:
         ),
         ("made:1,offices=4", "of which one stays"),
         ("made:1,offices=3,area=20..40", "homes of 4 bedrooms have 76 to 180 m2"),
-        ("made:1,offices=x", "no number"),
+        ("made:1,offices=x", "neither a number nor a range"),
         ("made:1,offices=0..2", "offices=0..2: is a range, expected a number"),
         ("made:1,storeys=1..2", "storeys=1..2: is a range, expected a number"),
         ("made:1..2000000", "at most"),
