@@ -7,11 +7,9 @@ the values that the set draws. Effects: imports the modules of installed plugins
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 from types import ModuleType
 from typing import Any, Final
 
@@ -33,7 +31,6 @@ from pbrs_farm.furnishings.things import (
     bins,
     chandeliers,
     fitted,
-    joints,
     kitchen,
     lamps,
     plants,
@@ -44,8 +41,11 @@ from pbrs_farm.furnishings.things import (
 )
 from pbrs_farm.furnishings.things.maker import Family, described_in
 
-VERSION: Final = 8
-"""Part of the catalogue's digest: raised when a shape changes."""
+VERSION: Final = 9
+"""Version of the families' shapes, part of the catalogue's digest.
+
+tests/furnishings/things/test_made_families.py records what they make and fails until it is raised.
+"""
 
 # The order decides which piece a seed draws.
 _MODULES: Final = (
@@ -222,7 +222,5 @@ def _lit(shape: Shape, piece: Piece) -> Shape:
 
 @cache
 def families_digest() -> str:
-    """Digest of the modules of all families, and of the plugins that add some."""
-    texts = [Path(str(module.__file__)).read_bytes() for module in (joints, *_MODULES)]
-    digests = [hashlib.sha256(text).hexdigest() for text in texts]
-    return keys.digest(VERSION, *digests, *marks_in_digest("furniture", plugins("furniture")))
+    """Digest of the version of our families, and of the plugins that add some."""
+    return keys.digest(VERSION, *marks_in_digest("furniture", plugins("furniture")))
