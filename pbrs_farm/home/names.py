@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
+from collections.abc import Collection
 from functools import lru_cache
 from typing import Final
 
@@ -99,7 +100,20 @@ def names_clear_glass(name: str) -> bool:
     return bool(words & GLASS_WORDS) and not words & _OPAQUE_GLASS_WORDS
 
 
-def names_mirror(name: str) -> bool:
-    """Whether the name of a part of a piece says that it mirrors: a mirror's frame or lamp does not."""
+def has_copy_suffix(name: str, siblings: Collection[str] = ()) -> bool:
+    """True if a modelling program named a mirrored copy: "Cabinet.mirror", "Leg.Mirror.001".
+
+    siblings: names of parts of the same item; "Leg_mirror" is a copy beside "Leg".
+    """
+    suffixed = re.fullmatch(r"(.*\w)([._ -])mirror(ed)?([._ ]?\d+)?", name, re.IGNORECASE)
+    return suffixed is not None and (suffixed[2] == "." or suffixed[1] in siblings)
+
+
+def names_mirror(name: str, siblings: Collection[str] = ()) -> bool:
+    """Whether the name of a part of a piece says that it mirrors: a mirror's frame or lamp does not.
+
+    siblings: names of parts of the same piece, of which it may be the mirrored copy.
+    """
     words = words_of(name)
-    return bool(words & MIRROR_WORDS) and not words & _NO_MIRROR_WORDS
+    is_mirror = bool(words & MIRROR_WORDS) and not words & _NO_MIRROR_WORDS
+    return is_mirror and not has_copy_suffix(name, siblings)

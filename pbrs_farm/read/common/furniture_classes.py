@@ -16,7 +16,7 @@ from typing import Final, NamedTuple
 
 from pbrs_farm.core.classes import NYU40_NAMES, PERSON, WINDOW
 from pbrs_farm.core.house import ItemKind
-from pbrs_farm.home.names import folded, parted
+from pbrs_farm.home.names import folded, has_copy_suffix, parted
 
 CLASS_TAG: Final = "class:"
 """Begins the tag of an item that names the rule which decided its class."""
@@ -38,6 +38,10 @@ _LONGEST_PHRASE: Final = 4  # words
 _TINT_WORDS: Final = """ash beech beige birch blue brick brown concrete cream fabric gray green grey leather maple
     marble metal oak orange pine pink purple red stone tile walnut wood wooden yellow"""
 _TINTS: Final = frozenset(_TINT_WORDS.split())
+# Names that programs give to new primitives, of any size.
+_DEFAULT_NAME: Final = re.compile(
+    r"(chamfer)?box(_?\d+|\.\d+)|gameobject\d*|skp_camera.*", re.IGNORECASE
+)
 # Beside these a kind of tree is a wood, a flower a pattern or a tint.
 _MATERIAL_WORDS: Final = """fabric gold grain laminate lumber parquet pattern plank planks plywood texture timber veneer
     wallpaper wood wooden"""
@@ -91,6 +95,24 @@ _RAISED_M: Final = (0.6, 1.8)  # above the floor of the level
 _LEAST_LAWN_M: Final = 1.0  # minimum shorter side of a lawn, metres
 _FLATTEST_PLANT: Final = 0.1  # minimum height over shorter side; flatter plants cover the ground
 _SLIMMEST_CROWN: Final = 0.25  # of the longer side
+_OFF_SCALE: Final = 2.0  # of the maximum size, for a file whose scale is a little off
+# Items sold with a mirror ("Sink_mirror"); other items are mirrored copies ("Chair_mirror").
+_OWNERS_OF_MIRRORS: Final = frozenset(
+    [
+        "bathtub",
+        "bed",
+        "cabinet",
+        "desk",
+        "dresser",
+        "otherfurniture",
+        "otherstructure",
+        "shelves",
+        "sink",
+        "table",
+        "toilet",
+    ]
+)
+_THINNEST_COPY: Final = 0.2  # minimum thickness over the middle side of a mirrored copy
 _STANDING: Final = frozenset({"bathtub", "bed", "chair", "desk", "sofa", "table", "toilet"})
 
 
@@ -280,6 +302,11 @@ def _class_of_phrase(phrase: str) -> tuple[str, bool] | None:
     return None
 
 
+def is_a_default_name(name: str) -> bool:
+    """True if a modelling program named an object after its shape: "Box001" of 3ds Max."""
+    return _DEFAULT_NAME.fullmatch(name) is not None
+
+
 def is_a_cover_of_ground(width: float, height: float, depth: float) -> bool:
     """True if a plant's size is that of ground cover: wide and flat, metres."""
     side = min(width, depth)
@@ -306,6 +333,16 @@ def _fits_its_size(label: str, place: PieceSize | None) -> bool:
     return long_min <= side <= long_max and height_min <= place.height <= height_max
 
 
+def is_far_too_large(label: str, place: PieceSize) -> bool:
+    """True if an item exceeds twice the maximum size of its class, or a floor mat's height."""
+    if label not in _SIZES:
+        return False
+    _, long_max, _, height_max = _SIZES[label]
+    slack = 1.0 if label == "floor mat" else _OFF_SCALE
+    side = max(place.width, place.depth)
+    return place.height > slack * height_max or side > _OFF_SCALE * long_max
+
+
 def _is_a_bench_alone(label: str, place: PieceSize | None) -> bool:
     """A catalogue's television with its bench, of which only the bench is left: deep, and twice as wide as high."""
     if place is None or label != "television":
@@ -313,10 +350,27 @@ def _is_a_bench_alone(label: str, place: PieceSize | None) -> bool:
     return place.depth >= place.height and place.width >= 2 * place.height
 
 
+def _is_a_mirrored_copy(
+    candidates: tuple[_Candidate, ...], name: str, place: PieceSize | None
+) -> bool:
+    """True if "mirror" at the end of a name is the suffix of a modelling program: "Chair_mirror.001"."""
+    is_last = re.search(r"mirror[\W\d_]*$", name, re.IGNORECASE) is not None
+    if not (is_last and candidates and candidates[0].phrase == "mirror"):
+        return False
+    owner = next((c.label for c in candidates if c.label != "mirror"), None)
+    if owner is None or owner not in _OWNERS_OF_MIRRORS or has_copy_suffix(name):
+        return owner is not None
+    if place is None:
+        return False
+    thinnest, middle, _ = sorted((place.width, place.height, place.depth))
+    return thinnest > _THINNEST_COPY * middle
+
+
 def _by_words(name: str, place: PieceSize | None, rule: str) -> PieceClass:
     # The class of the first candidate that fits the piece; "size" if only misfits are known.
     refused = False
-    for candidate in _candidates(name[:_LONGEST_NAME]):
+    candidates = _candidates(name[:_LONGEST_NAME])
+    for candidate in candidates[_is_a_mirrored_copy(candidates, name, place) :]:
         label, is_noun = candidate.label, candidate.is_noun
         if not _fits_its_size(label, place):
             refused = True

@@ -9,7 +9,7 @@ from typing import Final
 
 from pbrs_farm.core.classes import DOOR, FLOOR, LAMP, NYU40_NAMES, OTHERSTRUCTURE, WINDOW
 from pbrs_farm.core.house import ItemKind
-from pbrs_farm.home.names import words_of
+from pbrs_farm.home.names import parted, words_of
 from pbrs_farm.read.common.furniture_classes import (
     PERSON_WORD,
     PLANT_WORD,
@@ -17,7 +17,9 @@ from pbrs_farm.read.common.furniture_classes import (
     PieceSize,
     class_of_piece,
     is_a_cover_of_ground,
+    is_a_default_name,
     is_also_a_material,
+    is_far_too_large,
     kind_of,
     plain,
     stands_as_a_tree,
@@ -47,6 +49,7 @@ _PARTS_OF_BUILDINGS: Final = frozenset(_BUILT_WORDS.split())
 _LEAST_STRUCTURE_M: Final = 0.2  # a tile of a floor is as large
 _ROOMS_AND_CABINETS: Final = frozenset({"closet", "kitchen", "kitchenette", "pantry", "storage"})
 _REVIT_NAME: Final = re.compile(r'^M_|:.*:\d+$|[ "-].*:|:.*[ "-]')
+_SHORT_FOR_MATERIAL: Final = re.compile(r"(?<![^\W\d_])(?<!bath[ _])mat(?![^\W\d_])", re.IGNORECASE)
 UNMAPPED: Final = "unmapped"
 """Tag of an item without any known class."""
 
@@ -72,8 +75,15 @@ def class_of_node_name(
     size: of the node, if known: decides between words of a name, and rejects persons and plants of
     the wrong size.
     """
+    if is_a_default_name(name):
+        return None
     classes = (_class_of_words(text, size) for text in _likely_names(name, materials))
     return next((node_class for node_class in classes if node_class is not None), None)
+
+
+def class_of_material_name(name: str, *, size: PieceSize | None = None) -> NodeClass | None:
+    """Class from the name of a material, in which "mat" is short for material, except for a bath mat."""
+    return class_of_node_name(_SHORT_FOR_MATERIAL.sub("material", parted(name)), size=size)
 
 
 def _likely_names(name: str, materials: Sequence[str]) -> Iterator[str]:
@@ -115,7 +125,8 @@ def _signs_alike(text: str) -> str:
 def _class_of_words(name: str, size: PieceSize | None) -> NodeClass | None:
     piece = _piece(name, size)
     nyu40 = piece.nyu40
-    words = words_of(name)
+    # A refused "floor mat" is not a floor.
+    words = words_of(name) - (words_of(piece.phrase) if piece.word == "floor mat" else frozenset())
     is_structure = nyu40 is None or _only_describes(piece, name) or _may_be_wall(nyu40, words)
     if is_structure and not (size and _is_small(size)):
         # Look for structure where the name says nothing more special.
@@ -139,20 +150,21 @@ def _class_of_words(name: str, size: PieceSize | None) -> NodeClass | None:
 def _piece(name: str, size: PieceSize | None) -> PieceClass:
     """The class of a name as of a piece: where its size refuses every word, the first word's.
 
-    A person and a plant need their size: repair takes them out.
+    A person and a plant need their size: repair removes them. An item far too large has no class.
     """
     piece = class_of_piece("", name, "", size)
     if size is None:
         return piece
     if piece.nyu40 is None:
         piece = class_of_piece("", name)
-        is_refused = piece.word in (PERSON_WORD, PLANT_WORD)
+        is_living = piece.word in (PERSON_WORD, PLANT_WORD)
+        is_refused = is_living or is_far_too_large(piece.word, size)
     else:
         shape = (size.width, size.height, size.depth)
         is_refused = piece.word == PLANT_WORD and (
             is_also_a_material(piece.phrase) and not stands_as_a_tree(*shape)
         )
-    return PieceClass(None, "size", piece.word) if is_refused else piece
+    return PieceClass(None, "size", piece.word, piece.phrase) if is_refused else piece
 
 
 def _only_describes(piece: PieceClass, name: str) -> bool:

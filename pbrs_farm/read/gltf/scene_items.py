@@ -212,11 +212,11 @@ def _item(
     numbers = [number for _, meshes in parts for number, _ in meshes]
     glass = glass_materials(gltf, numbers) if is_opening else frozenset()
     joints = joints_of_parts(gltf, thing.parts)
-    for part, meshes in parts:
-        part_name = str(entry(gltf, "nodes", part.index).get("name", ""))
+    part_names = [str(entry(gltf, "nodes", part.index).get("name", "")) for part, _ in parts]
+    for (part, meshes), part_name in zip(parts, part_names, strict=True):
         is_own_part = part.path != thing.root.path
         is_glass = is_opening and is_own_part and names_glass(part_name)
-        is_said = is_own_part and (names_glass(part_name) or names_mirror(part_name))
+        is_said = is_own_part and (names_glass(part_name) or names_mirror(part_name, part_names))
         for number, mesh in meshes:
             material, emission = materials.material(number, clear=clear)
             # Glass by its name alone is a pane, unless the file tags its kind.

@@ -11,7 +11,7 @@ import numpy as np
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import Item, ItemKind, Surface
 from pbrs_farm.read.common.furniture_classes import PieceSize
-from pbrs_farm.read.common.name_classes import UNMAPPED, class_of_node_name
+from pbrs_farm.read.common.name_classes import UNMAPPED, class_of_material_name
 from pbrs_farm.read.common.room_shells import CLASS_OF_STRUCTURE, planar_parts, room_parts
 from pbrs_farm.read.gltf.room_fittings import parted_fittings
 
@@ -59,7 +59,7 @@ def _is_too_large_for_an_opening(item: Item) -> bool:
 
 
 def _by_materials(item: Item) -> tuple[Item, ...]:
-    kinds = [class_of_node_name(s.name) for s in item.surfaces]
+    kinds = [class_of_material_name(s.name) for s in item.surfaces]
     # Separate wall, floor and ceiling; surfaces with inconclusive names stay with the item.
     groups: dict[ItemKind | None, list[Surface]] = {}
     for surface, material_class in zip(item.surfaces, kinds, strict=True):
@@ -92,7 +92,7 @@ def _name_by_materials(item: Item) -> Item:
         return item
     width, height, depth = np.ptp(item.bounds, axis=0).tolist()
     size = PieceSize(width, height, depth)
-    first_class, *other_classes = [class_of_node_name(s.name, size=size) for s in item.surfaces]
+    first_class, *other_classes = [class_of_material_name(s.name, size=size) for s in item.surfaces]
     if first_class is None or any(next_class != first_class for next_class in other_classes):
         return item
     if first_class.kind in (ItemKind.LAMP, ItemKind.PERSON, ItemKind.DOOR, ItemKind.WINDOW):

@@ -117,6 +117,21 @@ SM_Whiteboard_01 | whiteboard
 SM_floor_01_28 | floor
 SM_reception_01_2 | none
 PointLight22 | lamp
+Chair_mirror.001 | chair
+Sofa.mirror | sofa
+Handle_Mirror.003 | otherprop
+Wall_mirror | mirror
+Sink_mirror | mirror
+Box001 | none
+ChamferBox01 | none
+Flower_bed | plant
+River_bed | otherstructure
+TableTopDecor | otherprop
+BathtubBasin | bathtub
+SinkBasin | sink
+PaperTowelRoll | otherprop
+towel_hook | otherprop
+door_hinge | otherprop
 """
 NAMES_OF_WOODS_AND_PLANTS = """
 Table_Pine | table

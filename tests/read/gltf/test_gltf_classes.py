@@ -25,8 +25,9 @@ def test_ground_that_is_called_grass_is_ground_and_a_tuft_of_it_a_plant() -> Non
 def test_names_tell_classes_and_unknown_ones_are_otherprop_and_said_so() -> None:
     s = two_rooms()
     cube = s.box([0, 0, 0], [0.5, 0.5, 0.5])
-    for name in ("Armchair_01", "wall lamp", "Thing.002", "floor mat", "Kitchen cabinet L"):
+    for name in ("Armchair_01", "wall lamp", "Thing.002", "Kitchen cabinet L"):
         s.node(name, mesh=cube, translation=[1, 0, 1])
+    s.node("floor mat", mesh=s.box([1, 0, 1], [2, 0.02, 1.5]))
     house = read(s)
     got = {i.name: (i.nyu40, i.kind) for i in house.items}
     assert got["Floor"] == (2, ItemKind.FLOOR)
@@ -136,3 +137,48 @@ def test_a_material_names_a_thing_only_of_a_size_that_fits() -> None:
         s.node(name, mesh=s.box(low, high, len(s.materials) - 1))
     kinds = {i.name: str(i.kind) for i in read(s).items}
     assert [kinds[name] for name in boxes] == ["ground", "object", "plant"]
+
+
+def test_a_material_called_mat_is_no_floor_mat_and_a_floor_mat_is_flat() -> None:
+    s = two_rooms()
+    cube = [1, 0, 1], [1.6, 0.1, 1.6]
+    for k, name in enumerate(("mat_0", "Mat.1", "mat_black", "BlackMat", "Bath mat")):
+        s.materials.append({"name": name})
+        s.node(f"Object_{k}", mesh=s.box(*cube, len(s.materials) - 1))
+    for name in ("Tall floor mat", "Rug"):
+        s.node(name, mesh=s.box([1, 0, 1], [1.6, 0.7, 1.5]))
+    house = read(s)
+    classes = {i.name: NYU40_NAMES[i.nyu40] for i in house.items[4:]}
+    assert [name for name, label in classes.items() if label == "floor mat"] == ["Object_4"]
+    assert {classes["Tall floor mat"], classes["Rug"]} == {"otherprop"}
+
+
+def test_the_mirrored_copy_of_a_part_is_no_mirror() -> None:
+    s = two_rooms()
+    s.materials.append({"name": "Chrome"})
+    side = s.box([1, 0, 1], [1.02, 0.8, 1.5], len(s.materials) - 1)
+    names = ("Side", "Side_mirror.001", "Door.mirror", "Hand_mirror")
+    s.node("Cabinet", children=[s.node(name, mesh=side) for name in names])
+    parts = [part.name for part in item(read(s), "Cabinet").surfaces]
+    assert parts == ["Chrome", "Chrome", "Chrome", "Hand_mirror"]
+
+
+@pytest.mark.parametrize(
+    ("name", "size", "label"),
+    [
+        ("Chair_mirror.001", (0.5, 0.9, 0.5), "chair"),
+        ("Cabinet.mirror", (0.8, 0.9, 0.4), "cabinet"),
+        ("Cabinet_mirror", (0.8, 0.9, 0.4), "cabinet"),
+        ("Cabinet_mirror", (0.8, 0.9, 0.03), "mirror"),
+        ("Table_mirror.002", (1.6, 0.75, 0.9), "table"),
+        ("Flowerbed", (3.0, 0.4, 1.0), "otherprop"),
+        ("Bed", (12.0, 0.3, 30.0), "otherprop"),
+        ("Box001", (4.0, 2.5, 0.1), "otherprop"),
+    ],
+)
+def test_suffixes_of_programs_and_sizes_decide_between_classes(
+    name: str, size: tuple[float, float, float], label: str
+) -> None:
+    s = two_rooms()
+    s.node(name, mesh=s.box([1, 0, 1], [1 + size[0], size[1], 1 + size[2]]))
+    assert NYU40_NAMES[item(read(s), name).nyu40] == label
