@@ -45,7 +45,7 @@ def _add_make(p: argparse.ArgumentParser) -> None:
     text = f"family of the plans (default: one by seed): {', '.join(PLANS)}"
     add("--plans", metavar="NAME", help=text)
     add("--storeys", metavar="N", help="1 or 2 with a staircase between (default 1)")
-    add("--offices", metavar="N", help="bedrooms that are offices (default 0)")
+    add("--offices", metavar="N", help="bedrooms that are offices (default: by chance)")
     text = "leave the rooms without furniture; needs no package"
     add("--empty", action="store_true", help=text)
     add("--programme", type=Path, metavar="FILE", help="JSON: the rooms of a certain flat")

@@ -10,8 +10,11 @@ from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.number_ranges import range_of
 
 PREFIX: Final = "made:"
-VERSION: Final = 11
+VERSION: Final = 12
 """Of the generator: part of a made home's id. Raised when it makes another home of a seed."""
+
+STREAM: Final = 11
+"""Names the random numbers of made homes. Changed, all homes are drawn anew; VERSION alone changes some."""
 
 VERSION_OF_STOREYS: Final = 3
 """The same of what only homes of two storeys have: raised, it leaves the others what they are."""
@@ -46,7 +49,7 @@ class MadeHome:
     furniture: bool = True
     storeys: int = 1
     plans: str = ""  # the family of its plan; "" = drawn by seed
-    offices: int = 0  # number of bedrooms used as offices
+    offices: int | None = None  # number of bedrooms used as offices; None = by chance
 
     @property
     def word(self) -> str:
@@ -68,7 +71,7 @@ class MadeHome:
             parts.append(f"plans={self.plans}")
         if self.storeys != plain.storeys:
             parts.append(f"storeys={self.storeys}")
-        if self.offices:
+        if self.offices is not None:
             parts.append(f"offices={self.offices}")
         if not self.furniture:
             parts.append("furniture=none")
@@ -83,6 +86,11 @@ class MadeHome:
     def version(self) -> int | str:
         """Of what makes it."""
         return VERSION if self.storeys == 1 else f"{VERSION}.{VERSION_OF_STOREYS}"
+
+    @property
+    def stream(self) -> int | str:
+        """Name of its random numbers."""
+        return STREAM if self.storeys == 1 else f"{STREAM}.{VERSION_OF_STOREYS}"
 
     @property
     def digest(self) -> str:
@@ -126,7 +134,7 @@ def made_homes(word: str) -> list[MadeHome]:
             home = replace(home, furniture=False)
         else:
             raise BadInput(word, option, "is no option of made homes", hint=_HINT)
-    check_wishes(home.bedrooms, home.area, home.storeys, home.offices)
+    check_wishes(home.bedrooms, home.area, home.storeys, home.offices or 0)
     return [replace(home, seed=seed) for seed in range(first, last + 1)]
 
 

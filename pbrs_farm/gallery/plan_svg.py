@@ -91,7 +91,7 @@ def _draw_stairs(root: Element, stair: Stair) -> None:
 def _tint(type_: RoomType) -> str:
     """The floor colour of a room type."""
     match type_:
-        case RoomType.LIVING | RoomType.STUDIO | RoomType.OFFICE:
+        case RoomType.LIVING | RoomType.STUDIO | RoomType.OFFICE | RoomType.DINING:
             return _LIVING
         case RoomType.KITCHEN:
             return _COOKING

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from math import inf
 from typing import Final
 
 import numpy as np
+from shapely.geometry import Polygon
 
 from pbrs_farm.core.catalogue import Catalogue
 from pbrs_farm.generate.drawn_plan import drawn_plan
-from pbrs_farm.generate.floor_plan import PlacedPiece, Plan, RoomType, Storey
+from pbrs_farm.generate.floor_plan import PlacedPiece, Plan, PlanRoom, RoomType, Storey
 from pbrs_farm.generate.furnish.furnished import furnished
 from pbrs_farm.generate.furnish.gates import furnish_report
 from pbrs_farm.generate.openings import plan_faults
+from pbrs_farm.generate.plan_families import plan_families
 from pbrs_farm.generate.programme import Programme, Wishes, with_family
 from pbrs_farm.generate.staircase import Stair
 from pbrs_farm.generate.two_storeys import drawn_storeys
@@ -58,7 +61,8 @@ def drawn_home(
     best: DrawnHome | None = None
     for _ in range(_TRIES):
         plans, stair = _drawn_plans(rng, wishes, programme)
-        plans = with_offices(plans, wishes.offices) if wishes is not None else plans
+        if wishes is not None:
+            plans = with_other_uses(plans, wishes, rng.spawn(1)[0])
         for _ in range(_FURNISHINGS):
             storeys = tuple(Storey(p, furnished(p, catalogue, rng, style)) for p in plans)
             home = DrawnHome(
@@ -72,10 +76,29 @@ def drawn_home(
     return best
 
 
-def with_offices(plans: tuple[Plan, ...], n: int) -> tuple[Plan, ...]:
-    """The storeys with n bedrooms turned into offices: the smallest, first those that no room is entered from.
+def with_other_uses(
+    plans: tuple[Plan, ...], wishes: Wishes, rng: np.random.Generator
+) -> tuple[Plan, ...]:
+    """The storeys with the wished offices, else with a dining room and an office by chance.
 
-    The largest bedroom stays one.
+    Chance leaves the wished number of bedrooms, and one at least.
+    """
+    if wishes.offices is not None:
+        return with_rooms_of(plans, RoomType.OFFICE, wishes.offices)
+    family = plan_families()[plans[0].family]
+    is_dining, is_office = rng.random(2) < (family.dining_room, family.office)
+    for type_, is_drawn in ((RoomType.DINING, is_dining), (RoomType.OFFICE, is_office)):
+        bedrooms = [r for plan in plans for r in plan.rooms if r.type is RoomType.BEDROOM]
+        if is_drawn and len(bedrooms) > max(wishes.bedrooms[0], 1):
+            plans = with_rooms_of(plans, type_, 1)
+    return plans
+
+
+def with_rooms_of(plans: tuple[Plan, ...], type_: RoomType, n: int) -> tuple[Plan, ...]:
+    """The storeys with n bedrooms turned into offices or dining rooms; the largest stays one.
+
+    Rooms from which one enters a private room come last; else offices are the smallest bedrooms, and
+    dining rooms those nearest to the kitchen.
     """
     rooms = [
         (storey, number) for storey, plan in enumerate(plans) for number in range(len(plan.rooms))
@@ -86,21 +109,23 @@ def with_offices(plans: tuple[Plan, ...], n: int) -> tuple[Plan, ...]:
 
     def rank(place: tuple[int, int]) -> tuple[bool, float]:
         plan = plans[place[0]]
+        room = plan.rooms[place[1]]
         guests = (o for o in plan.openings if o.other == place[1] and o.room != place[1])
         private = (RoomType.WARDROBE, RoomType.BATHROOM)
-        return any(plan.rooms[o.room].type in private for o in guests), plan.rooms[place[1]].area
+        has_guest = any(plan.rooms[o.room].type in private for o in guests)
+        return has_guest, _from_kitchen(plan, room) if type_ is RoomType.DINING else room.area
 
     largest = max(bedrooms, key=lambda place: plans[place[0]].rooms[place[1]].area, default=None)
     chosen = sorted((place for place in bedrooms if place != largest), key=rank)[:n]
-    label = RoomType.OFFICE.label
     names = {
-        place: label if n == 1 else f"{label} {k + 1}" for k, place in enumerate(sorted(chosen))
+        place: type_.label if n == 1 else f"{type_.label} {k + 1}"
+        for k, place in enumerate(sorted(chosen))
     }
     return tuple(
         replace(
             plan,
             rooms=tuple(
-                replace(room, type=RoomType.OFFICE, name=names[storey, number])
+                replace(room, type=type_, name=names[storey, number])
                 if (storey, number) in names
                 else room
                 for number, room in enumerate(plan.rooms)
@@ -108,6 +133,12 @@ def with_offices(plans: tuple[Plan, ...], n: int) -> tuple[Plan, ...]:
         )
         for storey, plan in enumerate(plans)
     )
+
+
+def _from_kitchen(plan: Plan, room: PlanRoom) -> float:
+    """Metres from a room to the nearest kitchen of its storey."""
+    kitchens = [Polygon(r.polygon) for r in plan.rooms if r.type is RoomType.KITCHEN]
+    return min((float(k.distance(Polygon(room.polygon))) for k in kitchens), default=inf)
 
 
 def _broken(storey: Storey, catalogue: Catalogue) -> list[str]:

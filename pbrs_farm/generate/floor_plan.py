@@ -26,6 +26,7 @@ class RoomType(StrEnum):
     KITCHEN = "kitchen"
     BEDROOM = "bedroom"
     OFFICE = "office"  # to work in
+    DINING = "dining"
     STUDIO = "studio"  # to live and to sleep in
     BATHROOM = "bathroom"
     WC = "wc"
@@ -43,6 +44,7 @@ class RoomType(StrEnum):
             RoomType.KITCHEN,
             RoomType.BEDROOM,
             RoomType.OFFICE,
+            RoomType.DINING,
             RoomType.STUDIO,
         )
 
@@ -56,8 +58,8 @@ class RoomType(StrEnum):
         """Name of the room type on a drawn plan."""
         if self in (RoomType.LIVING, RoomType.STUDIO):
             return "Living room"
-        if self is RoomType.STORE:
-            return "Store room"
+        if self in (RoomType.STORE, RoomType.DINING):
+            return f"{self.value.capitalize()} room"
         return "WC" if self is RoomType.WC else self.value.capitalize()
 
 

@@ -47,7 +47,7 @@ def generate_home(
     wishes = Wishes(bedrooms, area, home.storeys, home.plans, home.offices)
     # All randomness comes from one stream that the wishes and the version name.
     words = (home.word,) if programme is None else (home.word, repr(programme))
-    rng = np.random.default_rng(keys.seed("made", home.version, *words))
+    rng = np.random.default_rng(keys.seed("made", home.stream, *words))
     shelf = catalogue if home.furniture else EMPTY
     drawn = drawn_home(rng, shelf, wishes=wishes, programme=programme, style=home.style)
     origin = origin_of_home(home, shelf, programme)

@@ -13,7 +13,7 @@ from pbrs_farm.generate.slicing_goals import STEP_M, Brief, IntRect, shared_leng
 # fmt: off
 MIN_WIDTH: Final = {
     RoomType.LIVING: 3.2, RoomType.STUDIO: 3.2, RoomType.KITCHEN: 2.1, RoomType.BEDROOM: 2.6,
-    RoomType.OFFICE: 2.2,
+    RoomType.OFFICE: 2.2, RoomType.DINING: 2.6,
     RoomType.BATHROOM: 1.55, RoomType.HALL: 1.1, RoomType.WC: 0.9, RoomType.STORE: 0.9,
     RoomType.WARDROBE: 1.4, RoomType.STAIRS: 0.0,
 }
@@ -21,7 +21,7 @@ MIN_WIDTH: Final = {
 # fmt: off
 MAX_ASPECT: Final = {
     RoomType.LIVING: 1.7, RoomType.STUDIO: 1.7, RoomType.KITCHEN: 1.9, RoomType.BEDROOM: 1.6,
-    RoomType.OFFICE: 1.8,
+    RoomType.OFFICE: 1.8, RoomType.DINING: 1.6,
     RoomType.BATHROOM: 1.7, RoomType.HALL: 8.0, RoomType.WC: 1.9, RoomType.STORE: 1.8,
     RoomType.WARDROBE: 1.8, RoomType.STAIRS: math.inf,
 }

@@ -20,6 +20,7 @@ MEDIAN_AREA: Final = {
     RoomType.KITCHEN: 9.7,
     RoomType.BEDROOM: 10.9,
     RoomType.OFFICE: 9.0,
+    RoomType.DINING: 12.0,
     RoomType.STUDIO: 24.0,
     RoomType.BATHROOM: 6.0,
     RoomType.WC: 1.7,
@@ -33,6 +34,7 @@ AREA_RANGE: Final = {
     RoomType.KITCHEN: (7.2, 20.0),
     RoomType.BEDROOM: (9.0, 17.0),
     RoomType.OFFICE: (6.0, 17.0),
+    RoomType.DINING: (8.0, 20.0),
     RoomType.STUDIO: (18.0, 34.0),
     RoomType.BATHROOM: (3.8, 9.0),
     RoomType.WC: (1.3, 2.4),
@@ -117,11 +119,11 @@ class Wishes:
     area: tuple[float, float] = (20.0, 250.0)  # of all rooms, square metres
     storeys: int = 1
     plans: str = ""  # family of plans; "" = drawn by seed
-    offices: int = 0  # number of bedrooms that become offices
+    offices: int | None = None  # number of bedrooms that become offices; None = by chance
 
     def __post_init__(self) -> None:
         """Raise BadInput for ranges that no home can meet."""
-        check_wishes(self.bedrooms, self.area, self.storeys, self.offices)
+        check_wishes(self.bedrooms, self.area, self.storeys, self.offices or 0)
 
 
 def drawn_programme(rng: np.random.Generator, wishes: Wishes | None = None) -> Programme:

@@ -85,7 +85,7 @@ _USES: Final = {
     RoomKind.KITCHEN: _Use(RoomType.KITCHEN),
     RoomKind.BATHROOM: _Use(RoomType.BATHROOM),
     RoomKind.HALL: _Use(RoomType.HALL),
-    RoomKind.DINING: _Use(RoomType.LIVING, "dining_room"),
+    RoomKind.DINING: _Use(RoomType.DINING),
     RoomKind.OFFICE: _Use(RoomType.OFFICE),
 }
 

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from pbrs_farm.core.catalogue import EMPTY
 from pbrs_farm.core.made_home import MadeHome
-from pbrs_farm.generate.drawn_home import DrawnHome, drawn_home, with_offices
+from pbrs_farm.generate.drawn_home import DrawnHome, drawn_home, with_other_uses, with_rooms_of
 from pbrs_farm.generate.floor_plan import OpeningKind, Plan, PlanOpening, PlanRoom, RoomType
 from pbrs_farm.generate.furnish.gates import furnish_report
 from pbrs_farm.generate.generated_home import generate_home
+from pbrs_farm.generate.plan_families import plan_families
 from pbrs_farm.generate.programme import Wishes
 from tests.generate.furnish.shelves import plain_catalogue
 
@@ -77,7 +80,7 @@ def _row_of_rooms(*rooms: tuple[RoomType, float]) -> Plan:
 def _offices_of(n: int, *storeys: Plan) -> dict[tuple[int, int], str]:
     return {
         (storey, number): room.name
-        for storey, plan in enumerate(with_offices(storeys, n))
+        for storey, plan in enumerate(with_rooms_of(storeys, RoomType.OFFICE, n))
         for number, room in enumerate(plan.rooms)
         if room.type is RoomType.OFFICE
     }
@@ -95,6 +98,28 @@ def test_the_smallest_bedrooms_become_offices_first_those_without_a_bathroom() -
     assert _offices_of(1, largest_first) == {(0, 0): "Office"}
     upstairs = _row_of_rooms((bed, 2.5), (bed, 6))
     assert _offices_of(2, plan, upstairs) == {(0, 3): "Office 1", (1, 0): "Office 2"}
+
+
+def test_offices_and_dining_rooms_appear_by_chance_where_a_bedroom_is_spare() -> None:
+    bed, kitchen = RoomType.BEDROOM, RoomType.KITCHEN
+    plan = replace(_row_of_rooms((bed, 5), (bed, 3), (bed, 4), (kitchen, 3)), family="us")
+
+    def types(seed: int, wishes: Wishes) -> list[RoomType]:
+        (drawn,) = with_other_uses((plan,), wishes, np.random.default_rng(seed))
+        return [room.type for room in drawn.rooms]
+
+    by_seed = [types(seed, Wishes()) for seed in range(300)]
+    family = plan_families()["us"]
+    shares = [np.mean([t in row for row in by_seed]) for t in (RoomType.DINING, RoomType.OFFICE)]
+    assert shares == pytest.approx([family.dining_room, family.office], abs=0.1)
+    # The dining room is beside the kitchen, the office is the smallest bedroom, the largest stays.
+    assert [bed, RoomType.OFFICE, RoomType.DINING, kitchen] in by_seed
+    assert all(row[0] is bed for row in by_seed)
+    # A wish for bedrooms or offices leaves nothing to chance.
+    as_wished = [
+        types(seed, wishes) for seed in range(20) for wishes in (Wishes((3, 4)), Wishes(offices=0))
+    ]
+    assert all(row == [bed, bed, bed, kitchen] for row in as_wished)
 
 
 def test_an_office_without_a_desk_breaks_a_gate() -> None:

@@ -22,7 +22,7 @@ from pbrs_farm.prepare.source import resolve
 from pbrs_farm.read.sweethome3d.home import read_home
 from tests.inputs.box_catalogue import boxes
 
-HOME = MadeHome(2, furniture=False)
+HOME = MadeHome(2, furniture=False, offices=0)
 
 
 def empty_house() -> House:

@@ -91,8 +91,8 @@ class _Brief(Record):
     least_share: float = 0.0
 
 
-UseWithoutType = Literal["childs_room", "dining_room"]
-"""Briefs for uses that are not a RoomType: in no generated plan, or drawn at random."""
+UseWithoutType = Literal["childs_room"]
+"""Briefs for uses that are not a RoomType: drawn at random."""
 
 _LEAST_STRETCH_M: Final = 1.3  # shorter walls are not filled from side to side
 _FOR_SIX_M2, _FOR_EIGHT_M2 = 16.0, 24.0  # rooms that have a table for so many
@@ -174,7 +174,7 @@ def _measures(space: FurnishSpace, type_: RoomType, rng: np.random.Generator) ->
         "row": max(x1 - x0, z1 - z0) - 0.2,
         "stretches": free_stretches(space, _LEAST_STRETCH_M),
     }
-    if type_ in (RoomType.LIVING, RoomType.STUDIO):  # dining rooms too
+    if type_ in (RoomType.LIVING, RoomType.STUDIO, RoomType.DINING):
         # Large rooms have tables for eight, small ones for four.
         most = 8 if space.area > _FOR_EIGHT_M2 else 6 if space.area > _FOR_SIX_M2 else 4
         measures["seats"] = most if rng.random() < _LARGE_TABLES else max(most - 2, 4)

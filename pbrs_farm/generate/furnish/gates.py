@@ -17,6 +17,7 @@ _SEATS: Final = ("sofa", "corner_sofa", "armchair", "chair")
 MUST_HAVES: Final[dict[RoomType, tuple[tuple[str, ...], ...]]] = {
     RoomType.BEDROOM: (("bed",),),
     RoomType.OFFICE: (("desk",),),
+    RoomType.DINING: (("dining_table",),),
     RoomType.STUDIO: (("bed",), _SEATS),
     RoomType.LIVING: (_SEATS,),
     RoomType.KITCHEN: (("sink",), ("cooker", "hob"), ("fridge",)),
