@@ -5,11 +5,11 @@
 Run a page's commands first (a view or two at 320x240 will do); a page whose files are missing is named and
 left as it is. Some want more than their page: photos/*.png are photographs of yours (predict, train's views
 under viewseen/, photographs, photographs_seen), farm.png and job.png are screenshots of the board, spp4 to spp256 are runs of
-gpu.md's last line, back is simulators.md's export rendered again, ownviews a run with own_furniture.md's
-catalogue, desk/Desk and desk/Laptop the two halves of photographs.md's block, light/NN_NAME.png the pictures
-of switches.md's table, resume_sums.npz the sums that a killed view leaves beside its outputs.
-Effects: reads out/, writes docs/pictures/howto/PAGE.jpg, 640 pixels wide (screenshots as wide as they are) and
-at most 60 kB, and the pictures of docs/switches.md and docs/photographs.md and the sheet of predict.md.
+the last line of light_costs.md, back is simulators.md's export rendered again, ownviews a run with own_furniture.md's
+catalogue, light/NN_NAME.png the pictures of relight.md's table, resume_sums.npz the sums that a killed view leaves
+beside its outputs. A name in PAGES is that of a picture, which a page shows.
+Effects: reads out/, writes docs/pictures/howto/NAME.jpg, 640 pixels wide (screenshots as wide as they are) and
+at most 60 kB, and the pictures of relight.md, compare.md and train.md beside them.
 """
 
 from __future__ import annotations
@@ -81,20 +81,20 @@ def blended(picture: Pixels, colours: Pixels, where: NDArray[np.bool_]) -> Pixel
 
 
 def own_camera() -> Image.Image:
-    return row(pf.open("out/mine")[0].colour)
+    return row(pf.open("out/own_camera/one")[0].colour)
 
 
 def sun_and_hour() -> Image.Image:
-    return row(*(pf.open(f"out/day/{hour}")[0].colour for hour in (7, 12, 18)))
+    return row(*(pf.open(f"out/sun/day/{hour}")[0].colour for hour in (7, 12, 18)))
 
 
 def night() -> Image.Image:
-    frames = pf.open("out/night")
+    frames = pf.open("out/sun/night")
     return row(frames[0].colour, frames[1].colour)
 
 
 def intrinsic() -> Image.Image:
-    frame = pf.open("out/intrinsic")[0]
+    frame = pf.open("out/intrinsic/views")[0]
 
     def shown(light: NDArray[Any], white: float) -> Pixels:
         return (255 * np.clip(light / white, 0, 1) ** (1 / 2.2)).astype(np.uint8)
@@ -110,14 +110,14 @@ def intrinsic() -> Image.Image:
 
 def class_map() -> Image.Image:
     frame = max(
-        pf.open("out/studio"), key=lambda f: float((f.classes_by("out/mine.csv") > 0).mean())
+        pf.open("out/coco/views"), key=lambda f: float((f.classes_by("mine.csv") > 0).mean())
     )
-    mine = frame.classes_by("out/mine.csv")
+    mine = frame.classes_by("mine.csv")
     return row(frame.colour, blended(frame.colour, PALETTE[mine % len(PALETTE)], mine > 0))
 
 
 def stereo() -> Image.Image:
-    left, right = pf.open("out/pairs")[:2]
+    left, right = pf.open("out/walk/pairs")[:2]
     pixels = left.layer("disparity") / 256
     # Colours of 1 / disparity, which is proportional to depth.
     depth_mm = np.where(pixels > 0, 32_000 / np.maximum(pixels, 1e-6), 0).astype(np.uint16)
@@ -125,14 +125,14 @@ def stereo() -> Image.Image:
 
 
 def plugin() -> Image.Image:
-    frame = pf.open("out/studio")[1]
+    frame = pf.open("out/height")[1]
     return row(frame.colour, label_colours.depth_colours(frame.layer("height"), 0.0, 2.5))
 
 
 def blenderproc() -> Image.Image:
     import h5py
 
-    with h5py.File(first("hdf5/*.hdf5", 1)) as file:
+    with h5py.File(first("blenderproc/hdf5/*.hdf5", 1)) as file:
         depth = (1000 * file["depth"][:]).astype(np.uint16)
         normals = np.rint(255 * file["normals"][:]).astype(np.uint8)
         instances = label_colours.instance_colours(file["instance_segmaps"][:])
@@ -147,8 +147,8 @@ def coco() -> Image.Image:
 def _of_coco(n: int) -> Image.Image:
     from pycocotools import mask
 
-    document = json.loads(first("coco/*/annotations.json").read_text())
-    folder = first("coco/*/annotations.json").parent
+    document = json.loads(first("coco/coco/*/annotations.json").read_text())
+    folder = first("coco/coco/*/annotations.json").parent
     names = {c["id"]: c for c in document["categories"]}
     shown = document["images"][n]
     picture = np.asarray(Image.open(folder / shown["file_name"]).convert("RGB"))
@@ -171,7 +171,7 @@ def _of_coco(n: int) -> Image.Image:
 
 def questions() -> Image.Image:
     """A picture with the things of its phrases, and four of its questions."""
-    folder = first("questions/*/refs.json").parent
+    folder = first("questions/rows/*/refs.json").parent
     refs = json.loads((folder / "refs.json").read_text())
     medium = refs[0]["file_name"]
     boxes = {
@@ -204,7 +204,7 @@ def questions() -> Image.Image:
 
 
 def yolo() -> Image.Image:
-    return row(*(_of_yolo(path) for path in sorted(OUT.glob("yolo_seg/*/labels/*.txt"))[1:3]))
+    return row(*(_of_yolo(path) for path in sorted(OUT.glob("coco/yolo_seg/*/labels/*.txt"))[1:3]))
 
 
 def _of_yolo(labels: Path) -> Image.Image:
@@ -237,11 +237,11 @@ def _of_row(view: dict[str, Any]) -> Image.Image:
 
 def predict() -> Image.Image:
     photo = first("photos/*.png")
-    return row(Image.open(photo), normals_of(first(f"seen/{photo.stem}_normal.png")))
+    return row(Image.open(photo), normals_of(first(f"train/seen/{photo.stem}_normal.png")))
 
 
 def train() -> Image.Image:
-    frame = pf.open("out/homes")[0]
+    frame = pf.open("out/train/homes")[0]
     seen = first(f"viewseen/{frame.id.replace('/', '_')}_normal.png")
     truth = (frame.layer("normal") // 257).astype(np.uint8)
     return row(frame.colour, truth, normals_of(seen))
@@ -253,7 +253,7 @@ def normals_of(path: Path) -> Pixels:
 
 
 def data_set() -> Image.Image:
-    frames = pf.open("out/indoor-1k/parts/views")
+    frames = pf.open("out/ten_thousand/set/parts/views")
     pictures = [frames[k].colour for k in range(8)]
     return rows(row(*pictures[:4]), row(*pictures[4:]))
 
@@ -295,7 +295,8 @@ def resume() -> Image.Image:
 
 def photographs() -> None:
     """docs/pictures/photographs.jpg: two photographs, each beside a rendered view."""
-    ours = [pf.open("out/desk/Desk")[1].colour, pf.open("out/desk/Laptop")[0].colour]
+    frames = pf.open("out/compare/desk")
+    ours = [frames[1].colour, frames[2].colour]
     photos = [Image.open(path) for path in sorted(OUT.glob("photos/*.png"))]
     pairs = [row(photo, view) for photo, view in zip(photos, ours, strict=True)]
     rows(*pairs).save(PICTURES.parent / "photographs.jpg", quality=88, optimize=True)
@@ -303,11 +304,11 @@ def photographs() -> None:
 
 def photographs_seen() -> None:
     """docs/pictures/photographs_seen.jpg: each photograph beside its normals, classes and edges."""
-    said = ("seen", "classes", "edges")  # where predict.md's first three commands write
+    said = ("seen", "classes", "edges")  # where train.md's commands write
     sheets = [
         row(
             Image.open(photo),
-            *(Image.open(OUT / task / f"{photo.stem}_shown.png") for task in said),
+            *(Image.open(OUT / "train" / task / f"{photo.stem}_shown.png") for task in said),
         )
         for photo in sorted(OUT.glob("photos/*.png"))
     ]

@@ -81,7 +81,7 @@ def _check_rows(case: ViewCase, rows: list[dict[str, Any]]) -> None:
 
 
 def flux_lm(light: Mapping[str, Any], emission: Mapping[str, Any]) -> float:
-    """Flux in lm of a light of house.json under the recipe's group `emission` (docs/spec/sky.md).
+    """Flux in lm of a light of house.json under the recipe's group `emission` (docs/light.md).
 
     The source states the flux that leaves the lamp, from which its shade takes a part of the bulb's.
     """

@@ -125,7 +125,7 @@ def _sun(house: str, recipe: Mapping[str, Any]) -> tuple[float, float, bool]:
     return elevation, azimuth, is_overcast
 
 
-# Sun's elevation in degrees -> log10 lx of a clear sky on level ground (docs/spec/sky.md).
+# Sun's elevation in degrees -> log10 lx of a clear sky on level ground (docs/light.md).
 _CLEAR = (
     (-18.0, -12.0, -6.0, -3.0, 0.0, 2.0, 10.0, 30.0, 60.0, 90.0),
     (-3.2, -2.1, 0.53, 1.6, 2.78, 3.15, 3.65, 4.0, 4.11, 4.15),
@@ -133,7 +133,7 @@ _CLEAR = (
 
 
 def _sky_lx(height: float, is_overcast: bool, light: Mapping[str, Any]) -> tuple[float, float]:
-    """Lux of open level ground by the dome and by the sun (docs/spec/sky.md)."""
+    """Lux of open level ground by the dome and by the sun (docs/light.md)."""
     degrees, scale = math.degrees(height), light["sky_lx"] / 1e4
     clear = float(10 ** np.interp(degrees, *_CLEAR))
     if is_overcast:

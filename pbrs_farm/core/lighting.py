@@ -66,7 +66,7 @@ def flux_lm(
     lamp_lm: float = 1_600.0,
     lm_per_watt: float = 13.0,
 ) -> float:
-    """Luminous flux in lm of one light source (docs/spec/sky.md: one photometric scale).
+    """Luminous flux in lm of one light source (docs/light.md: one photometric scale).
 
     share: of the lamp's power. lamp_lm: flux of a Sweet Home 3D lamp of power 0.5; lm_per_watt: SUNCG's.
     """

@@ -161,7 +161,7 @@ class RepairFields(FieldGroup):
 
 
 class SurroundingFields(FieldGroup):
-    """Surroundings before the windows (docs/dress/outside.md), which light the rooms."""
+    """Surroundings before the windows (docs/dress.md), which light the rooms."""
 
     steps = ("house",)
 
@@ -336,7 +336,7 @@ class LightFields(FieldGroup):
 
 
 class SkyFields(FieldGroup):
-    """Outdoor light (docs/spec/sky.md)."""
+    """Outdoor light (docs/light.md)."""
 
     steps = ("illuminance", "light")
 

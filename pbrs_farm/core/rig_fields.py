@@ -87,7 +87,7 @@ class RigCamera(FieldGroup):
 
 
 class RigFields(FieldGroup):
-    """The cameras that take each view together; the first has the view's own id (docs/motion/rigs.md)."""
+    """The cameras that take each view together; the first has the view's own id (docs/cameras.md)."""
 
     steps = ("cameras",)
 

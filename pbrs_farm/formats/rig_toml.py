@@ -50,4 +50,4 @@ def rig_from_toml(path: Path) -> RigFields:
 
 def rig_from_table(fields: Mapping[str, Any], place: object) -> RigFields:
     """The rig in the tables of such a file; BadInput, naming place and key, for invalid ones."""
-    return checked(RigFields, dict(fields), place, hint="docs/motion/rigs.md")
+    return checked(RigFields, dict(fields), place, hint="docs/cameras.md")

@@ -151,7 +151,7 @@ class CameraOptions(Record):
     )
     rig: Path | None = option(
         None,
-        "several cameras at the same instants, by a file rig.toml (docs/motion/rigs.md)",
+        "several cameras at the same instants, by a file rig.toml (docs/cameras.md)",
         group="viewpoints",
         metavar="FILE",
     )

@@ -51,13 +51,6 @@ SHRUNK_FILE = (  # of a data set
 NEEDS = {  # what a page takes from a page before it
     "data": ("run Studio --recipe preview --views 2 --out out/studio",),
     "study": ("run made:1..20 --recipe preview --modes mlt_il_ol --out out/homes",),
-    "hugging_face": ("run made:1..20 --dress 1 --recipe fast --modes mlt_il_ol --out out/homes",),
-    "night": ("run Studio --recipe preview --views 1 --out out/day",),
-    "predict": ("run made:1..20 --recipe preview --modes mlt_il_ol --out out/homes",),
-    "compare": (
-        "run made:1..20 --recipe preview --modes mlt_il_ol --out out/homes",
-        "run Studio --recipe preview --modes mlt_il_ol --out out/other",
-    ),
 }
 
 
@@ -77,9 +70,6 @@ def test_a_page_runs_to_its_end(page: Path, tmp_path: Path) -> None:
     _provide(tmp_path, text)
     for line in NEEDS.get(page.stem, ()):
         _command(f"pbrs-farm {line}", tmp_path, small=True)
-    if page.stem == "predict" and find_spec("torch"):
-        train = "pbrs-farm train normals out/homes --out out/runs/normals --set steps=2"
-        _command(train, tmp_path, small=True)
     variables: dict[str, str] = {}
     session = ""
     for block in blocks_of(page):
@@ -183,10 +173,9 @@ def _provide(folder: Path, text: str) -> None:
         (folder / name).write_text(block)
     if not (folder / "mine.csv").exists():
         (folder / "mine.csv").write_text("from,id,name\nchair,1,seat\nsofa,1,seat\nbed,2,bed\n")
-    for models in ("my_models", "my_objects"):
+    for models in ("my_furniture", "my_objects"):
         (folder / models).mkdir()
-        for name, size in (("mug", 0.1), ("carton", 0.14)):
-            edge = 1000 * size if models == "my_models" and "--unit mm" in text else size
+        for name, edge in (("mug", 0.1), ("carton", 0.14)):
             trimesh.creation.box([edge, edge, 1.2 * edge]).export(folder / models / f"{name}.glb")
     (folder / "my-home.sh3d").write_bytes(archive())
     camera = {"fx": 60.0, "fy": 60.0, "cx": 32.0, "cy": 24.0, "width": 64, "height": 48}

@@ -98,7 +98,7 @@ def test_labels_are_those_of_the_home(root, scans) -> None:
 
 
 def test_the_docs_have_the_scanners() -> None:
-    page = Path(__file__).parents[2] / "docs/formats/lidar.md"
+    page = Path(__file__).parents[2] / "docs/howto/sensors.md"
     assert scanners_table() in page.read_text()
 
 

@@ -155,7 +155,7 @@ def _pcd(records: NDArray[Any], words: Iterable[str]) -> bytes:
 
 
 def scanners_table() -> str:
-    """The Markdown table of scanners in docs/formats/lidar.md."""
+    """The Markdown table of scanners in docs/howto/sensors.md."""
     rows = [
         "| scanner | rings, degrees | beams a ring | range in m | noise |",
         "|---|---|---|---|---|",
