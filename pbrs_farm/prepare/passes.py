@@ -15,7 +15,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Final, NamedTuple, TypeAlias
 
 from pbrs_farm.core import keys
-from pbrs_farm.core.catalogue import EMPTY
+from pbrs_farm.core.catalogue import EMPTY, Catalogue
 from pbrs_farm.core.house import House
 from pbrs_farm.core.made_home import VERSION as GENERATE_VERSION
 from pbrs_farm.core.plugins import marks_in_digest
@@ -265,7 +265,14 @@ def _repair(work: Preparation) -> Preparation:
     def occluder_from(some: House) -> Caster:
         return Caster.of_house(some)
 
-    repaired = partial(repair, fields=work.recipe.repair, occluder_from=occluder_from)
+    def lamps_from() -> Catalogue:
+        from pbrs_farm.dress.content import content
+
+        return content().with_families(EMPTY)
+
+    repaired = partial(
+        repair, fields=work.recipe.repair, occluder_from=occluder_from, lamps_from=lamps_from
+    )
     dressed = work.dressed
     if dressed is None:
         house, report = repaired(work.house)
@@ -318,7 +325,8 @@ PASSES: Final = (
     Pass("stand-ins", 3, _stand_in, _has_stand_ins, _stand_ins_depend),
     Pass("furnish", GENERATE_VERSION + _FURNISH_VERSION, _furnish, _is_furnished, _furnish_depends),
     Pass("dress", 10, _dress, _is_dressed, _dress_depends),
-    Pass("repair", 3, _repair, _is_home),
+    # Its version counts the generated ceiling lamps, too.
+    Pass("repair", 4, _repair, _is_home),
     Pass("open", 1, _leave_open, _stands_open, _open_depends),
     Pass("float", 1, _float, _has_floating_things, _float_depends),
     Pass(

@@ -10,11 +10,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
+from pbrs_farm.core.catalogue import Catalogue
 from pbrs_farm.core.house import Enclosure, House, Note, Room
 from pbrs_farm.core.recipe import RepairFields
 from pbrs_farm.repair.lamps.bulbs import with_bulbs
 from pbrs_farm.repair.lamps.lampshades import with_shades
-from pbrs_farm.repair.lamps.room_lighting import with_room_lighting
+from pbrs_farm.repair.lamps.room_lighting import with_measured_lamps, with_room_lighting
 from pbrs_farm.repair.measure.enclosure import Space
 from pbrs_farm.repair.measure.furniture_audit import furniture_audit
 from pbrs_farm.repair.measure.leaks import Occluder, leaks_of_house
@@ -45,6 +46,7 @@ class Repairing:
     house: House
     fields: RepairFields
     occluder_from: Callable[[House], Occluder] | None
+    lamps_from: Callable[[], Catalogue] | None = None
     facts: Mapping[str, Any] = field(default_factory=dict)
     built: Structure | None = None
 
@@ -73,16 +75,21 @@ class RepairStep:
 
 
 def repair(
-    house: House, fields: RepairFields, *, occluder_from: Callable[[House], Occluder] | None = None
+    house: House,
+    fields: RepairFields,
+    *,
+    occluder_from: Callable[[House], Occluder] | None = None,
+    lamps_from: Callable[[], Catalogue] | None = None,
 ) -> tuple[House, RepairReport]:
     """The repaired house and a report of all changes (paper section 3).
 
     An already repaired house is returned unchanged. occluder_from: builds a ray caster over
-    a house's triangles; None leaves leaks and the lamps' light output ratio unmeasured.
+    a house's triangles; None leaves leaks and the lamps' light output ratio unmeasured. lamps_from:
+    loads the catalogue of ceiling lamps to add; with None they are globes on cords.
     """
     if house.is_repaired:
         return house, RepairReport(house_id=house.id, was_repaired=True)
-    work = Repairing(house, fields, occluder_from)
+    work = Repairing(house, fields, occluder_from, lamps_from)
     for step in STEPS:
         work = step.run(work)
     counts = {name: work.facts[name] for name in StructureReport.model_fields if name in work.facts}
@@ -145,8 +152,17 @@ def _with_room_lighting(work: Repairing) -> Repairing:
         fallback=fields.fallback_light,
         in_every_room=fields.lamp_in_every_room,
         lamp_lx=fields.lamp_lx,
+        lamps_from=work.lamps_from,
     )
-    return work.after(house, fallback_lights=lights.fallback, added_lamps=lights.added)
+    n_added = len(house.items) - len(work.house.items)
+    if work.occluder_from is not None:
+        house = with_measured_lamps(house, n_added, fields, work.occluder_from)
+    return work.after(
+        house,
+        fallback_lights=lights.fallback,
+        added_lamps=lights.added,
+        brightened_lamps=lights.brightened,
+    )
 
 
 def _with_enclosure(work: Repairing) -> Repairing:

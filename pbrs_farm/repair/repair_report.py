@@ -169,6 +169,7 @@ class RepairReport(Record, extra="allow"):
     sources: tuple[SourceRepair, ...] = ()
     fallback_lights: tuple[str, ...] = ()  # ids of the rooms that got one: nothing lit them
     added_lamps: tuple[str, ...] = ()  # ids of rooms with no lamp, or too weak ones
+    brightened_lamps: tuple[str, ...] = ()  # ids of rooms whose ceiling lamps were too weak
     added_ceilings: tuple[str, ...] = ()  # ids of rooms that had walls and no ceiling
     rooms: tuple[RoomAudit, ...] = ()
     is_leaking: bool | None = None  # None = not measured

@@ -92,6 +92,9 @@ def _lines_of_lamps(report: RepairReport) -> Iterator[str]:
     if report.added_lamps:
         yield f"{_n(len(report.added_lamps), 'room')} where people live had no lamp, or too weak ones; a ceiling light was added for the evening: {_some(report.added_lamps)}."
 
+    if report.brightened_lamps:
+        yield f"{_n(len(report.brightened_lamps), 'room')} had too weak ceiling lamps, which are brighter now: {_some(report.brightened_lamps)}."
+
 
 def _lines_of_rooms(report: RepairReport) -> Iterator[str]:
     for room in report.rooms:

@@ -1,80 +1,173 @@
 """Position and shape of the lamp that repair adds to a room; no effects.
 
-`ceiling_lamp` alone defines an added lamp: a glowing ball.
+Its shape is a piece of the group `ceiling_lamp` of the given catalogue. If there is no catalogue, or no
+piece of it fits below the ceiling, it is a small globe on a cord.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Final
+
 import numpy as np
 import shapely
 
+from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import F64, triple
+from pbrs_farm.core.catalogue import Catalogue, Shape
 from pbrs_farm.core.classes import CEILING, LAMP, OTHERSTRUCTURE
-from pbrs_farm.core.house import House, Item, ItemKind, LightPart, Room, corners_of_surfaces
+from pbrs_farm.core.house import (
+    House,
+    Item,
+    ItemKind,
+    LightPart,
+    Material,
+    MaterialKind,
+    Room,
+    corners_of_surfaces,
+)
 from pbrs_farm.core.lighting import PowerUnit
-from pbrs_farm.core.mesh import distances_to_triangles
+from pbrs_farm.core.mesh import clipped_to_box, distances_to_triangles
 from pbrs_farm.geometry.heights import lowest_above
+from pbrs_farm.geometry.solids import lathe
 from pbrs_farm.repair.lamps.bulbs import icosphere
 from pbrs_farm.repair.structure import plan_geometry as plan
 from pbrs_farm.repair.structure.prisms import polygons_of
 
 ADDED_LAMP = "added"  # tag of every lamp that repair adds
-_BELOW_CEILING_M = 0.2  # distance of the lamp's centre from the ceiling
+_GROUP: Final = "ceiling_lamp"  # of the catalogue
+_LEAST_LM, MOST_LM = 600.0, 10_000.0  # of one lamp: a small bulb, a chandelier
+_GLOBE_BELOW_CEILING_M = 0.2  # distance of a globe's centre from the ceiling
 _TALL_M = 0.5  # furniture that comes this near to the ceiling blocks its area for lamps
 _OWN_WALL_M = 0.2  # maximum distance of a room's own walls inside its outline, metres
 _HEAD_M = 1.9  # a lamp hangs this high above the floor where the ceiling does
 _RADIUS_M = 0.1
 _POWER = 0.5  # power of a lamp in Sweet Home 3D: its default
-_LEAST_LM, _MOST_LM = 600.0, 10_000.0  # of one lamp: a small bulb, a chandelier
 _ABOVE_FLOOR_M = 0.5  # structure lower than this is the floor
+_SLACK_M = 0.05  # between the drawn height of a ceiling and its mesh
 _GRID_M = 0.25  # spacing of the places tried below a sloped ceiling
+_FLAT_M = 0.2  # maximum height of a lamp close to the ceiling
+_SMALL_M2 = 8.0  # rooms below this floor area take flat lamps first
+_WIDEST = 0.3  # maximum width of a lamp, as a share of the room's shorter side
+_AROUND_M = 0.03  # free space around a lamp
+_GAP_M = 0.0005  # between a lamp and the ceiling: coincident faces flicker
+_SCALES = (1.0, 0.75, 0.5)
 
 
 def ceiling_lamp(
-    house: House, room: Room, material: int, tag: str, flux_lm: float = 0.0
-) -> Item | None:
-    """A ball below the ceiling, in the centre of its largest free part.
+    house: House, room: Room, tag: str, flux_lm: float = 0.0, lamps: Catalogue | None = None
+) -> tuple[Item, Shape] | None:
+    """A lamp under the ceiling, in the centre of its largest free part, and its shape.
 
-    None if there is nothing above the room to hang it from: an attic without a roof. material: index
-    of its bulb material. tag: reason for adding it; prefix of the item's id. flux_lm: its luminous
-    flux, limited to that of one lamp; 0 = that of a lamp of Sweet Home 3D.
+    None if there is nothing above the room to hang it from: an attic without a roof. The materials of
+    the item's surfaces are indices into shape.materials. tag: reason for adding it; prefix of the item's
+    id. flux_lm: its luminous flux, limited to that of one lamp; 0 = that of a lamp of Sweet Home 3D.
     """
-    centre = place_of_lamp(house, room)
-    if centre is None:
+    top = place_of_lamp(house, room)
+    if top is None:
         return None
-    radius = _RADIUS_M
-    near = [i for i in house.items if _within_bounds(i, centre, 2 * radius)]
-    # Shrink it until it touches nothing.
-    for item in near:
-        free = distances_to_triangles(centre, corners_of_surfaces(item.surfaces)).min()
-        radius = max(min(radius, 0.9 * float(free)), 0.01)
-    light = LightPart(
-        position=triple(centre),
-        radius_m=radius,
-        power=min(max(flux_lm, _LEAST_LM), _MOST_LM) if flux_lm else _POWER,
-        unit=PowerUnit.LUMEN if flux_lm else PowerUnit.SWEETHOME3D,
-        emitting=(0,),
-        escape=1.0,
+    fitting = _fitting_piece(lamps, house, room, top) if lamps else None
+    shape, scale = fitting or (_globe(house, room, top), 1.0)
+    at = top - [0.0, float(shape.bounds[1, 1]) * scale + _GAP_M, 0.0]
+    surfaces = tuple(
+        replace(s, positions=(s.positions * scale + at).astype(np.float32)) for s in shape.surfaces
     )
-    return Item(
+    power = min(max(flux_lm, _LEAST_LM), MOST_LM) if flux_lm else _POWER
+    unit = PowerUnit.LUMEN if flux_lm else PowerUnit.SWEETHOME3D
+    lights = tuple(
+        replace(
+            light,
+            position=triple(np.array(light.position) * scale + at),
+            radius_m=light.radius_m * scale,
+            power=power,
+            unit=unit,
+            share=1.0 / len(shape.lights),
+            rgb_linear=(1.0, 1.0, 1.0),  # the recipe draws the colour of white lamps
+        )
+        for light in shape.lights
+    )
+    item = Item(
         id=f"{tag}_{room.id}",
         name=f"{tag} ceiling light",
         kind=ItemKind.LAMP,
         level_id=room.level_id,
-        surfaces=(icosphere("bulb", centre, radius, material),),
+        surfaces=surfaces,
         nyu40=LAMP,
         source_class=tag,
         room_id=room.id,
-        lights=(light,),
+        lights=lights,
         tags=tuple(dict.fromkeys((tag, ADDED_LAMP))),
+    )
+    return item, shape
+
+
+def _fitting_piece(
+    lamps: Catalogue, house: House, room: Room, top: F64
+) -> tuple[Shape, float] | None:
+    """The shape of a piece that fits below the ceiling at top (3,), and its scale; None if none does."""
+    height = _heights_to_hang_from(house, room, top[None, [0, 2]])[0]
+    if height > top[1] + _GAP_M:
+        return None
+    area = plan.polygon_of_room(room.polygon)
+    x0, z0, x1, z1 = area.bounds
+    widest = _WIDEST * min(x1 - x0, z1 - z0)
+    pieces = lamps.of(_GROUP)
+    # Draw an order; flat lamps first in small rooms, hanging ones first in others.
+    rng = np.random.default_rng(keys.seed("added lamp", house.id, room.id))
+    drawn = [pieces[int(k)] for k in rng.permutation(len(pieces))]
+    drawn.sort(key=lambda piece: (piece.size[2] < _FLAT_M) != (area.area < _SMALL_M2))
+    corners = corners_of_surfaces(s for item in house.items for s in item.surfaces)
+    reach = max((max(piece.size) for piece in pieces), default=0.0) + _AROUND_M
+    corners = clipped_to_box(corners, top - reach, top + reach)
+    for scale in _SCALES:
+        for piece in drawn:
+            width, depth, tall = np.array(piece.size) * scale
+            if max(width, depth) > widest or top[1] - tall < room.floor_y + _HEAD_M:
+                continue
+            if not _is_free(corners, top, np.array([width, tall, depth])):
+                continue
+            shape = lamps.shape(piece)
+            if shape is not None and shape.lights:
+                return shape, scale
+    return None
+
+
+def _is_free(corners: F64, top: F64, size: F64) -> bool:
+    """True if no triangle (F, 3, 3) reaches into the box of a lamp that hangs from top (3,)."""
+    half = size[[0, 2]] / 2 + _AROUND_M
+    low = np.array([top[0] - half[0], top[1] - size[1] - _AROUND_M, top[2] - half[1]])
+    high = np.array([top[0] + half[0], top[1] - _GAP_M, top[2] + half[1]])
+    return not len(clipped_to_box(corners, low, high))
+
+
+def _globe(house: House, room: Room, top: F64) -> Shape:
+    """An opal globe on a cord to the structure above, as large as the items around it allow."""
+    centre = top - [0.0, _GLOBE_BELOW_CEILING_M, 0.0]
+    radius = _RADIUS_M
+    for item in house.items:
+        if _within_bounds(item, centre, 2 * radius):
+            free = distances_to_triangles(centre, corners_of_surfaces(item.surfaces)).min()
+            radius = max(min(radius, 0.9 * float(free)), 0.01)
+    canopy = min(0.05, radius)
+    height = float(_heights_to_hang_from(house, room, top[None, [0, 2]])[0]) - centre[1] + radius
+    profile = [[0.0, 2 * radius], [0.004, 2 * radius], [0.004, height - 0.025]]
+    profile += [[canopy, height - 0.02], [canopy, height], [0.0, height]]
+    middle = np.array([0.0, radius, 0.0])
+    return Shape(
+        (icosphere("bulb", middle, radius, 0), lathe("cord", np.array(profile), np.zeros(3), 1)),
+        (
+            Material("fallback_bulb", kind=MaterialKind.BULB),
+            Material("fallback_cord", diffuse=(0.5, 0.5, 0.5)),
+        ),
+        lights=(LightPart(triple(middle), radius, _POWER, PowerUnit.SWEETHOME3D, emitting=(0,)),),
     )
 
 
 def place_of_lamp(house: House, room: Room) -> F64 | None:
-    """(3,) centre of the largest circle in the room's ceiling clear of tall items: cupboards, and walls
-    inside the room's outline, such as those of a bathroom drawn in it.
+    """(3,) place on the ceiling, in the centre of its largest circle clear of tall items: cupboards, and
+    walls inside the room's outline, such as those of a bathroom drawn in it.
 
-    Below the actual ceiling; if that is lower than a person or open to the sky, below its highest
+    On the actual ceiling; if that is lower than a person or open to the sky, below its highest
     point. None if everything above is open.
     """
     # Take what reaches the ceiling out of the room's plan, unless nothing would be left.
@@ -86,7 +179,7 @@ def place_of_lamp(house: House, room: Room) -> F64 | None:
     # Measure how high it is there, and look for a higher place if it is low.
     places = circle[:1]
     heights = _heights_to_hang_from(house, room, places)
-    if not room.floor_y + _HEAD_M + _BELOW_CEILING_M <= heights[0] < np.inf:
+    if not room.floor_y + _HEAD_M + _GLOBE_BELOW_CEILING_M <= heights[0] < np.inf:
         low, high = np.array(largest.bounds).reshape(2, 2)
         axes = [np.arange(low[k], high[k], _GRID_M) for k in range(2)]
         grid = np.stack([g.ravel() for g in np.meshgrid(*axes)], 1)
@@ -97,7 +190,9 @@ def place_of_lamp(house: House, room: Room) -> F64 | None:
     if not is_under.any():
         return None
     best = int(np.argmax(np.where(is_under, np.minimum(heights, room.ceiling_y), -np.inf)))
-    y = min(float(heights[best]), room.ceiling_y) - _BELOW_CEILING_M
+    y = float(heights[best])
+    # A void above the room is no place for a lamp, a ceiling a little above its drawn height is.
+    y = y if y < room.ceiling_y + _SLACK_M else room.ceiling_y
     return np.array([places[best, 0], y, places[best, 1]])
 
 

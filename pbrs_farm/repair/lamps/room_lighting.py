@@ -2,24 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
 
 from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.catalogue import Catalogue, Shape
 from pbrs_farm.core.house import House, Item, LightPart, Material, MaterialKind, Opening, Room
-from pbrs_farm.core.lighting import flux_lm
+from pbrs_farm.core.lighting import PowerUnit, flux_lm
+from pbrs_farm.core.recipe import RepairFields
 from pbrs_farm.home.lamps import flux_for_floor
 from pbrs_farm.home.room_use import is_lived_in
-from pbrs_farm.repair.lamps.ceiling_lamp import ADDED_LAMP, ceiling_lamp, heights_above
+from pbrs_farm.repair.lamps.ceiling_lamp import ADDED_LAMP, MOST_LM, ceiling_lamp, heights_above
+from pbrs_farm.repair.lamps.lampshades import with_shades
+from pbrs_farm.repair.measure.leaks import Occluder
 from pbrs_farm.repair.structure import plan_geometry as plan
 
 FALLBACK = "fallback"
 _DIM = 0.25  # lamps with less than this share of the flux a room needs count as too dim
 _LEAST_ESCAPE = 0.01  # light output ratio below which a lamp counts as none
 _HEIGHT_SLACK_M = 0.05  # a lamp or opening may lie so far outside the room's heights
+_BRIGHTER = "brighter"
+_HUNG_M = 1.4  # a lamp over a table hangs this high above the floor
+_AT_CEILING_M = 0.4  # maximum distance from the ceiling to the top of a lamp that hangs there
 _BY_THE_ROOM_M = 0.6  # an opening nearer than this is in a wall of the room
 _SKY_POINTS = 64  # points of a room without a ceiling from which rays go up
 _LEAST_SKY = 0.1  # share of them with open sky from which the sky lights the room
@@ -27,32 +34,41 @@ _LEAST_SKY = 0.1  # share of them with open sky from which the sky lights the ro
 
 @dataclass(frozen=True, slots=True)
 class GivenLights:
-    """Ids of the rooms that got a ceiling light."""
+    """Ids of the rooms that got a ceiling light or brighter ones."""
 
     fallback: tuple[str, ...]  # nothing lit them
     added: tuple[str, ...]  # rooms with daylight and either no lamp or too weak ones
+    brightened: tuple[str, ...] = ()  # too weak lamps hung at the ceiling
 
 
 def with_room_lighting(
-    house: House, *, fallback: bool, in_every_room: bool = False, lamp_lx: float = 0.0
+    house: House,
+    *,
+    fallback: bool,
+    in_every_room: bool = False,
+    lamp_lx: float = 0.0,
+    lamps_from: Callable[[], Catalogue] | None = None,
 ) -> tuple[House, GivenLights]:
-    """Set Room.lit_by of every room, and add ceiling lights where needed.
+    """Set Room.lit_by of every room, and add ceiling lights, at the end of the items, where needed.
 
     fallback: to each room with a floor, a ceiling and no light. in_every_room: to each living area
     without a lamp, regardless of daylight. Rooms open to the sky get none. lamp_lx: target
-    illuminance of an added light on the floor; a room whose lamps have little of the required flux
-    gets one for the rest. 0: all added lights are alike, and a room with any lamp gets none.
+    illuminance of an added light on the floor. If a room's lamps have little of the required flux,
+    those that hang at its ceiling become brighter; if none hangs there, the room gets a light for the
+    rest. 0: all added lights are alike, and a room with any lamp gets none. lamps_from: loads the
+    shapes of added lights.
     """
-    rooms, lights = [], []
-    rooms_lit: dict[str, list[str]] = {FALLBACK: [], ADDED_LAMP: []}
+    rooms, added = list[Room](), list[tuple[Item, Shape]]()
+    given: dict[str, list[str]] = {FALLBACK: [], ADDED_LAMP: [], _BRIGHTER: []}
     areas = [plan.polygon_of_room(r.polygon) for r in house.rooms]
     glazed = {i.id for i in house.items if _has_pane(i, house.materials)}
-    lamps = [i for i in house.items if any(_shines(light) for light in i.lights)]
     boxes = _plan_boxes(house.items)
+    items = list(house.items)
+    lamps = [k for k, i in enumerate(items) if any(_shines(light) for light in i.lights)]
     for room, area in zip(house.rooms, areas, strict=True):
         lit_by = []
         near = _items_near(house, boxes, area)
-        own_lm = sum(_flux_in(lamp, room, area) for lamp in lamps)
+        own_lm = sum(_flux_in(items[k], room, area) for k in lamps)
         wanted_lm = flux_for_floor(area.area, lamp_lx)
         if own_lm > 0:
             lit_by.append("lamps")
@@ -66,21 +82,87 @@ def with_room_lighting(
             tag = FALLBACK
         elif in_every_room and own_lm <= _DIM * wanted_lm and room.has_floor:
             tag = ADDED_LAMP if is_lived_in(room, area.area) else ""
+        hung = [k for k in lamps if tag and _hangs_in(items[k], room, area)]
+        if hung:
+            # Make the room's own lamps brighter rather than hang another beside them.
+            hung_lm = sum(_flux_in(items[k], room, area) for k in hung)
+            for k in hung:
+                items[k] = _brightened(items[k], room, area, 1 + (wanted_lm - own_lm) / hung_lm)
+            tag = ""
+            given[_BRIGHTER].append(room.id)
+        catalogue = lamps_from() if tag and lamps_from else None
         rest_lm = max(wanted_lm - own_lm, 0.0)
-        lamp = ceiling_lamp(near, room, len(house.materials), tag, rest_lm) if tag else None
+        lamp = ceiling_lamp(near, room, tag, rest_lm, catalogue) if tag else None
         if lamp is not None:
             lit_by.append(tag)
-            lights.append(lamp)
-            rooms_lit[tag].append(room.id)
+            added.append(lamp)
+            given[tag].append(room.id)
         elif tag == FALLBACK:
             # Nothing is above the room, whatever its source says.
             lit_by.append("sky")
         rooms.append(replace(room, lit_by=tuple(lit_by)))
-    materials = house.materials
-    if lights:
-        materials = (*materials, Material("fallback_bulb", kind=MaterialKind.BULB))
-    lighted = replace(house, rooms=tuple(rooms), items=(*house.items, *lights), materials=materials)
-    return lighted, GivenLights(tuple(rooms_lit[FALLBACK]), tuple(rooms_lit[ADDED_LAMP]))
+    lighted = _with_added(replace(house, rooms=tuple(rooms), items=tuple(items)), added)
+    return lighted, GivenLights(*(tuple(ids) for ids in given.values()))
+
+
+def _with_added(house: House, added: Sequence[tuple[Item, Shape]]) -> House:
+    """The house with lamps at the end of its items, and the materials and textures of their shapes."""
+    items, materials, textures = list(house.items), list(house.materials), dict(house.textures)
+    for item, shape in added:
+        first = len(materials)
+        surfaces = tuple(replace(s, material=s.material + first) for s in item.surfaces)
+        items.append(replace(item, surfaces=surfaces))
+        materials += shape.materials
+        textures |= shape.textures
+    return replace(house, items=tuple(items), materials=tuple(materials), textures=textures)
+
+
+def with_measured_lamps(
+    house: House, n_added: int, fields: RepairFields, occluder_from: Callable[[House], Occluder]
+) -> House:
+    """The house with the light output ratio of its last n_added items, which are lamps.
+
+    Their bulbs become brighter by what their shades keep in.
+    """
+    if not n_added:
+        return house
+    kept, lamps = house.items[:-n_added], house.items[-n_added:]
+    # Structure near a lamp reflects its light; other lamps do not matter.
+    structure = tuple(item for item in kept if item.kind.is_structure and not item.lights)
+    alone = replace(house, items=(*structure, *lamps))
+    shaded, _sources = with_shades(alone, (), fields, occluder_from)
+    lamps = tuple(_compensated(item) for item in shaded.items[-n_added:])
+    return replace(house, items=(*kept, *lamps), materials=shaded.materials)
+
+
+def _compensated(item: Item) -> Item:
+    lights = tuple(
+        replace(light, power=min(light.power / (light.escape or 1.0), MOST_LM))
+        if light.unit is PowerUnit.LUMEN
+        else light
+        for light in item.lights
+    )
+    return replace(item, lights=lights)
+
+
+def _hangs_in(lamp: Item, room: Room, area: plan.Shape) -> bool:
+    """True for a lamp that hangs at the room's ceiling and gives light to the room."""
+    if not lamp.n_faces or _flux_in(lamp, room, area) <= 0:
+        return False
+    low, high = lamp.bounds[:, 1]
+    return bool(low > room.floor_y + _HUNG_M and high > room.ceiling_y - _AT_CEILING_M)
+
+
+def _brightened(lamp: Item, room: Room, area: plan.Shape, factor: float) -> Item:
+    """The lamp with the flux of its sources in the room times a factor, up to that of one lamp."""
+    lights = []
+    for light in lamp.lights:
+        if _flux_in(replace(lamp, lights=(light,)), room, area) > 0:
+            whole_lm = flux_lm(light.power, light.unit, 1.0)
+            power = max(min(whole_lm * factor, MOST_LM), whole_lm)
+            light = replace(light, power=round(power, 1), unit=PowerUnit.LUMEN)
+        lights.append(light)
+    return replace(lamp, lights=tuple(lights))
 
 
 def _plan_boxes(items: Sequence[Item]) -> F64:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.catalogue import EMPTY
 from pbrs_farm.core.classes import OTHERSTRUCTURE
 from pbrs_farm.core.house import (
     House,
@@ -22,9 +24,10 @@ from pbrs_farm.core.house import (
     Surface,
     corners_of_surfaces,
 )
-from pbrs_farm.core.lighting import PowerUnit
-from pbrs_farm.core.mesh import distances_to_triangles, face_areas, triangle_corners
+from pbrs_farm.core.lighting import PowerUnit, flux_lm
+from pbrs_farm.core.mesh import clipped_to_box, distances_to_triangles, face_areas, triangle_corners
 from pbrs_farm.core.recipe import RepairFields
+from pbrs_farm.furnishings.things.families import with_families
 from pbrs_farm.geometry.solids import box
 from pbrs_farm.home.room_use import is_lived_in
 from pbrs_farm.read.builtin.builtin_home import builtin_home
@@ -233,15 +236,61 @@ def test_an_added_lamps_flux_is_what_one_lamp_gives(lux: float, lumen: float) ->
     assert {light.power for i in house.items for light in i.lights} == {lumen}
 
 
-def test_lamps_that_are_too_weak_for_the_room_get_one_beside_them() -> None:
+def _flux_by_room(house: House) -> dict[str | None, float]:
+    flux: dict[str | None, float] = {}
+    for item in house.items:
+        for light in item.lights:
+            flux[item.room_id] = flux.get(item.room_id, 0) + flux_lm(light.power, light.unit, light.share)  # fmt: skip
+    return flux
+
+
+def test_too_weak_lamps_at_the_ceiling_become_brighter_and_others_get_one_beside_them() -> None:
     home = builtin_home()
     n_lamps = sum(bool(i.lights) for i in home.items)
-    house, report = repair(home, RepairFields(lamp_in_every_room=True, lamp_lx=1_000))
-    assert set(report.added_lamps) == {"0_0", "0_1"}
-    assert all({"lamps", "added"} <= set(r.lit_by) for r in house.rooms)
-    assert sum(bool(i.lights) for i in house.items) == n_lamps + 2
+    house, report = repair(home, RepairFields(lamp_in_every_room=True, lamp_lx=150))
+    # Room 0_0 has a lamp on a table, room 0_1 one at its ceiling.
+    assert (report.added_lamps, report.brightened_lamps) == (("0_0",), ("0_1",))
+    assert [r.lit_by for r in house.rooms] == [("lamps", "windows", "added"), ("lamps", "windows")]
+    assert sum(bool(i.lights) for i in house.items) == n_lamps + 1
+    area = polygon_of_room(home.rooms[1].polygon).area
+    assert _flux_by_room(house)["0_1"] == pytest.approx(150 * area / 0.3, rel=1e-3)
+    assert "1 room had too weak ceiling lamps" in summary_of_report(report)
     _, report = repair(home, RepairFields(lamp_in_every_room=True, lamp_lx=5))
-    assert report.added_lamps == ()
+    assert (report.added_lamps, report.brightened_lamps) == ((), ())
+
+
+def test_an_added_lamp_is_a_piece_of_the_catalogue_that_touches_nothing() -> None:
+    home = builtin_home()
+    dark = home.with_items([i for i in home.items if not i.lights])
+    fields = RepairFields(lamp_in_every_room=True, lamp_lx=100)
+    lamps = partial(with_families, EMPTY)
+    house, _ = repair(dark, fields, occluder_from=EmbreeOccluder, lamps_from=lamps)
+    added = house.items[-2:]
+    assert [i.id for i in added] == ["added_0_0", "added_0_1"]
+    rest = corners_of_surfaces(s for i in house.items[:-2] for s in i.surfaces)
+    for item in added:
+        # It reaches up to the ceiling, keeps clear of heads and is more than a ball.
+        low, high = item.bounds
+        room = next(r for r in house.rooms if r.id == item.room_id)
+        assert room.ceiling_y - 0.002 < high[1] < room.ceiling_y
+        assert low[1] >= room.floor_y + 1.89
+        assert not len(clipped_to_box(rest, low, high))
+        kinds = {house.materials[s.material].kind for s in item.surfaces}
+        assert MaterialKind.BULB in kinds
+        assert len(kinds) > 1
+        assert {house.materials[item.surfaces[k].material].kind for light in item.lights for k in light.emitting} == {MaterialKind.BULB}  # fmt: skip
+        assert all(light.escape is not None for light in item.lights)
+        # The flux that leaves the lamp is that which the room needs.
+        out = sum(flux_lm(x.power, x.unit, x.share) * (x.escape or 0) for x in item.lights)
+        assert out == pytest.approx(100 * polygon_of_room(room.polygon).area / 0.3, rel=1e-3)
+
+
+def test_a_lamp_below_a_slope_hangs_from_a_cord() -> None:
+    home, room = _with_slope()
+    lamps = partial(with_families, EMPTY)
+    house, _ = with_room_lighting(home, fallback=True, in_every_room=True, lamps_from=lamps)
+    lamp = next(i for i in house.items if i.id == f"added_{room.id}")
+    assert [s.name for s in lamp.surfaces] == ["bulb", "cord"]
 
 
 def test_a_room_with_a_lamp_of_its_own_gets_no_other() -> None:
@@ -313,18 +362,24 @@ def test_the_added_lamp_hangs_in_no_wall_that_stands_inside_the_room() -> None:
     assert there[1] == y
 
 
-def test_the_added_lamp_hangs_below_a_sloped_ceiling_where_it_is_high() -> None:
+def _with_slope() -> tuple[House, Room]:
+    """The builtin home without lamps, its first room below a sloped ceiling."""
     home = builtin_home()
     room = home.rooms[0]
     (x0, z0), (x1, z1) = room.polygon.min(0), room.polygon.max(0)
     quad = np.array([[x0, 0.9, z0], [x1, 2.4, z0], [x1, 2.4, z1], [x0, 0.9, z1]], np.float32)
     slope = Surface("slope", quad, np.array([[0, 1, 2], [0, 2, 3]], np.int32), 0)
     roof = Item("roof", "roof", ItemKind.CEILING, "0", (slope,))
-    items = [i for i in home.items if i.kind is not ItemKind.CEILING]
-    x, y, _ = _place(home.with_items([*items, roof]), room)
-    height = 0.9 + 1.5 * (x - x0) / (x1 - x0)
-    assert y == pytest.approx(height - 0.2, abs=1e-3)
-    assert y > 1.9
+    items = [i for i in home.items if i.kind is not ItemKind.CEILING and not i.lights]
+    return home.with_items([*items, roof]), room
+
+
+def test_the_added_lamp_hangs_below_a_sloped_ceiling_where_it_is_high() -> None:
+    home, room = _with_slope()
+    x0, x1 = room.polygon[:, 0].min(), room.polygon[:, 0].max()
+    x, y, _ = _place(home, room)
+    assert y == pytest.approx(0.9 + 1.5 * (x - x0) / (x1 - x0), abs=1e-3)
+    assert y > 2.1
 
 
 def test_an_added_lamp_hangs_from_what_is_there_and_never_from_the_sky() -> None:

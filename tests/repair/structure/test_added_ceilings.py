@@ -50,7 +50,7 @@ def test_a_roofless_room_is_closed_at_its_walls_height_and_its_lamp_hangs_there(
     assert (after.rooms[0].ceiling_y, report.added_ceilings) == (2.5, ("0_0",))
     assert report.rooms[0].enclosure == "closed"
     (lamp,) = [i for i in after.items if i.kind is ItemKind.LAMP]
-    assert lamp.lights[0].position[1] == pytest.approx(2.3)
+    assert lamp.lights[0].position[1] == pytest.approx(2.3, abs=1e-3)
     assert "1 room had walls and no ceiling" in summary_of_report(report)
 
 
