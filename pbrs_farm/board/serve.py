@@ -143,9 +143,10 @@ def bound_socket(host: str, port: int) -> socket.socket:
     listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         listening.bind((host.strip("[]"), port))
-    except OSError as error:
+    except (OSError, OverflowError) as error:
         listening.close()
-        text = f"cannot listen there: {error.strerror}"
+        reason = getattr(error, "strerror", "") or "a port is a number in 0..65535"
+        text = f"cannot listen there: {reason}"
         raise BadInput(f"{host}:{port}", "", text, hint="--port another") from None
     listening.listen(_BACKLOG)
     return listening

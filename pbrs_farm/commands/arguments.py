@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, Final, cast
 
 from pbrs_farm.commands.command_line import Parser
 from pbrs_farm.commands.options import add_options, group_of
+from pbrs_farm.core.checked_calls import MAX_EDGE_PX
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.number_ranges import seeds_of
 from pbrs_farm.core.shown_text import escaped, printable, shown
@@ -174,8 +175,9 @@ def size_of(text: str | None) -> tuple[int, int] | None:
     if text is None:
         return None
     width, _, height = text.partition("x")
-    if not all(n.isascii() and n.isdigit() and 1 <= int(n) <= 16384 for n in (width, height)):
-        raise BadInput("--size", text, "expected a width and a height", hint="e.g. 320x240")
+    if not all(n.isascii() and n.isdigit() and 1 <= int(n) <= MAX_EDGE_PX for n in (width, height)):
+        expected = f"expected a width and a height, each 1 to {MAX_EDGE_PX} pixels"
+        raise BadInput("--size", text, expected, hint="e.g. 320x240")
     return int(width), int(height)
 
 
@@ -214,8 +216,13 @@ def recipe_of(args: argparse.Namespace | RecipeOptions) -> Recipe:
     if getattr(args, "exact", False):
         overrides["cameras.exact"] = "true"
     if args.recipe.endswith(ENDING):
-        return recipe_from_toml(Path(args.recipe), overrides)
-    return recipe_from_name(args.recipe, overrides)
+        recipe = recipe_from_toml(Path(args.recipe), overrides)
+    else:
+        recipe = recipe_from_name(args.recipe, overrides)
+    for option in ("frames", "fps"):
+        if getattr(args, option, None) is not None and recipe.cameras.source_name != "walk":
+            raise BadInput(f"--{option}", "", "is for walks only", hint="--cameras walk")
+    return recipe
 
 
 def store_of(url: str) -> Store:

@@ -10,9 +10,9 @@ import csv
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
-from pbrs_farm.core.shown_text import did_you_mean
+from pbrs_farm.core.shown_text import did_you_mean, hint_of_choice
 
 _TABLE: Final = Path(__file__).with_name("verbs.csv")
 
@@ -49,6 +49,12 @@ class Parser(argparse.ArgumentParser):
         """
         actions = [a for a in self._actions if isinstance(a, argparse._SubParsersAction)]
         return dict(actions[0].choices) if actions else {}
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        """As argparse's, with the nearest choices in the message."""
+        if action.choices is not None and value not in action.choices:
+            near = hint_of_choice(str(value), [str(choice) for choice in action.choices])
+            raise argparse.ArgumentError(action, f"invalid choice: {value!r} ({near})")
 
     def format_help(self) -> str:
         """The help text: argparse's for a verb, the verbs in groups for the command."""

@@ -57,6 +57,7 @@ def _submit(args: argparse.Namespace) -> int:
 def _submitted(args: argparse.Namespace, request: SubmitRequest) -> str:
     """Send the houses to the farm; returns the job's id, "" after a dry run."""
     from pbrs_farm.prepare.passes import uses_catalogue
+    from pbrs_farm.store import store_from_url
     from workers.client.estimate import estimate
     from workers.client.farm_client import completed
     from workers.house_files import (
@@ -80,6 +81,8 @@ def _submitted(args: argparse.Namespace, request: SubmitRequest) -> str:
     _warn_of_paths([ref.location for ref in refs if is_left_in_place(ref)])
     # Estimate without access to the store or Redis.
     if request.dry_run:
+        if args.store:
+            store_from_url(args.store)  # refuses an unknown scheme; connects to nothing
         plan = estimate(completed(houses, spec)[1], request.slots)
         if request.as_json:
             echo_json(plan)

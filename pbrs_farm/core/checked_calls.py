@@ -66,6 +66,7 @@ MAX_VIEW_PIXELS: Final = 2**27
 
 Count = Annotated[int, Where("a whole number of 1 or more", lambda v: v >= 1)]
 Whole = Annotated[int, Where("a whole number of 0 or more", lambda v: v >= 0)]
+NotNegative = Annotated[float, Where("a number of 0 or more", lambda v: v >= 0)]
 Positive = Annotated[float, Where("a number above 0", lambda v: v > 0)]
 Share = Annotated[float, Where("a number in 0..1", lambda v: 0 <= v <= 1)]
 Vector = Annotated[Sequence[float], Where("three finite numbers", lambda v: _are_numbers(v, 3))]
@@ -103,7 +104,14 @@ def checked_call(function: Callable[_P, _R]) -> Callable[_P, _R]:
     @wraps(function)
     def call(*args: _P.args, **kwargs: _P.kwargs) -> _R:
         hints = _hints_of(function)
-        for name, value in signature.bind(*args, **kwargs).arguments.items():
+        try:
+            given = signature.bind(*args, **kwargs).arguments
+        except TypeError as error:
+            unknown = [name for name in kwargs if name not in signature.parameters]
+            near = hint_of_choice(unknown[0], list(signature.parameters)) if unknown else ""
+            text = f"{function.__name__}(): {error}"
+            raise TypeError(f"{text}; {near}" if near else text) from None
+        for name, value in given.items():
             if name in hints:
                 check_argument(function.__name__, name, value, hints[name])
         try:

@@ -12,6 +12,7 @@ from pbrs_farm.core.checked_calls import MAX_EDGE_PX, MAX_VIEW_PIXELS
 from pbrs_farm.core.entries import EntryTable
 from pbrs_farm.core.lighting import BULB_RADIUS_M
 from pbrs_farm.core.plugins import checked_names
+from pbrs_farm.core.shot import MOST_FRAMES
 from pbrs_farm.core.shown_text import hint_of_choice
 
 MAX_SAMPLES: Final = 2**20
@@ -226,7 +227,7 @@ class CameraFields(FieldGroup):
     )
     file: str = field("", "camera or trajectory file of the user's, for those sources")
     exact: bool = field(False, "score every candidate at full size")
-    walk_frames: int = field(150, "walk: views along it", 2, 100_000)
+    walk_frames: int = field(150, "walk: views along it", 2, MOST_FRAMES)
     walk_fps: float = field(30.0, "walk: frames a second", high=1_000, above=0)
     walk_speed_mps: float = field(0.8, "walk: of the eye, at most", 0.1, 10)
     walk_turn_dps: float = field(60.0, "walk: degrees a second, at most", 5, 720)

@@ -15,6 +15,9 @@ from typing import Any, Final, Literal
 
 from pbrs_farm.core import keys
 
+MOST_FRAMES: Final = 100_000
+"""Of one film: ids of more would not sort."""
+
 _FILM: Final = "clip"  # the take of all frames of a house; part of their seeds
 _FRAME: Final = re.compile(r"frame_(\d{5,})")
 

@@ -16,7 +16,7 @@ from pbrs_farm.core.entries import EntryTable
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.options import flag, options_of, record_of
 from pbrs_farm.core.record import Record
-from pbrs_farm.core.shown_text import did_you_mean
+from pbrs_farm.core.shown_text import did_you_mean, hint_of_choice
 
 if TYPE_CHECKING:
     from pbrs_farm.export.chosen_view import Choice, ChosenView
@@ -126,7 +126,7 @@ def form_of(name: str) -> Form:
     """
     names = form_names()
     if name not in names:
-        raise BadInput("--to", name, "no such form", hint=f"of {', '.join(names)}")
+        raise BadInput("--to", name, "no such form", hint=hint_of_choice(name, names))
     form: Form = FORMS.entry(name)
     return form
 

@@ -90,6 +90,16 @@ def ray_lengths(i: Intrinsics) -> F64:
     return np.asarray(np.sqrt(1 + x[None, :] ** 2 + y[:, None] ** 2))
 
 
+def signed_ids(ids: NDArray[Any]) -> NDArray[Any]:
+    """Ids with -1 for 0, as int16 if all fit and as int32 otherwise.
+
+    >>> signed_ids(np.array([0, 40000], np.uint16))
+    array([   -1, 40000], dtype=int32)
+    """
+    dtype = np.int16 if int(ids.max(initial=0)) <= np.iinfo(np.int16).max else np.int32
+    return np.where(ids > 0, ids.astype(dtype), dtype(-1))
+
+
 def preview(colour: F32, has_surface: NDArray[np.bool_]) -> NDArray[np.uint8]:
     """(H, W, 3) uint8: linear colour with the tone mapping of Hypersim's repository.
 

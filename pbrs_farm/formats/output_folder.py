@@ -76,7 +76,10 @@ def views_of(root: Path) -> tuple[ViewEntry, ...]:
     # Homes first, then objects without context.
     roots = [root / name for name in keys.FOLDERS if (root / name).is_dir()]
     if not roots:
-        text = "not an output folder of pbrs-farm: it has no houses"
+        is_there = root.is_dir()
+        text = (
+            "not an output folder of pbrs-farm: it has no houses" if is_there else "no such folder"
+        )
         raise BadInput(root, "", text, hint="see --out")
     folders = [folder for below in roots for folder in sorted(below.iterdir())]
     return tuple(view for folder in folders for view in _views(folder))

@@ -24,6 +24,7 @@ from pbrs_farm.core.camera import Camera, camera_of_recipe, intrinsics_from_k, r
 from pbrs_farm.core.checked_calls import (
     MAX_EDGE_PX,
     Count,
+    NotNegative,
     Positive,
     Share,
     Size,
@@ -378,6 +379,11 @@ class Home:
         """
         if not models:
             raise BadInput("scatter", "models", "give at least one model")
+        if on is not None and in_:
+            raise BadInput("scatter", "in_", "cannot be combined with on=", hint="one of the two")
+        if floating and on is not None:
+            text = "floating items have no support: cannot be combined with on="
+            raise BadInput("scatter", "floating", text, hint='in_="Kitchen" chooses a room')
         if floating and physics:
             raise BadInput(
                 "scatter", "floating", "what hangs in the air does not fall", hint="one of the two"
@@ -427,11 +433,16 @@ class Home:
 
     @checked_call
     def open(
-        self, items: ItemLike, share: Share = 1.0, part: str = "*", *, at: Keys | None = None
+        self,
+        items: ItemLike,
+        share: Share | None = None,
+        part: str = "*",
+        *,
+        at: Keys | None = None,
     ) -> Home:
         """The home with doors, drawers and lids of items open by a share of their way; 0 closes them.
 
-        items: as of `without`; part: name or pattern of parts in `home.joints`, as "drawer*". at: seconds ->
+        items: as of `without`; share: 1 if not given; part: name or pattern of parts in `home.joints`, as "drawer*". at: seconds ->
         share instead, {0: 0, 2: 1}: linear motion between these times, for films. A blocked part opens as far
         as it can, with a warning. Raises BadInput if no part of the items opens.
 
@@ -440,9 +451,11 @@ class Home:
             >>> home.open("door*", at={0: 0, 2: 1}).motions.column("until_s")[0]
             2.0
         """
+        if at is not None and share is not None:
+            raise BadInput("open", "at", "cannot be combined with share", hint="one of the two")
         joints = self._joints_of(items, part)
         if at is None:
-            return self._opened(OpenJoints(joints=joints, share=float(share)))
+            return self._opened(OpenJoints(joints=joints, share=1.0 if share is None else share))
         keys = tuple((float(t), float(at[t])) for t in sorted(at))
         return self._opened(KeyJoints(joints=joints, keys=keys))
 
@@ -472,7 +485,7 @@ class Home:
         return home
 
     @checked_call
-    def at(self, time_s: float) -> Home:
+    def at(self, time_s: NotNegative) -> Home:
         """The home at a time, seconds, with all motions stopped there.
 
         >>> moving = home.open("door*", at={0: 0, 2: 1})
@@ -684,18 +697,27 @@ class Home:
 
     @checked_call
     def cameras(
-        self, preset: str | None = None, n: Count | None = None, **fields: Any
+        self,
+        preset: str | None = None,
+        n: Count | None = None,
+        *,
+        size: Size | None = None,
+        **fields: Any,
     ) -> Viewpoints:
         """Viewpoints by the rules of a preset, best first in each room.
 
         preset: photo, paper or released; None = the recipe's. n: so many, spread over rooms; None =
-        all. fields: of the recipe's group `cameras`, such as hfov_rad=1.2 or source="walk".
+        all. size: (width, height) of the pictures, pixels; None = the recipe's. fields: of the recipe's
+        group `cameras`, such as hfov_rad=1.2 or source="walk".
 
             >>> len(home.cameras("photo", n=2))
             2
         """
         changes = {"preset": preset, **fields} if preset is not None else fields
-        home = self.set(**{f"cameras.{name}": value for name, value in changes.items()})
+        settings = {f"cameras.{name}": value for name, value in changes.items()}
+        if size is not None:
+            settings |= {"image.width_px": size[0], "image.height_px": size[1]}
+        home = self.set(**settings)
         data = self.renderer.sampled(self.source, home.recipe)
         views = views_from_json(data, "cameras.json")
         rows = [(view.id, view.room_id, view.score) for view in views.values()]

@@ -21,6 +21,7 @@ from pbrs_farm.core.checked_calls import (
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.lighting import ALL_MODES, Mode
 from pbrs_farm.core.recipe import Recipe, with_settings
+from pbrs_farm.core.shot import MOST_FRAMES
 from pbrs_farm.formats.rig_toml import rig_from_table, rig_from_toml
 from pbrs_farm.progress import progress_reporter
 from pbrs_farm.run.local import run_local
@@ -136,6 +137,9 @@ def film(
         >>> [frame.ref.view for frame in frames]
         ['frame_00000', 'frame_00001']
     """
+    if fps * seconds > MOST_FRAMES:
+        text = f"{fps:g} frames a second for {seconds:g} s are too many, at most {MOST_FRAMES:,}"
+        raise BadInput("film", "seconds", text)
     n = max(1, round(fps * seconds))
     per_frame = [cameras] * n if isinstance(cameras, Camera | Viewpoint) else list(cameras)
     if len(per_frame) != n:

@@ -39,6 +39,11 @@ def zipped(path: Path, **entries: str) -> Path:
         (["run", "builtin", "--out", "{out}", "--layers", "smell"], "no such layer"),
         (["run", "builtin", "--out", "{out}", "--size", "axb"], "expected a width and a height"),
         (["run", "builtin", "--out", "{out}", "--size", "640"], "e.g. 320x240"),
+        (["run", "builtin", "--out", "{out}", "--size", "99999x9"], "each 1 to 16384 pixels"),
+        (["run", "builtin", "--out", "{out}", "--fps", "10"], "--fps: is for walks only"),
+        (["export", "{out}/none", "--to", "coco", "--out", "{out}"], "{out}/none: no such folder"),
+        (["board", "/tmp", "--port", "99999"], "99999: cannot listen there: a port is a number"),
+        (["submit", "builtin", "--dry-run", "--store", "ftp://a/b"], "'ftp://a/b': not a store"),
         (["run", "builtin", "--out", "{out}", "--noise", "low"], "light.noise"),
         (["run", "builtin", "--out", "{out}", "--time-budget", "-1"], "light.time_budget_s"),
         (

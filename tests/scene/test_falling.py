@@ -80,7 +80,7 @@ def test_what_does_not_rest_flies_off_or_begins_inside_is_named(
 ) -> None:
     with pytest.raises(BadInput, match=r"crate 1.*still moves after 0.2 s"):
         held.drop("crate 1", seconds=0.2)
-    with pytest.raises(BadInput, match=r"crate 1.*exploded"):
+    with pytest.raises(BadInput, match="drop: push: expected at most 50 m/s"):
         held.drop("crate 1", push=(0, 500, 0))
     table = held.items["dining table"].bounds
     x, _y, z = table.mean(0)

@@ -41,7 +41,6 @@ from pbrs_farm.transport.develop.mode_pictures import denoise_aovs
 
 _MOST_SCENES: Final = 999  # scenes of a volume
 _MOST_LIGHT: Final = 65504.0  # maximum of a half float
-_INT16: Final = 32767
 _INDEX: Final = "index.csv"  # not in Hypersim: the view of each frame
 _CREDITS: Final = "ATTRIBUTION.txt"
 _SPLIT_FIELDS: Final = (
@@ -207,7 +206,6 @@ def _geometry(view: ChosenView) -> dict[str, NDArray[Any]]:
         z = view.array("depth_z").astype(np.float64)
     i, is_visible = intrinsics_of(view.facts), z > 0
     along = np.where(is_visible, z * hypersim.ray_lengths(i), np.nan)
-    whole = np.int16 if int(instance.max(initial=0)) <= _INT16 else np.int32
     semantic = view.array("semantic") if view.choice.classes is None else None
     pose, turn = pose_opencv(view), hypersim.Z_UP_FROM_Y_UP
     local = opengl_normals(view)
@@ -216,7 +214,7 @@ def _geometry(view: ChosenView) -> dict[str, NDArray[Any]]:
         "position": _positions(z, i, pose, turn),
         "normal_cam": local,
         "normal_world": _in_world(local, pose, turn),
-        "semantic_instance": np.where(instance > 0, instance, -1).astype(whole),
+        "semantic_instance": hypersim.signed_ids(instance),
         "render_entity_id": np.where(instance > 0, instance.astype(np.int32), np.int32(-1)),
     }
     if semantic is not None:

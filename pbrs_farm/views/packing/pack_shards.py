@@ -14,6 +14,7 @@ import pyarrow.parquet as pq
 from pbrs_farm.core.checked_calls import checked_call
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.shown_text import hint_of_choice
 from pbrs_farm.regular_files import digest_of_regular, files_below, new_folder
 from pbrs_farm.views.dataset_json import DATASET_JSON, Dataset, Shard, dataset_json
 from pbrs_farm.views.packing.croissant import croissant_json
@@ -57,7 +58,7 @@ def pack(
     {'all': 1}
     """
     if form not in FORMS:
-        raise BadInput("--to", form, "no such form", hint=f"of {', '.join(FORMS)}")
+        raise BadInput("--to", form, "no such form", hint=hint_of_choice(form, FORMS))
     source, left_out = views.source, dict(views.left_out)
     if not isinstance(source, StoredRoot):
         raise BadInput(source.url, "", "is packed already", hint="pack the output folder itself")

@@ -10,6 +10,7 @@ import numpy as np
 from pbrs_farm.core.checked_calls import as_words, check_fields
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house_split import SPLITS, SplitShares, split_of_house
+from pbrs_farm.core.shown_text import hint_of_choice
 from pbrs_farm.views.dataset_json import WHOLE
 from pbrs_farm.views.view_sample import LAYERS, MODES, SampleRequest, Size
 from pbrs_farm.views.views import ViewRef
@@ -43,7 +44,9 @@ class Packing:
         for mode in self.modes:
             SampleRequest(self.layers, mode, size=self.size)  # raises BadInput for invalid values
         if self.colour not in COLOURS:
-            raise BadInput("colour", self.colour, "no such form", hint=f"of {', '.join(COLOURS)}")
+            raise BadInput(
+                "colour", self.colour, "no such form", hint=hint_of_choice(self.colour, COLOURS)
+            )
         if self.views_per_shard < 1 or not 1 <= self.quality <= 100:
             text = f"{self.views_per_shard} views a shard, quality {self.quality}"
             raise BadInput("pack", "", text, hint="1 or more views, a quality of 1 to 100")
