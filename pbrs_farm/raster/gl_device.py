@@ -52,10 +52,13 @@ def open_context() -> Any:
     raise MachineFailed(text, hint=system_command("gl"))
 
 
-def texture_from_pixels(context: Any, pixels: NDArray[np.uint8]) -> Any:
-    """A repeating, mipmapped sRGB texture from (H, W, 3 or 4) uint8, row 0 = top.
+def texture_from_pixels(
+    context: Any, pixels: NDArray[np.uint8], repeats: tuple[bool, bool] = (True, True)
+) -> Any:
+    """A mipmapped sRGB texture from (H, W, 3 or 4) uint8, row 0 = top.
 
-    pixels: sRGB bytes; without alpha it is opaque. Larger pictures than OpenGL must accept are
+    pixels: sRGB bytes; without alpha it is opaque. repeats: along u and v; where it does not, its edge
+    goes on, or coarse levels would mix the colours of both ends at the border. Larger pictures than OpenGL must accept are
     thinned by whole steps, not filtered. Lives as long as the context: release both.
     """
     # Subsample textures larger than OpenGL's guaranteed limit.
@@ -68,7 +71,7 @@ def texture_from_pixels(context: Any, pixels: NDArray[np.uint8]) -> Any:
     texture = context.texture(size, 4, rgba[::-1].tobytes(), internal_format=_SRGB8_ALPHA8)
     texture.build_mipmaps()
     texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
-    texture.repeat_x = texture.repeat_y = True
+    texture.repeat_x, texture.repeat_y = repeats
     return texture
 
 

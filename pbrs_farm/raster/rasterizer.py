@@ -43,6 +43,7 @@ from pbrs_farm.raster.uniform_blocks import (
     material_blocks,
 )
 
+_EDGE = 1e-3  # coordinates that leave a texture by less do not repeat it
 SKY_SRGB = (0.78, 0.87, 0.96)  # background: behind windows and beyond the house
 
 
@@ -96,7 +97,11 @@ class Rasterizer:
         used_textures = (
             (name, pixels) for name, pixels in sorted(textures.items()) if name in used
         )
-        uploaded = {name: texture_from_pixels(gl, pixels) for name, pixels in used_textures}
+        repeating = _repeating_textures(house)
+        uploaded = {
+            name: texture_from_pixels(gl, pixels, ((name, 0) in repeating, (name, 1) in repeating))
+            for name, pixels in used_textures
+        }
         white = texture_from_pixels(gl, np.full((1, 1, 3), 255, np.uint8))
         self._textures = [uploaded.get(m.texture_id or "", white) for m in house.materials]
 
@@ -310,6 +315,19 @@ class Rasterizer:
         if size not in self._targets:
             self._targets[size] = RenderTarget(self._context, size, self._samples)
         return self._targets[size]
+
+
+def _repeating_textures(house: House) -> set[tuple[str, int]]:
+    """(texture id, 0 along u or 1 along v) of textures that a surface shows beyond their edges."""
+    repeating = set()
+    for item in house.items:
+        for surface in item.surfaces:
+            name = house.materials[surface.material].texture_id
+            if name and surface.uvs is not None and len(surface.uvs):
+                uvs = np.nan_to_num(surface.uvs)
+                leaves = (uvs.min(0) < -_EDGE) | (uvs.max(0) > 1 + _EDGE)
+                repeating |= {(name, k) for k in range(2) if leaves[k]}
+    return repeating
 
 
 def _set_uniforms(program: Any, **values: Any) -> None:

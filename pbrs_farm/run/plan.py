@@ -48,8 +48,8 @@ STEPS: Final = {
         Step("pairs", 2, ("house", "cameras"), per_view=False, needs=("house", "cameras")),
         Step("tracks", 2, ("house", "cameras"), per_view=False, needs=("house", "cameras")),
         Step("truth", 4, ("house", "cameras")),
-        Step("opengl_dl", 3, ("house", "cameras")),
-        Step("opengl_il", 3, ("house", "cameras")),
+        Step("opengl_dl", 4, ("house", "cameras")),
+        Step("opengl_il", 4, ("house", "cameras")),
         Step("illuminance", 10, ("house",), per_view=False),
         # Every change of illuminance also changes light's digest, so it is not listed in `after`.
         Step("light", 27, ("house", "cameras"), needs=("illuminance",)),

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.ndimage import maximum_filter, minimum_filter
@@ -80,6 +82,18 @@ def test_the_top_row_of_a_texture_is_at_the_top_of_the_wall():
         picture = raster.render_dl(camera())
     assert picture[8, 16, 0] > 100 > picture[8, 16, 2]
     assert picture[15, 16, 2] > 100 > picture[15, 16, 0]
+
+
+@pytest.mark.parametrize(("copies", "is_mixed"), [(1, False), (2, True)])
+def test_only_a_repeating_texture_mixes_its_ends_at_the_border(copies, is_mixed):
+    wall = square(-1.0, 0, half=1.0)
+    wall = replace(wall, uvs=wall.uvs * copies)
+    picture = np.zeros((20, 20, 3), np.uint8)
+    picture[:, :10] = 255
+    painted = Material("painted", texture_id="t")
+    with Rasterizer(house((item(wall),), (painted,)), {"t": picture}) as drawn:
+        row = drawn.render_dl(camera())[12, :, 0].astype(int)
+    assert (row[0] < row[1] - 5) == is_mixed
 
 
 def test_a_cut_out_texture_shows_what_lies_behind():
