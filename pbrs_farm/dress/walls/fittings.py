@@ -23,6 +23,7 @@ from pbrs_farm.dress.walls.hung_things import (
 from pbrs_farm.home.room_use import RoomKind
 
 _SWITCH_M, _SOCKET_M = 1.05, 0.3  # heights of their middles above the floor
+_DATA_SOCKETS, _DATA_SHARE = ("antenna", "rj45"), 0.15  # words of their names, share of sockets
 _CASING_M = 0.16  # distance from a door's opening to the middle of its switch
 
 
@@ -169,15 +170,35 @@ def fit_switches(hanging: Hanging, catalogue: Catalogue, style: Style, share: fl
             lit += 1
     for _ in range(WANTS[room.kind].sockets):
         n = int(rng.choice([1, 1, 2, 3]))
-        socket = _draw_fitting(catalogue, "socket", rng) or content().things["wall_socket"](
-            rng, style, n, colour
-        )
+        # All mains sockets of a home are of one standard.
+        of_home = hanging.house.rng("sockets", "make")
+        socket = _draw_fitting(catalogue, "socket", of_home, leave_out=_DATA_SOCKETS)
+        if rng.random() < _DATA_SHARE:
+            socket = _draw_fitting(catalogue, "socket", rng, only=_DATA_SOCKETS) or socket
+        socket = socket or content().things["wall_socket"](rng, style, n, colour)
         hang_anywhere(hanging, socket, _SOCKET_M - 0.04, 0.05, rng)
 
 
-def _draw_fitting(catalogue: Catalogue, group: str, rng: np.random.Generator) -> Model | None:
-    """A socket or switch of the catalogue with a realistic size; None = generate one."""
-    fit = [p for p in catalogue.of(group) if max(p.size) < 0.2 and p.size[1] < 0.06]
+def _draw_fitting(
+    catalogue: Catalogue,
+    group: str,
+    rng: np.random.Generator,
+    *,
+    only: tuple[str, ...] = ("",),
+    leave_out: tuple[str, ...] = (),
+) -> Model | None:
+    """A socket or switch of the catalogue with a realistic size; None = generate one.
+
+    only, leave_out: words of a piece's name, in lower case.
+    """
+    fit = [
+        p
+        for p in catalogue.of(group)
+        if max(p.size) < 0.2
+        and p.size[1] < 0.06
+        and any(word in p.name.lower() for word in only)
+        and not any(word in p.name.lower() for word in leave_out)
+    ]
     if not fit or rng.random() < 0.4:
         return None
     piece: Piece = fit[int(rng.integers(len(fit)))]

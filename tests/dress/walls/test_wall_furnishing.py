@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pbrs_farm.core.catalogue import EMPTY
-from pbrs_farm.core.classes import BED
+from pbrs_farm.core.catalogue import EMPTY, Catalogue, Piece, Place, Shape
+from pbrs_farm.core.classes import BED, OTHERPROP
 from pbrs_farm.core.house import Item, ItemKind, Material
 from pbrs_farm.core.mesh import signed_volume, triangle_corners
 from pbrs_farm.dress.finish_scheme import finish_scheme
@@ -22,6 +22,7 @@ from pbrs_farm.dress.walls.hanging import WANTS, Hanging
 from pbrs_farm.dress.walls.radiators import hang_radiators, wants_radiators
 from pbrs_farm.furnishings.things import hung, radiators
 from pbrs_farm.furnishings.things.maker import Thing
+from pbrs_farm.geometry.solids import box
 from pbrs_farm.home.room_use import RoomKind
 from pbrs_farm.read.builtin.builtin_home import builtin_home
 from tests.dress.furniture import solid
@@ -149,3 +150,24 @@ def test_notes_hang_flat_on_a_wall_at_the_height_of_eyes() -> None:
         assert min(high[0] - low[0], high[2] - low[2]) < 0.002
         assert low[1] - floor_y > 0.9
         assert high[1] - floor_y < 2.4
+
+
+def test_all_mains_sockets_of_a_home_are_of_one_standard() -> None:
+    shape = Shape(
+        (box("plate", np.array([0, 0.04, 0.004]), np.array([0.04, 0.04, 0.004]), 0),),
+        (Material("white"),),
+    )
+    names = ("Type A plug", "Type E plug", "Type G plug", "RJ45 plug")
+    pieces = tuple(
+        Piece(f"s#{name}", name, "socket", Place.WALL, OTHERPROP, (0.08, 0.008, 0.08))
+        for name in names
+    )
+    catalogue = Catalogue(pieces, lambda _piece: shape, "sockets")
+    standards = []
+    for seed in range(1, 6):
+        mutable = MutableHouse(builtin_home(), seed)
+        furnish_walls(mutable, catalogue, _style(), 1.0)
+        named = {i.name for i in mutable.items if i.name in names or i.name == "wall socket"}
+        standards.append(named - {"RJ45 plug"})
+    assert all(len(of_home) <= 1 for of_home in standards)
+    assert len(set.union(*standards)) > 1
