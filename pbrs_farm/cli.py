@@ -82,7 +82,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 1
     if verb and module is None and not verb.startswith("-"):
         offer = did_you_mean(verb, list(VERBS))
-        warn(f"no verb {verb!r}{f', {offer}' if offer else ''} (pbrs-farm --help lists them)")
+        warn(f"no command {verb!r}{f', {offer}' if offer else ''} (pbrs-farm --help lists them)")
         return 2
     try:
         if verb == "demo":
@@ -160,12 +160,13 @@ def build_parser(module: str | None = None, words: Sequence[str] | None = None) 
     """
     # All verbs accept --debug, before or after their other options.
     common = Parser(add_help=False)
-    common.add_argument("--debug", action="store_true", help="show tracebacks")
+    common.add_argument("--debug", action="store_true", help="show the traceback of an error")
     parser, add_parser = _bare_parser()
 
     def verb(name: str, handler: Handler) -> Parser:
-        text = VERBS[name].help
-        sub: Parser = add_parser(name, help=text, description=text, parents=[common])
+        row = VERBS[name]
+        sub: Parser = add_parser(name, help=row.help, description=row.help, parents=[common])
+        sub.examples = tuple(row.examples.split("; "))
         sub.set_defaults(handler=handler)
         return sub
 
@@ -191,17 +192,15 @@ def _bare_parser() -> tuple[Parser, Callable[..., Parser]]:
     """The parser without verbs, and the function that adds a verb."""
     parser = Parser(
         prog="pbrs-farm",
-        description="Houses designed by people in, physically-based training images with exact labels out.",
+        description="Renders homes designed by people into physically-based training images with exact labels.",
     )
-    parser.add_argument(
-        "--version", action=_Version, nargs=0, help="show program's version number and exit"
-    )
+    parser.add_argument("--version", action=_Version, nargs=0, help="print the version and exit")
     parser.set_defaults(debug=False, every_verb=build_parser)
     # Without the farm's packages, the help names the command that installs them.
     if not has_farm():
-        farm = "submit, status, workers and the other verbs of a farm need celery and redis"
+        farm = "submit, status, workers and the other commands of a farm need celery and redis"
         parser.epilog = f"{farm}: {install_command('workers')}"
-    return parser, parser.add_subparsers(title="verbs", metavar="VERB").add_parser
+    return parser, parser.add_subparsers(title="commands", metavar="COMMAND").add_parser
 
 
 class _Version(argparse.Action):

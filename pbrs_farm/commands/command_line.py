@@ -1,4 +1,4 @@
-"""The parser of the command line: verbs by purpose, suggestions for typing errors. Effects: prints.
+"""The parser of the command line: commands by purpose, examples, suggestions for typing errors. Effects: prints.
 
 Options may come before or after the verb.
 """
@@ -19,12 +19,13 @@ _TABLE: Final = Path(__file__).with_name("verbs.csv")
 
 @dataclass(frozen=True, slots=True)
 class VerbRow:
-    """A verb of verbs.csv. group: its heading in the help; module: of pbrs_farm.commands."""
+    """A row of verbs.csv. group: heading in the help; examples: with ; between, without the program's name."""
 
     verb: str
     group: str
     module: str
     help: str
+    examples: str
 
 
 def _rows() -> tuple[VerbRow, ...]:
@@ -37,7 +38,9 @@ VERBS: Final = {row.verb: row for row in _rows()}
 
 
 class Parser(argparse.ArgumentParser):
-    """An ArgumentParser whose help lists verbs in groups."""
+    """An ArgumentParser whose help lists verbs in groups, or ends with a verb's examples."""
+
+    examples: tuple[str, ...] = ()
 
     options_by_words: Callable[[Parser, Sequence[str] | None], None] | None = None
     """Adds a verb's options that depend on the words given, such as the form of --to; all for None."""
@@ -59,8 +62,9 @@ class Parser(argparse.ArgumentParser):
     def format_help(self) -> str:
         """The help text: argparse's for a verb, the verbs in groups for the command."""
         actions = [a for a in self._actions if isinstance(a, argparse._SubParsersAction)]
-        if not actions or actions[0].metavar != "VERB":
-            return super().format_help()
+        if not actions or actions[0].metavar != "COMMAND":
+            examples = [f"  pbrs-farm {example}\n" for example in self.examples]
+            return "".join([super().format_help(), *["\nexamples:\n"] * bool(examples), *examples])
         lines = {action.dest: action for action in actions[0]._choices_actions}
         formatter = self._get_formatter()
         formatter.add_usage(self.usage, self._actions, self._mutually_exclusive_groups)
@@ -71,7 +75,9 @@ class Parser(argparse.ArgumentParser):
             formatter.add_arguments([lines[row.verb] for row in rows if row.group == group])
             formatter.end_section()
         formatter.add_text(self.epilog)
-        formatter.add_text("`pbrs-farm VERB --help` lists a verb's options.")
+        formatter.add_text(
+            "`pbrs-farm COMMAND --help` lists the options of a command, with examples."
+        )
         return formatter.format_help()
 
 

@@ -22,7 +22,6 @@ def add_verbs(verb: Verb) -> None:
     p.add_argument("--shard", metavar="K/N", help=text)
     add_options(p, ProcessLimitOptions)
     p.add_argument("--json", action="store_true", help="a JSON line per event")
-    p.epilog = "example: pbrs-farm make indoor-1k --out out/indoor-1k --jobs 4"
 
     p = verb("estimate", _estimate)
     p.add_argument("set", metavar="SET", help=SET)
@@ -33,7 +32,6 @@ def add_verbs(verb: Verb) -> None:
         help="print each of these clouds' bill, line by line; `estimate SET` lists the clouds",
     )
     p.add_argument("--json", action="store_true", help="as JSON")
-    p.epilog = 'example: pbrs-farm estimate indoor-10k --cloud AWS "Google Cloud"'
 
 
 def _make(args: argparse.Namespace) -> int:

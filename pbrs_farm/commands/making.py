@@ -51,7 +51,7 @@ def add_verbs(verb: Verb) -> None:
     add_options(p, RunRequest, recipe="preview")
     # A first-time user's command ends in seconds.
     p.set_defaults(views=6)
-    p.epilog = "six views unless --views asks for others"
+    p.epilog = "Renders six views unless --views gives another number."
 
     p = verb("run", _run)
     add = p.add_argument
@@ -66,9 +66,6 @@ def add_verbs(verb: Verb) -> None:
     group_of(p, "viewpoints").add_argument("--camera-file", type=Path, help=text)
     add_options(p, RunRequest)
     p.usage = "%(prog)s HOME [HOME ...] [options]"
-    p.epilog = (
-        "example: pbrs-farm run Studio --dress 1 --recipe preview --views 4 --layers albedo depth_z"
-    )
 
     p = verb("objects", _objects)
     add = p.add_argument

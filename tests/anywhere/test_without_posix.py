@@ -58,7 +58,7 @@ def test_no_process_starts_whose_log_could_not_be_moved() -> None:
 
 
 def test_the_help_is_printed() -> None:
-    assert "pbrs-farm VERB --help" in _said(pbrs_farm("--help"))
+    assert "pbrs-farm COMMAND --help" in _said(pbrs_farm("--help"))
 
 
 def test_a_run_makes_its_view_and_goes_on_where_it_stopped(tmp_path: Path) -> None:

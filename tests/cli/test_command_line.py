@@ -35,8 +35,8 @@ def refusal(capsys: pytest.CaptureFixture[str], *words: str, code: int) -> str:
 @pytest.mark.parametrize(
     ("words", "says", "code"),
     [
-        (["rnu"], "no verb 'rnu', did you mean run?", 2),
-        (["zzzzz"], "no verb 'zzzzz' (pbrs-farm --help lists them)", 2),
+        (["rnu"], "no command 'rnu', did you mean run?", 2),
+        (["zzzzz"], "no command 'zzzzz' (pbrs-farm --help lists them)", 2),
         (["layers", "--jsn"], "no such option --jsn", 2),
         (["doctor", "--jsn"], "no such option --jsn, did you mean --json?", 2),
         (["recipes", "fast", "paper"], "unexpected word 'paper'", 2),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import shlex
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -56,7 +57,7 @@ print("last:", sorted(heavy & set(sys.modules)), "pathlib" in after_import)
 def test_the_help_says_what_the_farms_verbs_need(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("pbrs_farm.cli.has_farm", lambda: False)
     text = " ".join(build_parser().format_help().split())
-    assert "the other verbs of a farm need celery and redis: " in text
+    assert "the other commands of a farm need celery and redis: " in text
     assert "[workers]" in text
 
 
@@ -103,6 +104,16 @@ def test_a_verb_has_a_help_and_a_usage_and_a_word_for_every_option(name: str) ->
     for action in parser._actions:
         if not isinstance(action, argparse._SubParsersAction):
             assert action.help, f"{name} {action.option_strings or action.dest}"
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_the_help_of_a_verb_ends_with_examples_that_parse(verb: str) -> None:
+    examples = VERBS[verb].examples.split("; ")
+    assert EVERY[f"pbrs-farm {verb}"].format_help().endswith(f"\n  pbrs-farm {examples[-1]}\n")
+    for example in examples:
+        words = shlex.split(example.partition(" > ")[0])
+        assert words[0] == verb
+        assert not build_parser(VERBS[verb].module, words).parse_known_args(words)[1], example
 
 
 @pytest.mark.parametrize(

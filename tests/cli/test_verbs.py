@@ -328,7 +328,7 @@ def test_a_run_goes_to_a_folder_of_the_homes_name_where_none_is_told() -> None:
     ]  # fmt: skip
 
 
-def test_the_options_of_run_stand_in_groups_below_an_example(
+def test_the_options_of_run_are_in_groups_before_its_examples(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     with pytest.raises(SystemExit):
@@ -338,7 +338,7 @@ def test_the_options_of_run_stand_in_groups_below_an_example(
         text.index(f"\n{t}:") for t in ("viewpoints", "dressing", "recipe", "light", "the run")
     ]
     assert places == sorted(places)
-    assert "example: pbrs-farm run Studio" in " ".join(text.split())
+    assert "\nexamples:\n  pbrs-farm run Studio " in text
 
 
 def test_the_layers_on_a_terminal_are_columns_that_fit_it() -> None:
