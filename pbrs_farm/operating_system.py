@@ -21,7 +21,7 @@ from importlib import import_module
 from pathlib import Path, PureWindowsPath
 from typing import IO, Any, Final, Protocol
 
-NOT_REGULAR: Final = "is no regular file (a device or a pipe)"
+NOT_REGULAR: Final = "is not a regular file (a device or a pipe)"
 _PR_SET_PDEATHSIG: Final = 1  # from linux/prctl.h
 _LOOK_EVERY_S: Final = 1.0  # interval of checks for a dead parent, where the system sends no signal
 _CRASH_CODES: Final = 0xC0000000  # Windows: lowest exit code that is a fault (NTSTATUS error)

@@ -79,7 +79,7 @@ def text_given(path: Path, *, error: type[BadInput] = BadInput) -> str:
     try:
         return text_from_bytes(data)
     except UnicodeDecodeError:
-        raise error(path, "", "cannot be read: is no UTF-8 text") from None
+        raise error(path, "", "is not UTF-8 text") from None
 
 
 @contextmanager

@@ -48,51 +48,47 @@ class JobRules(Record):
     """When to give up on a task, a house, a job."""
 
     max_attempts: int = Field(3, ge=1)
-    failed_share: float = Field(0.5, description="of a house's batches; more quarantines the house")
-    max_quarantined: int = Field(20, ge=1, description="houses; fewer never pause a job")
+    failed_share: float = Field(0.5, description="of failed batches; more quarantines the house")
+    max_quarantined: int = Field(20, ge=1, description="minimum of houses to pause the job")
     quarantined_share: float = Field(0.2, description="of closed houses; more pauses the job")
-    max_same_failure: int = Field(50, ge=1, description="alike for good; as many pause the job")
-    shard_size: int = Field(500, ge=1, description="houses merged by one task")
+    max_same_failure: int = Field(50, ge=1, description="equal failures; as many pause the job")
+    shard_size: int = Field(500, ge=1, description="houses that one task merges")
 
 
 class FarmOptions(Record):
     """How the farm does a job: options of `submit`, entries of job.toml, fields of its JobSpec."""
 
-    gpu: bool = option(False, "light goes to the queue light.gpu")
+    gpu: bool = option(False, "render light on GPU workers (queue light.gpu)")
     priority: int = option(
         DEFAULT_PRIORITY,
-        f"0 goes first, {LEAST_URGENT} last",
+        f"0 runs first, {LEAST_URGENT} last (default {DEFAULT_PRIORITY})",
         ge=0,
         le=LEAST_URGENT,
         choices=tuple(range(LEAST_URGENT + 1)),
     )
     max_slots: int = option(
-        0,
-        "at most N of its tasks in flight at once (0: as many as there are slots)",
-        ge=0,
-        metavar="N",
-        least=0,
+        0, "maximum simultaneous tasks (default 0: all slots)", ge=0, metavar="N", least=0
     )
     budget_h: float = option(
         0.0,
-        "slot-hours after which it pauses itself (0: none)",
+        "pause the job after this many slot-hours (default 0: no limit)",
         ge=0,
         name="budget",
         metavar="HOURS",
         least=0,
         expected="slot-hours, 0 or more",
     )
-    after: tuple[str, ...] = option((), "begin when this job is done, repeatable", metavar="JOB")
+    after: tuple[str, ...] = option((), "start when this job is done, repeatable", metavar="JOB")
     preempt: bool = option(
-        False, "urgent: running tasks of other jobs make room, and keep what they have rendered"
+        False, "urgent: interrupt tasks of other jobs; they lose nothing and resume later"
     )
 
 
 class FarmAccess(Record):
     """Options of submit shared by all verbs of the farm (commands/arguments.py:add_farm)."""
 
-    store: str = option("", "default: $PBRS_STORE", metavar="URL")
-    as_json: bool = option(False, "for machines", name="json")
+    store: str = option("", "store of the farm (default: $PBRS_STORE)", metavar="URL")
+    as_json: bool = option(False, "print JSON", name="json")
 
 
 class _HousesOption(Record):
@@ -102,7 +98,7 @@ class _HousesOption(Record):
 
 
 class _ReferenceOption(Record):
-    reference: Path | None = option(None, "reference file: select when the job ends")
+    reference: Path | None = option(None, "select views by this reference file when the job ends")
 
 
 class SubmitRequest(
@@ -111,12 +107,12 @@ class SubmitRequest(
     """Inputs of `submit` besides the words of homes, from its options or a job's file."""
 
     like: str = option(
-        "", "take the options of this job.toml for the homes named here", metavar="FILE"
+        "", "use the options of this job.toml for the homes of the command", metavar="FILE"
     )
-    part: str = option("", "of a data set with several parts: the one to render", metavar="NAME")
-    update: bool = option(False, "give the store this recipe")
-    dry_run: bool = option(False, "print tasks, hours, storage; do nothing")
-    slots: int = option(2, "for --dry-run: tasks at once", least=1)
+    part: str = option("", "part to render, for a data set with several", metavar="NAME")
+    update: bool = option(False, "if the store has another recipe, replace it")
+    dry_run: bool = option(False, "print tasks, hours and storage; submit nothing")
+    slots: int = option(2, "for --dry-run: number of slots (default 2)", least=1)
 
 
 class JobSpec(FarmOptions, Wanted):
@@ -130,13 +126,13 @@ class JobSpec(FarmOptions, Wanted):
     version: str  # work_version of who submitted or adopted it
     versions_before: tuple[str, ...] = ()  # by which it was worked on before it was adopted
     recipe: Recipe
-    user: str = Field("", description="whose job it is; nobody's on a farm without users")
+    user: str = Field("", description="owner of the job; empty on a farm without users")
     batch_stages: tuple[str, ...] = Field((GL, LIGHT), alias="group_stages")
-    seconds_per_view: float = Field(20.0, gt=0, description="of light, expected; sizes the batches")
+    seconds_per_view: float = Field(20.0, gt=0, description="expected, of light; sizes the batches")
     min_batches: int = Field(
-        1, ge=1, alias="min_groups", description="of a house, about; by slots at submission"
+        1, ge=1, alias="min_groups", description="approximate, per house; by slots at submission"
     )
-    reference: str = Field("", description="key of the reference selection scores against, or none")
+    reference: str = Field("", description="key of the selection's reference; empty = none")
     rules: JobRules = JobRules()
     n_houses: int = 0
 

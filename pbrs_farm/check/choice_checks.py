@@ -67,7 +67,7 @@ def _check_report(case: HouseCase, report: Mapping[str, Any]) -> None:
         place = f"{house.id} room {room['room_id']}"
         stored = house.rooms.get(room["room_id"])
         same = not house.rooms or (stored is not None and stored["name"] == room["name"])
-        tally.expect("choice", place, same, "is no room of house.json")
+        tally.expect("choice", place, same, "is not a room of house.json")
         for sector in room.get("sectors", []):
             refused.update(sector["refused"])
             n_candidates += sector["n_candidates"]
@@ -210,7 +210,7 @@ def _check_rig(case: HouseCase, row: Mapping[str, Any], place: str) -> None:
     instant, camera = str(rig["instant"]), str(rig["camera"])
     first = house.camera_rows.get(instant)
     same = row["id"] in (instant, Shot.of_id(instant).partner(eye=camera).id) and first is not None
-    if not expect(same, f"is no camera of the rig at {instant!r}"):
+    if not expect(same, f"is not a camera of the rig at {instant!r}"):
         return
     assert first is not None
     if house.recipe:

@@ -94,7 +94,7 @@ def _check_names(case: ViewCase, row: dict[str, Any]) -> None:
     if not case.house.items:
         return
     item = case.house.items.get(int(row["id"]))
-    if case.tally.expect("names", place, item is not None, "is no item of house.json"):
+    if case.tally.expect("names", place, item is not None, "is not an item of house.json"):
         assert item is not None
         row = {"floating": False, **row}
         floats = FLOATING in item["tags"]
@@ -106,7 +106,9 @@ def _check_model_pose(case: ViewCase, row: dict[str, Any]) -> None:
     place = f"{case.place} instance {row['id']}"
     expect = case.tally.at("model poses", place)
     pose = np.array(row["world_from_model"], np.float64)
-    if not expect(pose.shape == np.shape(row["camera_from_model_opencv"]) == (4, 4), "is no pose"):
+    if not expect(
+        pose.shape == np.shape(row["camera_from_model_opencv"]) == (4, 4), "is not a pose"
+    ):
         return
     expect(is_rigid(pose), "world_from_model is not rigid")
     product = np.linalg.inv(case.view.world_from_camera) @ pose
@@ -234,7 +236,7 @@ def _check_light_facts(case: ViewCase) -> None:
     weights = light.get("lamp_weights", {})
     if house.items and weights:
         unknown = weights.keys() - house.lamps.keys()
-        expect(not unknown, f"lamp_weights name {sorted(unknown)[:3]}, which are no lamps")
+        expect(not unknown, f"lamp_weights name {sorted(unknown)[:3]}, which are not lamps")
         total = sum(weights.values())
         same = abs(total - 1) <= 1e-3 and min(weights.values()) >= 0
         expect(same, f"lamp_weights sum to {total:.4f}")

@@ -77,7 +77,7 @@ def _manifest(file: Path, house: str, tally: Tally) -> dict[str, dict[str, Any]]
             if not {"bytes", "sha256"} <= row.keys() or ".." in key.split("/") or key[:1] == "/":
                 raise ValueError
         except (ValueError, KeyError, TypeError):
-            tally.expect("files", f"{house}/manifest.jsonl line {number}", False, "is no row")
+            tally.expect("files", f"{house}/manifest.jsonl line {number}", False, "is not a row")
             continue
         tally.expect("files", key, key not in rows, "is listed twice")
         rows[key] = row
@@ -105,7 +105,7 @@ def _check_markers(house: Path, rows: dict[str, dict[str, Any]], tally: Tally) -
             marker = {"view_id": None, **marker}
             _ = marker["step"], marker["house_id"], marker["digest"]
         except (ValueError, KeyError, TypeError):
-            tally.expect("markers", place, False, "is no marker")
+            tally.expect("markers", place, False, "is not a marker")
             continue
         step, _, view = file.stem.partition(".")
         name = {"step": step, "house": house.name, "view": view or None}

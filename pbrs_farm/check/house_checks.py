@@ -69,7 +69,7 @@ def _check_items(house: StoredHouse, document: Mapping[str, Any], tally: Tally) 
         name = NYU40_NAMES[row["nyu40"]]
         judge("item", place, tally, node=node, extras=extras, row=row, moves=moves, none=[], name=name)  # fmt: skip
         is_room = row["room_id"] is None or row["room_id"] in house.rooms
-        expect(is_room, f"stands in {row['room_id']}, which is no room")
+        expect(is_room, f"stands in {row['room_id']}, which is not a room")
         expect(row["level_id"] in levels, "stands on no level")
         surfaces = [
             (s["n_vertices"], s["n_faces"], s["material"])
@@ -121,7 +121,7 @@ def _check_materials(house: StoredHouse, document: Mapping[str, Any], tally: Tal
         ):
             expect = tally.at("materials", place)
             is_texture = row[name] is None or row[name] in texture_keys
-            expect(is_texture, f"its {name} is no texture of the house")
+            expect(is_texture, f"its {name} is not a texture of the house")
             in_json = row[name] if row[name] in picture_keys else None
             in_glb = None if texture is None else picture_keys[texture["index"]]
             expect(in_json == in_glb, f"has another {name} in house.glb")
@@ -171,7 +171,7 @@ def _check_rooms(house: StoredHouse, tally: Tally) -> None:
         off = abs(room["floor_y"] - levels.get(room["level_id"], room["floor_y"]))
         expect(off <= _STEP_M, f"its floor is {off:.2f} m off its level's")
         is_room = room["ceiling_y"] > room["floor_y"] and len(room["polygon"]) >= 3
-        expect(is_room, "is no room")
+        expect(is_room, "is not a room")
         row = repaired.get(name)
         if house.repair and expect(row is not None, "is not in repair.json"):
             area = polygon_area(np.array(room["polygon"], np.float64))
@@ -192,11 +192,11 @@ def _check_openings(house: StoredHouse, tally: Tally) -> None:
         expect = tally.at("openings", f"{house.id} opening {row['id']}")
         item = ids.get(row["item_id"])
         is_item = row["item_id"] is None or item is not None
-        expect(is_item, f"is of {row['item_id']}, which is no item")
+        expect(is_item, f"is of {row['item_id']}, which is not an item")
         expect(row["level_id"] in levels, "is on no level")
         if item is not None:
             same = (item["kind"] == "window") == row["is_window"]
-            expect(same, f"is no {item['kind']}'s")
+            expect(same, f"differs from its item, a {item['kind']}")
         quad, normal = np.array(row["quad"], np.float64), np.array(row["normal"], np.float64)
         sides = np.diff(quad, axis=0)
         lengths = np.maximum(np.linalg.norm(sides, axis=1), 1e-9)

@@ -40,7 +40,7 @@ def check_pose(case: ViewCase) -> None:
     height, width = view.size
     fx, fy, cx, cy = k[0, 0], k[1, 1], k[0, 2], k[1, 2]
     is_camera = fx > 0 and fy > 0 and 0 < cx < width and 0 < cy < height and k[2, 2] == 1
-    expect(is_camera, "K is no camera's")
+    expect(is_camera, "K is not a camera matrix")
 
 
 def check_reprojection(case: HouseCase) -> None:

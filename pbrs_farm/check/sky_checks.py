@@ -30,7 +30,7 @@ def check_illuminance(case: HouseCase) -> None:
     for row in document["rooms"]:
         place = f"{house.id} room {row['room']}"
         room = house.rooms.get(str(row["room"]))
-        is_room = house.rooms and case.tally.expect("illuminance", place, room is not None, "is no room")  # fmt: skip
+        is_room = house.rooms and case.tally.expect("illuminance", place, room is not None, "is not a room")  # fmt: skip
         if is_room:
             judge("lit room", place, case.tally, row=row, room=room)
         if "warnings" in row:

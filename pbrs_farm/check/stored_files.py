@@ -44,7 +44,7 @@ def object_from_json(data: bytes | str) -> dict[str, Any]:
     try:
         value = json.loads(data)
     except (ValueError, RecursionError):
-        raise BadFile("is no JSON, or is cut short") from None
+        raise BadFile("is not valid JSON, or is cut short") from None
     if not isinstance(value, dict):
-        raise BadFile("is no JSON object")
+        raise BadFile("is not a JSON object")
     return value

@@ -82,7 +82,7 @@ def _box_fault(box: dict[str, Any], corners: F64, items: HouseItems, number: int
     """The fault of a box; "" if it is right."""
     axes, centre, half = (np.array(box[k], np.float64) for k in ("axes", "centre", "half"))
     if axes.shape != (3, 3) or np.abs(axes @ axes.T - np.eye(3)).max() > 1e-6:
-        return "its axes are no frame"
+        return "its axes are not orthonormal"
     # Rows are columns in house.json.
     stored = items.boxes.get(number)
     if stored is not None and np.abs(axes - np.array(stored["axes"], np.float64).T).max() > 1e-6:
@@ -111,7 +111,7 @@ def _share_fault(case: ViewCase, row: dict[str, Any], corners: F64, rays: Rays) 
     view, instance, n_pixels = case.view, case.arrays["instance"], case.n_pixels
     visible, share = int((instance == int(row["id"])).sum()), float(row["visible_fraction"])
     if not 0 < share <= 1:
-        return f"{share:g} is no share"
+        return f"{share:g} is not a share"
     # Pixels where the item alone might be visible, beside those where it is.
     rows, columns = _reach(view, corners)
     beside = instance[rows, columns] != int(row["id"])

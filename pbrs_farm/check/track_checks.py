@@ -116,7 +116,7 @@ def _check_group(film: _Film, frame: int, index: I64) -> None:
     centred = inside & (np.abs(px - np.floor(px) - 0.5) <= _PX).all(1)
     centred &= ~tracks["occluded"][index, frame]
     name = view.folder.name
-    if not film.expect(centred.all(), f"of {name} have points that are no pixel's centre"):
+    if not film.expect(centred.all(), f"of {name} have points off pixel centres"):
         return
     origin, directions = view.rays(rows, columns)
     face = scenes.rays.first(origin, directions)

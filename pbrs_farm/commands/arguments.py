@@ -35,14 +35,14 @@ Verb = Callable[[str, Handler], Parser]
 
 # Help texts of the arguments for a home and for a view.
 HOME: Final = (
-    "file of a home or a folder of homes (those in it, not in folders below; `inputs` lists the"
-    " formats), example home's name, `builtin`, `made:SEED`, or `plugin:NAME,SEED`"
+    "home file, folder of home files (not of subfolders; `inputs` lists the formats), example home's"
+    " name, `builtin`, `made:SEED`, or `plugin:NAME,SEED`"
 )
 _MAX_LINE: Final = (
     1500  # maximum characters of a warning: room for a command that reproduces a fault
 )
 MAX_SEEDS: Final = 100_000  # maximum seeds of one command
-VIEW: Final = "a view's folder: OUT/houses/<house>/views/<view>"
+VIEW: Final = "folder of a view: OUT/houses/<house>/views/<view>"
 
 
 def warn(text: str) -> None:
@@ -146,7 +146,7 @@ def home_arguments(homes: Sequence[str], houses: str | None) -> list[str]:
                 warn(f"{folder}: {unlisted}")
         return words
     if len(homes) != 1:
-        raise BadInput("--houses", houses, "needs the SUNCG root as the one HOME")
+        raise BadInput("--houses", houses, "needs the SUNCG root as the only HOME")
     return suncg_list(Path(homes[0]), Path(houses))
 
 
@@ -264,8 +264,10 @@ def add_farm(p: argparse.ArgumentParser) -> None:
     submit declares both in workers/job.py.
     """
     # Not generated from a model: the small verbs import no models.
-    p.add_argument("--store", default="", metavar="URL", help="default: $PBRS_STORE")
-    p.add_argument("--json", action="store_true", help="for machines")
+    p.add_argument(
+        "--store", default="", metavar="URL", help="store of the farm (default: $PBRS_STORE)"
+    )
+    p.add_argument("--json", action="store_true", help="print JSON")
 
 
 def farm_of(args: argparse.Namespace) -> Farm:

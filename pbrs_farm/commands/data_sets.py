@@ -8,7 +8,7 @@ from pathlib import Path
 from pbrs_farm.commands.arguments import Verb, counted, echo, echo_json, warn
 from pbrs_farm.commands.options import add_options, request_from
 
-SET = "a shipped set (indoor-1k, indoor-10k or indoor-60k) or your own FILE.toml (docs/sets.md)"
+SET = "indoor-1k, indoor-10k, indoor-60k, or a FILE.toml (docs/sets.md)"
 
 
 def add_verbs(verb: Verb) -> None:
@@ -17,11 +17,11 @@ def add_verbs(verb: Verb) -> None:
 
     p = verb("make", _make)
     p.add_argument("set", metavar="SET", help=SET)
-    p.add_argument("--out", required=True, help="the set's folder")
-    text = "render every N-th home from the K-th on; when OUT has all shards, run again without it"
+    p.add_argument("--out", required=True, help="folder of the set")
+    text = "render part K of N, e.g. 2/8; once OUT has all parts, run again without --shard"
     p.add_argument("--shard", metavar="K/N", help=text)
     add_options(p, ProcessLimitOptions)
-    p.add_argument("--json", action="store_true", help="a JSON line per event")
+    p.add_argument("--json", action="store_true", help="print a JSON line per event")
 
     p = verb("estimate", _estimate)
     p.add_argument("set", metavar="SET", help=SET)
@@ -29,9 +29,9 @@ def add_verbs(verb: Verb) -> None:
         "--cloud",
         nargs="+",
         metavar="NAME",
-        help="print each of these clouds' bill, line by line; `estimate SET` lists the clouds",
+        help="print an itemised bill of these clouds; `estimate SET` lists them",
     )
-    p.add_argument("--json", action="store_true", help="as JSON")
+    p.add_argument("--json", action="store_true", help="print JSON")
 
 
 def _make(args: argparse.Namespace) -> int:
@@ -67,8 +67,8 @@ def _make(args: argparse.Namespace) -> int:
         n_lost += len(summary.walls_lost)
     if n_failed:
         warn(
-            f"{n_failed} failed: the set is not written. Call again; a home that fails each time has to"
-            " leave the file"
+            f"{n_failed} failed: the set is not written. Run again; remove homes that keep failing from"
+            f" {args.set}"
         )
         return 1
     if shard != WHOLE:

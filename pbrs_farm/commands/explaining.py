@@ -51,21 +51,21 @@ def add_verbs(verb: Verb) -> None:
     p = verb("dress", _dress)
     add_home(p)
     add = p.add_argument
-    text = "what is chosen: another seed, another home (default 1)"
+    text = "seed of the dressing; another seed gives another home (default 1)"
     add("--seed", dest="dress", default="1", metavar="N", help=text)
     text = "folder for before_after.png, house.glb, house.json, dress.json, repair.json"
     add("--out", type=Path, required=True, help=text)
-    text = "pictures of before and after, a room each (default 1; 0 = none)"
+    text = "number of rooms with before and after pictures (default 1; 0 = none)"
     add("--views", type=int, default=1, metavar="N", help=text)
     add_options(p, LibraryOptions)
     add_options(p, RecipeOptions)
 
     p = verb("catalogue", _catalogue)
-    text = "as --catalogue takes it: 3D-FUTURE, hssd-models, objathor, GLB or OBJ with a CSV, .sh3f"
+    text = "3D-FUTURE, hssd-models, objathor, GLB or OBJ with a CSV, or .sh3f, as for --catalogue"
     p.add_argument("libraries", nargs="+", type=Path, metavar="LIBRARY", help=text)
-    text = "write what was refused: a CSV of kind, model, reason"
+    text = "write the rejected models to FILE.csv: kind, model, reason"
     p.add_argument("--refused", type=Path, metavar="FILE.csv", help=text)
-    p.add_argument("--json", action="store_true", help="for machines")
+    p.add_argument("--json", action="store_true", help="print JSON")
 
     p = verb("repair", _repair)
     add_home(p)
@@ -76,13 +76,13 @@ def add_verbs(verb: Verb) -> None:
     p = verb("cameras", _cameras)
     add_home(p)
     add = p.add_argument
-    text = "floor plan with candidates, rejections and winners: FILE.png and FILE.svg"
+    text = "draw candidates, rejections and winners on a floor plan: FILE.png and FILE.svg"
     add("--map", type=Path, metavar="FILE", help=text)
-    add("--out", type=Path, metavar="FILE", help="write the views to FILE (cameras.json)")
-    add("--per-sector", type=int, metavar="K", help="K diverse views a sector")
+    add("--out", type=Path, metavar="FILE", help="write the views to FILE, as cameras.json")
+    add("--per-sector", type=int, metavar="K", help="keep K diverse views per sector (default 1)")
     add("--exact", action="store_true", help="score every candidate at full size")
     add_options(p, CameraOptions)
-    add("--json", action="store_true", help="views and report as JSON")
+    add("--json", action="store_true", help="print views and report as JSON")
     add_options(p, SeededRecipeOptions)
 
 
@@ -115,7 +115,7 @@ def _catalogue(args: argparse.Namespace) -> int:
         first = next(note for note in loaded.notes if note.kind == kind)
         echo(f"{n} {kind}: {first.place}: {first.text}{' ...' if n > 1 else ''}")
     if not is_usable:
-        warn(f"{', '.join(map(str, args.libraries))}: holds nothing that can be used")
+        warn(f"{', '.join(map(str, args.libraries))}: no usable piece or picture")
     return 0 if is_usable else 1
 
 
@@ -148,7 +148,7 @@ def _dress(args: argparse.Namespace) -> int:
             source, recipe, lambda share: tell(args.home, _SHARE_OF_CATALOGUE + of_house * share)
         )
         if report is None:
-            raise BadInput(args.home, "", "an object without context is not dressed")
+            raise BadInput(args.home, "", "a single object cannot be dressed")
         pictures = _before_after(args, house, recipe, tell) if args.views else {}
     glb, description = bundle_from_house(house)
     text = attribution_text([house.source.attribution], report.credits)
@@ -192,7 +192,7 @@ def _before_after(
         files[name] = before_after_png(pair.before, pair.after, caption)
         tell("before and after", done + (1 - done) * (n + 1) / args.views)
     if not files:
-        warn("no room has a view: no picture of before and after")
+        warn("no room has a view, so no before and after picture")
     return files
 
 

@@ -22,12 +22,12 @@ _SAY_EVERY_S: Final = 5.0
 def add_verbs(verb: Verb) -> None:
     """Add homes and its subcommand make."""
     p = verb("homes", _homes)
-    p.add_argument("--fetch", action="store_true", help="download the package now")
-    text = "download the furniture to dress and to make homes with (120 MB), too"
+    p.add_argument("--fetch", action="store_true", help="download the example homes (17 MB)")
+    text = "download the furniture for dressing and for generated homes (120 MB)"
     p.add_argument("--furniture", action="store_true", help=text)
-    p.add_argument("--json", action="store_true", help="for machines")
+    p.add_argument("--json", action="store_true", help="print JSON")
     parts = p.add_subparsers(metavar="make")
-    text = "generate furnished homes as .sh3d files, with plans.html to look at"
+    text = "generate furnished homes as .sh3d files, with their plans in plans.html"
     _add_make(parts.add_parser("make", help=text, description=text))
 
 
@@ -36,28 +36,30 @@ def _add_make(p: argparse.ArgumentParser) -> None:
 
     p.set_defaults(handler=_make)
     add = p.add_argument
-    add("count", nargs="?", type=int, default=1, metavar="N", help="how many (default 1)")
-    add("--seed", type=int, default=1, help="of the first; the others follow (default 1)")
-    add("--out", type=Path, default=Path("homes"), help="folder (default homes/)")
-    add("--rooms", metavar="LOW..HIGH", help="bedrooms, 0 to 4, e.g. 2..4")
-    add("--area", metavar="LOW..HIGH", help="floor of all rooms in square metres, e.g. 60..90")
-    add("--style", metavar="NAME", help="of furniture and paints, e.g. nordic")
-    text = f"family of the plans (default: one by seed): {', '.join(PLANS)}"
-    add("--plans", metavar="NAME", help=text)
-    add("--storeys", metavar="N", help="1 or 2 with a staircase between (default 1)")
-    add("--offices", metavar="N", help="bedrooms that are offices (default: by chance)")
-    text = "leave the rooms without furniture; needs no package"
-    add("--empty", action="store_true", help=text)
-    add("--programme", type=Path, metavar="FILE", help="JSON: the rooms of a certain flat")
-    text = (
-        "a floor plan in any format of docs/houses/plans.md, furnished by the seed: JSON, GeoJSON, CSV, "
-        "SVG, TXT"
+    add("count", nargs="?", type=int, default=1, metavar="N", help="number of homes (default 1)")
+    add(
+        "--seed",
+        type=int,
+        default=1,
+        help="seed of the first home; the next ones follow (default 1)",
     )
+    add("--out", type=Path, default=Path("homes"), help="output folder (default homes/)")
+    add("--rooms", metavar="LOW..HIGH", help="number of bedrooms, 0 to 4, e.g. 2..4")
+    add("--area", metavar="LOW..HIGH", help="floor area of all rooms, square metres, e.g. 60..90")
+    add("--style", metavar="NAME", help="style of furniture and paints, e.g. nordic")
+    text = f"type of floor plan (default: drawn by the seed): {', '.join(PLANS)}"
+    add("--plans", metavar="NAME", help=text)
+    add("--storeys", metavar="N", help="number of storeys, 1 or 2 (default 1)")
+    add("--offices", metavar="N", help="bedrooms that become offices (default: by chance)")
+    text = "leave the rooms empty; needs no furniture package"
+    add("--empty", action="store_true", help=text)
+    add("--programme", type=Path, metavar="FILE", help="JSON file with the rooms of a home")
+    text = "furnish this floor plan: JSON, GeoJSON, CSV, SVG or TXT (docs/houses/plans.md)"
     add("--plan", type=Path, metavar="FILE", help=text)
-    add("--apartment", default="", metavar="ID", help="which one of a CSV with several")
-    text = "which storey of a plan of several, from 0 (default all)"
+    add("--apartment", default="", metavar="ID", help="id of the apartment in a CSV with several")
+    text = "storey of the plan, from 0 (default all)"
     add("--floor", type=int, metavar="K", help=text)
-    add("--jobs", type=int, default=1, metavar="N", help="processes (default 1)")
+    add("--jobs", type=int, default=1, metavar="N", help="number of processes (default 1)")
 
 
 def _homes(args: argparse.Namespace) -> None:
@@ -76,10 +78,10 @@ def _homes(args: argparse.Namespace) -> None:
     for row in rows:
         levels = counted(row.n_levels, "level")
         echo(f"{row.name:<34} {row.n_rooms:>2} rooms, {levels}")
-    echo(f"{'builtin':<34}  2 rooms, 1 level: our own, nothing to fetch")
-    echo(f"{'made:SEED, made:1..20,rooms=2..4':<34}  homes without end: each is made from its seed")
+    echo(f"{'builtin':<34}  2 rooms, 1 level: part of pbrs_farm, no download")
+    echo(f"{'made:SEED, made:1..20,rooms=2..4':<34}  generated homes, one for each seed")
     echo()
-    echo(f"fetched: {package.label}" if package else "not fetched yet: pbrs-farm homes --fetch")
+    echo(f"fetched: {package.label}" if package else "not downloaded yet: pbrs-farm homes --fetch")
     if package and package.note:
         echo(package.note)
     echo("home and models: E. and V. Puybaret / eTeks, CC-BY 3.0")
@@ -131,11 +133,11 @@ def _make_of_plan(args: argparse.Namespace) -> int:
         f"--{k}" for k in ("rooms", "area", "storeys", "offices", "programme") if getattr(args, k)
     ]
     if options:
-        raise BadInput("--plan", str(args.plan), f"leaves no choice of {options[0]}")
+        raise BadInput("--plan", str(args.plan), f"fixes the rooms: omit {options[0]}")
     entry = format_of_file(args.plan)
     if entry is not None and entry.kind != PLAN:
         hint = f"`pbrs-farm run {args.plan}` reads it"
-        raise BadInput(args.plan, "", f"is a house ({entry.kind}), no floor plan", hint=hint)
+        raise BadInput(args.plan, "", f"is a house ({entry.kind}), not a floor plan", hint=hint)
     plan_file = plan_from_file(args.plan, Part(args.apartment, args.floor))
     for line in plan_file.left_out:
         warn(f"left out: {line}")
@@ -154,7 +156,7 @@ def _folder(path: Path) -> None:
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise BadInput(path, "", error.strerror or "is no folder") from None
+        raise BadInput(path, "", error.strerror or "is not a folder") from None
 
 
 def _asked_for(args: argparse.Namespace) -> tuple[list[MadeHome], Programme | None]:
@@ -177,11 +179,11 @@ def _asked_for(args: argparse.Namespace) -> tuple[list[MadeHome], Programme | No
         raise BadInput(
             "--programme",
             str(args.programme),
-            "names the rooms of one storey and not which of them lie above",
-            hint="leave out --storeys, or ask for a house by --storeys 2 --rooms 2..4 --area 90..150",
+            "describes one storey only",
+            hint="omit --storeys, or omit --programme: --storeys 2 --rooms 2..4 --area 90..150",
         )
     if chosen:
-        raise BadInput("--programme", str(args.programme), f"leaves no choice of {chosen[0]}")
+        raise BadInput("--programme", str(args.programme), f"fixes the rooms: omit {chosen[0]}")
     if args.seed < 0:
         raise BadInput("--seed", str(args.seed), "is below 0", hint="--seed 1")
     first, last = args.seed, args.seed + args.count - 1
@@ -198,7 +200,7 @@ def catalogue_here() -> Catalogue:
 
     if not has_furniture():
         raise MachineFailed(
-            "made homes take their furniture from a package that is not fetched",
+            "generated homes need the furniture package, which is not downloaded",
             hint="`pbrs-farm homes --furniture` (120 MB), or --empty",
         )
     return catalogue_of_words("")

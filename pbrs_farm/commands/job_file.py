@@ -52,7 +52,7 @@ def _tables(file: str) -> dict[str, Any]:
     try:
         return tomllib.loads(text_given(Path(file)))
     except (tomllib.TOMLDecodeError, ValueError, RecursionError) as error:
-        raise BadInput(file, "", f"is no TOML: {error}") from None
+        raise BadInput(file, "", f"is not valid TOML: {error}") from None
 
 
 def _checked(job: dict[str, Any], file: str) -> dict[str, Any]:
@@ -62,7 +62,7 @@ def _checked(job: dict[str, Any], file: str) -> dict[str, Any]:
     for name, table in job.items():
         if name != "homes" and (name not in _TABLES or not isinstance(table, dict)):
             hint = did_you_mean(name, [*_TABLES, "homes"]) or f"[{'], ['.join(_TABLES)}]"
-            raise BadInput(file, name, "is no table of a job", hint=hint)
+            raise BadInput(file, name, "is not a table of a job file", hint=hint)
     return job
 
 

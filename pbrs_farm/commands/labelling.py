@@ -31,7 +31,9 @@ if TYPE_CHECKING:
     from pbrs_farm.views.packing.pack_options import PackOptions
     from pbrs_farm.views.packing.packing_plan import Packing
 
-SPLIT = "by home: train/val/test (default 80/10/10); without it all views are one"
+SPLIT = (
+    "split by home into train/val/test, in per cent (default 80/10/10; without --split: no split)"
+)
 
 
 def add_verbs(verb: Verb) -> None:
@@ -48,10 +50,10 @@ def add_verbs(verb: Verb) -> None:
         "--to",
         required=True,
         choices=form_names(),
-        help="docs/formats/export.md describes the forms; `--to FORM --help` lists the options of one",
+        help="format (docs/formats/export.md); `--to FORMAT --help` lists its options",
     )
-    add("--out", type=Path, help="new folder (default FOLDER_<form>)")
-    add("--selection", metavar="RUN", help="only what this run keeps")
+    add("--out", type=Path, help="new folder (default ROOT_<format>)")
+    add("--selection", metavar="RUN", help="only views kept by this run of `select`")
     add_options(p, ViewOptions)
     add("--split", nargs="?", const="80/10/10", metavar="SHARES", help=SPLIT)
 
@@ -59,20 +61,20 @@ def add_verbs(verb: Verb) -> None:
     add = p.add_argument
     add("root", metavar="ROOT", help="an output folder, or s3://bucket/prefix")
     add("--out", type=Path, required=True, help="new folder")
-    add("--to", choices=("shards", "parquet"), default="shards", help="default shards")
-    add("--selection", metavar="RUN", help="only what this run keeps")
+    add("--to", choices=("shards", "parquet"), default="shards", help="format (default shards)")
+    add("--selection", metavar="RUN", help="only views kept by this run of `select`")
     add_options(p, PackOptions)
     add("--split", nargs="?", const="80/10/10", metavar="SHARES", help=SPLIT)
-    add("--seed", type=int, default=0, help="of the order of views (default 0)")
+    add("--seed", type=int, default=0, help="seed of the order of views (default 0)")
 
     p = verb("classes", _count_classes)
-    p.add_argument("folder", metavar="FOLDER|HOME", help="an output folder, or a home to read")
+    p.add_argument("folder", metavar="FOLDER|HOME", help="output folder or home")
     add_options(p, ModelsOption)
-    p.add_argument("--json", action="store_true", help="as JSON")
+    p.add_argument("--json", action="store_true", help="print JSON")
 
     p = verb("label-sheet", _label_sheet)
     p.add_argument("view", type=Path, help=VIEW)
-    p.add_argument("--out", type=Path, help="PNG (default VIEW_labels.png here)")
+    p.add_argument("--out", type=Path, help="PNG file (default ./VIEW_labels.png)")
 
 
 def _add_form_options(p: argparse.ArgumentParser, words: Sequence[str] | None) -> None:
@@ -154,7 +156,7 @@ def _export_homes(args: argparse.Namespace, form: HomeForm) -> int:
     of_views |= {"--size": args.size, "--classes": args.classes, "--split": args.split}
     for option, value in of_views.items():
         if value:
-            raise BadInput(option, "", f"chooses of views; --to {args.to} writes homes")
+            raise BadInput(option, "", f"selects views, but --to {args.to} exports homes")
     out = args.out or Path(f"{Path(args.folder).resolve().name}_{args.to}")
     options = {name: getattr(args, name) for name in form_options(form)}
     with folder_of(args.folder) as folder:
@@ -252,7 +254,9 @@ def _label_sheet(args: argparse.Namespace) -> None:
     root = folder.parents[3] if len(folder.parents) > 3 else folder
     view = next((v for v in views_of(root) if v.folder.resolve() == folder), None)
     if view is None:
-        raise BadInput(args.view, "", "no view's folder", hint="OUT/houses/<house>/views/<view>")
+        raise BadInput(
+            args.view, "", "not the folder of a view", hint="OUT/houses/<house>/views/<view>"
+        )
     out = args.out or Path(f"{folder.name}_labels.png")
     put_files(out.parent, {out.name: png_from_array(label_sheet(view))})
     echo(str(out))

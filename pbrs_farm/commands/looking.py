@@ -25,18 +25,18 @@ if TYPE_CHECKING:
 def add_verbs(verb: Verb) -> None:
     """Add doctor, inputs, skies, recipes, layers and completion."""
     p = verb("doctor", _doctor)
-    p.add_argument("--json", action="store_true", help="for machines")
-    p.add_argument("--store", default=os.environ.get("PBRS_STORE", ""), help="store to try")
-    p.add_argument("--redis", default=os.environ.get("PBRS_REDIS_URL", ""), help="Redis to try")
+    p.add_argument("--json", action="store_true", help="print JSON")
+    p.add_argument("--store", default=os.environ.get("PBRS_STORE", ""), help="store to check")
+    p.add_argument("--redis", default=os.environ.get("PBRS_REDIS_URL", ""), help="Redis to check")
     p = verb("inputs", _inputs)
-    p.add_argument("--json", action="store_true", help="for machines")
+    p.add_argument("--json", action="store_true", help="print JSON")
     p = verb("skies", _skies)
     p = verb("recipes", _recipes)
     p.add_argument("name", nargs="?", default="fast", choices=RECIPE_NAMES, help="default fast")
-    p.add_argument("--toml", action="store_true", help="as a file for --recipe FILE.toml")
+    p.add_argument("--toml", action="store_true", help="print TOML, for --recipe FILE.toml")
     p = verb("layers", _layers)
     p = verb("completion", _completion)
-    p.add_argument("shell", choices=SHELLS, help="the shell that reads it")
+    p.add_argument("shell", choices=SHELLS, help="shell of the script")
 
 
 def _doctor(args: argparse.Namespace) -> int:
@@ -67,7 +67,7 @@ def _verdict(findings: Sequence[Finding], *, is_fine: bool) -> str:
     if not is_fine:
         return "This machine cannot render yet: see MISSING above."
     if any(f.part == GL and f.state != "ok" for f in findings):
-        return f"This machine can render by path tracing; OpenGL's pictures are left out. See {GL} above."
+        return f"This machine can render by path tracing; pictures of OpenGL are skipped. See {GL} above."
     return "This machine can render."
 
 

@@ -44,10 +44,10 @@ def add_verbs(verb: Verb) -> None:
     from pbrs_farm.run.request import CameraOptions, ModelsOption, ObjectsRequest, RunRequest
 
     p = verb("demo", _demo)
-    text = "example home, `builtin`, or a file (default Studio)"
+    text = "example home, `builtin`, or home file (default Studio)"
     p.add_argument("--home", default="Studio", help=text)
-    p.add_argument("--out", default="out/demo", help="output folder")
-    p.add_argument("--bare", action="store_true", help="the home as it was drawn, not dressed")
+    p.add_argument("--out", default="out/demo", help="output folder (default out/demo)")
+    p.add_argument("--bare", action="store_true", help="do not dress the home")
     add_options(p, RunRequest, recipe="preview")
     # A first-time user's command ends in seconds.
     p.set_defaults(views=6)
@@ -56,37 +56,37 @@ def add_verbs(verb: Verb) -> None:
     p = verb("run", _run)
     add = p.add_argument
     add("homes", nargs="*", metavar="HOME", help=HOME)
-    add("--home", action="append", default=[], metavar="PATH", help="the same, repeatable")
-    text = "file with one SUNCG house id per line; HOME is their root folder"
+    add("--home", action="append", default=[], metavar="PATH", help="same as HOME, repeatable")
+    text = "file with one SUNCG house id per line; HOME is SUNCG's root folder"
     add("--houses", metavar="LIST", help=text)
-    add("--out", help="output folder or store URL (default: out/ and the first home's name)")
+    add("--out", help="output folder or store URL (default: out/NAME, of the first home)")
     add_options(p, CameraOptions)
     add_options(p, ModelsOption)
-    text = "your own: JSON list, or room_camera.txt"
+    text = "use these cameras: a JSON list, or room_camera.txt (docs/cameras.md)"
     group_of(p, "viewpoints").add_argument("--camera-file", type=Path, help=text)
     add_options(p, RunRequest)
     p.usage = "%(prog)s HOME [HOME ...] [options]"
 
     p = verb("objects", _objects)
     add = p.add_argument
-    text = "folders of OBJ or GLB (ShapeNet's layout too), .sh3f libraries"
+    text = "folders of OBJ or GLB files (also in ShapeNet's layout), or .sh3f libraries"
     add("models", nargs="+", type=Path, metavar="MODELS", help=text)
-    text = "e.g. bed,chair,cabinet (default all)"
+    text = "categories to pick from, e.g. bed,chair,cabinet (default all)"
     add("--categories", default="", metavar="A,B", help=text)
-    text = "models picked at random (default 3500)"
+    text = "number of models, picked at random (default 3500)"
     add("--count", type=int, default=3500, metavar="N", help=text)
     add("--out", required=True, help="output folder or store URL")
     add_options(p, ObjectsRequest)
 
     p = verb("step", _step)
     add = p.add_argument
-    add("step", help="as a failure names it, e.g. light")
+    add("step", help="name of the step, e.g. light")
     add("home", help=HOME)
     add("--out", required=True, help="output folder or store URL of the run")
-    add("--view", metavar="VIEW", help="of a step of views: the view's id")
-    text = "optional layers that the step truth writes"
+    add("--view", metavar="VIEW", help="id of the view, for steps of views")
+    text = "optional layers of the step truth"
     add("--layers", nargs="+", default=[], metavar="LAYER", help=text)
-    add("--dress", type=int, default=0, metavar="SEED", help="of a dressed variant")
+    add("--dress", type=int, default=0, metavar="SEED", help="seed of a dressed variant")
     add_options(p, ModelsOption)
 
 
@@ -100,7 +100,7 @@ def _run(args: argparse.Namespace) -> int:
     args.out = _folder_of(homes[0])
     code = run_homes(args, homes)
     if code == 0 and not args.json:
-        echo(f"in {args.out}; look at it: pbrs-farm sheet {args.out}")
+        echo(f"output in {args.out}; next: pbrs-farm sheet {args.out}")
     return code
 
 

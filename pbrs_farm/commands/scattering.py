@@ -36,30 +36,36 @@ def add_verbs(verb: Verb) -> None:
     p = verb("scatter", _scatter)
     add = p.add_argument
     add("homes", nargs="+", metavar="HOME", help=HOME)
-    text = "a folder, a file or a pattern of GLB, glTF, OBJ, PLY, STL, OFF; repeatable"
+    text = "folder, file or pattern of GLB, glTF, OBJ, PLY, STL or OFF files, repeatable"
     add("--models", action="append", required=True, metavar="PATH", help=text)
     add("--out", required=True, help="output folder or store URL")
-    add("--count", type=int, default=20, metavar="N", help="things a scene (default 20)")
-    add("--scenes", type=int, default=1, metavar="N", help="scenes a home, by seeds from --seed on")
-    add("--views", type=int, default=5, metavar="N", help="views a scene (default 5)")
-    add("--physics", action="store_true", help="drop them and let them come to rest")
-    text = "hang them in the air of rooms at any turn, where they touch nothing"
+    add("--count", type=int, default=20, metavar="N", help="objects per scene (default 20)")
+    add("--scenes", type=int, default=1, metavar="N", help="scenes per home (default 1)")
+    add("--views", type=int, default=5, metavar="N", help="views per scene (default 5)")
+    add("--physics", action="store_true", help="drop the objects and simulate until they rest")
+    text = "place the objects in mid-air, in random poses, without contact"
     add("--float", action="store_true", dest="floating", help=text)
-    add("--on", default="", metavar="NAME", help="the furniture or room that takes them")
-    add("--room", default="", metavar="NAME", help="the room whose furniture and floor take them")
-    add("--unit", default="m", help="of the models' files: m, cm, mm, inch (default m)")
-    add("--size-m", type=float, metavar="M", help="the longest side of each model instead")
-    add("--up", default="", help="the models' axis that points up: x, y or z")
-    add("--credit", default="", metavar="TEXT", help="a line that pictures of the models carry")
-    text = "from the eye to what it looks at, metres (default 0.5..1.2)"
+    add("--on", default="", metavar="NAME", help="place them on this furniture, or in this room")
+    add("--room", default="", metavar="NAME", help="place them anywhere in this room")
+    add("--unit", default="m", help="unit of the models: m, cm, mm or inch (default m)")
+    add("--size-m", type=float, metavar="M", help="scale to this longest side, metres")
+    add("--up", default="", help="up axis of the models: x, y or z (default: as their format)")
+    add("--credit", default="", metavar="TEXT", help="credit line for pictures of the models")
+    text = "distance from the camera to its target, metres (default 0.5..1.2)"
     add("--distance", default="0.5..1.2", metavar="A..B", help=text)
-    text = "a BOP camera.json: K and size of the pictures"
+    text = "BOP camera.json with K and size of the pictures"
     add("--camera", type=Path, metavar="FILE", help=text)
-    text = "share of the model looked at that nothing hides (default 0.5)"
+    text = "minimum visible share of the target (default 0.5)"
     add("--visible", type=float, default=0.5, metavar="SHARE", help=text)
-    add("--dress", metavar="SEED", help="dress the home first, by this seed")
-    add("--modes", nargs="+", default=["mlt_il_ol"], metavar="MODE", help="default mlt_il_ol")
-    add("--layers", nargs="+", default=[], metavar="LAYER", help="optional layers to write too")
+    add("--dress", metavar="SEED", help="dress the home first, with this seed")
+    add(
+        "--modes",
+        nargs="+",
+        default=["mlt_il_ol"],
+        metavar="MODE",
+        help="modes (default mlt_il_ol)",
+    )
+    add("--layers", nargs="+", default=[], metavar="LAYER", help="optional layers to write")
     add_options(p, SeededRecipeOptions)
 
 

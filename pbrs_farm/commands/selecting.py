@@ -35,29 +35,29 @@ def add_verbs(verb: Verb) -> None:
     """Add reference and select."""
     p = verb("reference", _reference)
     add = p.add_argument
-    add("action", choices=("build",), help="the one thing to do")
+    add("action", choices=("build",), help="always build")
     add("source", type=Path, help="folder of RGB-D pairs, or nyu_depth_v2_labeled.mat")
-    add("--out", type=Path, required=True, help="the reference file to write")
-    add_set(p, "FIELD=VALUE", "histogram.FIELD or selection.FIELD")
+    add("--out", type=Path, required=True, help="reference file to write")
+    add_set(p, "FIELD=VALUE", "override histogram.FIELD or selection.FIELD, repeatable")
     _add_photographs(p)
 
     p = verb("select", _select)
     add = p.add_argument
     add("folder", help="output folder or store URL")
-    text = "a reference file, a folder of RGB-D pairs, or a .mat"
+    text = "reference file, folder of RGB-D pairs, or .mat file"
     add("--reference", type=Path, help=text)
-    text = "without a reference: leave out what teaches nothing (black plane cut twins)"
+    text = "drop uninformative views by these rules instead: black plane cut twins"
     add("--by", nargs="+", metavar="RULE", help=text)
-    add("--selection", metavar="RUN", help="with --by: among what this run keeps")
-    add("--run", default="default", help="name of the selection's files")
-    add_set(p, "FIELD=VALUE", "selection.FIELD, e.g. selection.min_depth=0.6")
-    add("--score-mode", help="mode to score where a view lacks mlt_il_ol")
-    add("--per-room-cap", type=int, metavar="N", help="best views kept per room")
-    add("--balance", choices=("none", "classes"), help="keep classes in balance")
-    add("--report", action="store_true", help="write selection/<run>.html too")
-    text = "the photographs' folder, to show the nearest ones in the report"
+    add("--selection", metavar="RUN", help="with --by: select from the views kept by this run")
+    add("--run", default="default", help="name of this selection and its files (default default)")
+    add_set(p, "FIELD=VALUE", "override selection.FIELD, e.g. selection.min_depth=0.6, repeatable")
+    add("--score-mode", help="mode to score if a view has no mlt_il_ol")
+    add("--per-room-cap", type=int, metavar="N", help="keep at most the N best views of a room")
+    add("--balance", choices=("none", "classes"), help="balance the classes of the kept views")
+    add("--report", action="store_true", help="also write selection/<run>.html")
+    text = "folder of the photographs, to show the nearest ones in the report"
     add("--photographs", type=Path, metavar="FOLDER", help=text)
-    add("--json", action="store_true", help="the summary as JSON")
+    add("--json", action="store_true", help="print the summary as JSON")
     _add_photographs(p)
 
 
@@ -66,7 +66,7 @@ def _add_photographs(p: argparse.ArgumentParser) -> None:
     add = p.add_argument
     add("--depth-scale", type=float, help="depth units per metre (default by file kind)")
     add("--sun-rgbd", action="store_true", help="undo SUN RGB-D's rotation of depth bits")
-    add("--no-crop", action="store_true", help="keep the registration border")
+    add("--no-crop", action="store_true", help="keep the border of the depth registration")
 
 
 def _overrides(arguments: list[str]) -> dict[str, str]:
@@ -101,7 +101,7 @@ def _select(args: argparse.Namespace) -> int:
 
     store = store_of(args.folder)
     if (args.reference is None) == (args.by is None):
-        raise BadInput("select", "", "give --reference or --by, one of them")
+        raise BadInput("select", "", "give either --reference or --by")
     if args.by is not None:
         return _select_by(args)
     recipe = recipe_from_json(store.get("recipe.json"), f"{store.url}: recipe.json")

@@ -54,29 +54,29 @@ class PartOptions(Request, CameraOptions, ModelsOption):
     """Render options of a part: those of `run`, for its homes."""
 
     select: tuple[str, ...] = option(
-        (), "rules by which views are left out of the forms", choices=tuple(REASONS)
+        (), "rules that exclude views from the exports", choices=tuple(REASONS)
     )
 
 
 class PartTable(PartOptions):
     """A table [part.NAME]."""
 
-    homes: tuple[str, ...] = option((), "homes, as `run` takes them")
+    homes: tuple[str, ...] = option((), "homes, as for `run`")
 
 
 class CardTable(Record):
     """The table [card]."""
 
-    title: str = option("", "the set's name for people")
-    text: str = option("", "what it is for, in Markdown")
-    licence: str = option("", "under which it may be used")
+    title: str = option("", "title of the set")
+    text: str = option("", "purpose, in Markdown")
+    licence: str = option("", "licence of the set")
 
 
 class FormTable(Record):
     """The entries of every table [form.NAME]."""
 
-    to: str = option("", "the form (default: the table's name)")
-    parts: tuple[str, ...] = option((), "of these parts (default: all)")
+    to: str = option("", "format (default: the table's name)")
+    parts: tuple[str, ...] = option((), "parts to export (default: all)")
 
 
 class ViewFormTable(FormTable, ViewOptions):
@@ -109,7 +109,7 @@ def set_from_word(word: str) -> DataSet:
         return set_from_bytes((SHIPPED / f"{word}{_ENDING}").read_bytes(), f"{word}{_ENDING}")
     if not word.endswith(_ENDING):
         hint = hint_of_choice(word, shipped_sets())
-        raise BadInput(word, "", "no such set", hint=f"{hint}, or your own FILE.toml")
+        raise BadInput(word, "", "no such set", hint=f"{hint}, or a FILE.toml")
     return set_from_bytes(read_given(Path(word)), word)
 
 
@@ -117,12 +117,12 @@ def set_from_bytes(data: bytes, file: str) -> DataSet:
     """Parse a data set's file; file is its name, for messages and the set's own name."""
     name = Path(file).stem
     if not _NAME.fullmatch(name):
-        raise BadInput(file, "", "a set's name is of small letters, digits, - and _")
+        raise BadInput(file, "", "the name of a set may have lower-case letters, digits, - and _")
     try:
         # Decode without the byte order mark that some editors write.
         tables = tomllib.loads(text_from_bytes(data))
     except (ValueError, RecursionError) as error:
-        raise BadInput(file, "", f"is no TOML: {error}") from None
+        raise BadInput(file, "", f"is not valid TOML: {error}") from None
     _check_tables(tables, file)
     with _placed(file, "split"):
         shares = shares_from_text(str(tables["split"])) if "split" in tables else None
@@ -144,7 +144,7 @@ def _check_tables(tables: Mapping[str, Any], file: str) -> None:
     for name, table in tables.items():
         if name != "split" and (name not in _TABLES or not isinstance(table, dict)):
             hint = did_you_mean(name, [*_TABLES, "split"]) or f"[{'], ['.join(_TABLES)}], split"
-            raise BadInput(file, name, "is no table of a set", hint=hint)
+            raise BadInput(file, name, "is not a table of a set", hint=hint)
     if not tables.get("part"):
         raise BadInput(file, "part", "names no homes", hint="[part.views] with homes = [...]")
     for kind in ("part", "form"):
@@ -152,7 +152,7 @@ def _check_tables(tables: Mapping[str, Any], file: str) -> None:
             if not isinstance(table, dict):
                 raise BadInput(file, f"{kind}.{name}", f"expected a table [{kind}.NAME]")
             if not _NAME.fullmatch(name):
-                text = "a name is of small letters, digits, - and _"
+                text = "a name may have lower-case letters, digits, - and _"
                 raise BadInput(file, f"{kind}.{name}", text)
 
 
@@ -212,9 +212,9 @@ def _form(
         view_table = request_from(argparse.Namespace(**values), ViewFormTable)
         form = form_of(to)
         if not isinstance(form, ViewForm):
-            raise BadInput("to", to, "is a form of homes, not of views")
+            raise BadInput("to", to, "exports homes, not views")
         if view_table.classes and not form.has_classes:
-            raise BadInput("classes", "", f"{to} has no classes of your own")
+            raise BadInput("classes", "", f"{to} has fixed classes")
         options = options_from(form, {k.replace("-", "_"): v for k, v in of_form.items()})
         choice = replace(choice_of(view_table), options=options)
         return SetForm(name, to, _parts_of(view_table, parts), choice)
@@ -235,7 +235,7 @@ def options_given(part: SetPart) -> dict[str, Any]:
     values = dict(part.values)
     values.pop("select", None)
     if "trajectory" in values:
-        raise BadInput("trajectory", str(values["trajectory"]), "is not sent to a farm")
+        raise BadInput("trajectory", str(values["trajectory"]), "cannot be submitted to a farm")
     of_cameras = {
         name: shown.sets
         for name, (_field, shown) in options_of(CameraOptions).items()

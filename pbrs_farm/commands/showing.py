@@ -25,19 +25,17 @@ def add_verbs(verb: Verb) -> None:
     add = p.add_argument
     add("root", nargs="?", default="", help="output folder or store URL (default $PBRS_STORE)")
     add("--host", default="127.0.0.1", help="address to listen on (default 127.0.0.1)")
-    add("--port", type=int, default=8080, help="default 8080; 0 takes a free one")
-    text = "a name that browsers may call the board by, repeatable (behind a proxy)"
+    add("--port", type=int, default=8080, help="port (default 8080; 0 = any free port)")
+    text = "host name that browsers use for the board, repeatable (for a proxy)"
     add("--allow-host", action="append", default=[], metavar="NAME", help=text)
-    text = (
-        "file that holds the token of changes, and of reading from elsewhere (default: a new one)"
-    )
+    text = "file with the token for changes, and for reading from other machines (default: a new token)"
     add("--token-file", type=Path, metavar="FILE", help=text)
-    add("--readonly", action="store_true", help="read-only: no one can change anything")
-    text = "keeps the index and thumbnails (default ~/.cache/pbrs_farm/board)"
+    add("--readonly", action="store_true", help="allow no changes")
+    text = "folder for the index and thumbnails (default ~/.cache/pbrs_farm/board)"
     add("--cache", type=Path, metavar="FOLDER", help=text)
-    text = "price of a slot for an hour, for the cost of jobs"
+    text = "price of a slot-hour, to show the cost of jobs"
     add("--price", type=float, default=0.0, metavar="P", help=text)
-    add("--currency", default="EUR", help="of --price (default EUR)")
+    add("--currency", default="EUR", help="currency of --price (default EUR)")
 
 
 def _board(args: argparse.Namespace) -> None:
@@ -91,7 +89,7 @@ def _say(options: BoardOptions, token: Secret, *, is_own_token: bool) -> None:
     if is_own_token and not (options.is_readonly and options.is_private):
         echo(f"token: {token.reveal()}")
     if not options.is_private:
-        warn(f"{options.host} is not this machine alone: put a proxy with TLS before the board")
+        warn(f"other machines can reach {options.host}: put a proxy with TLS in front of the board")
 
 
 def _token(path: Path) -> Secret:
@@ -103,7 +101,7 @@ def _token(path: Path) -> Secret:
     except OSError as error:
         raise BadInput(path, "", fault_of(error)) from None
     except UnicodeDecodeError:
-        raise BadInput(path, "", "is no text") from None
+        raise BadInput(path, "", "is not text") from None
     if len(text) < 16:
         raise BadInput(path, "", "expected a token of 16 characters or more")
     return Secret(text)

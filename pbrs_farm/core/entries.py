@@ -51,7 +51,7 @@ class EntryTable:
         entry = plugin.load()
         if type(entry).__name__ not in self.types or entry.name != name:
             types = " or ".join(self.types)
-            raise MachineFailed(f"plugin {plugin.mark} is no {types} called {name}")
+            raise MachineFailed(f"plugin {plugin.mark} has no {types} named {name}")
         return entry
 
     def marks(self, names: Iterable[str]) -> list[str]:

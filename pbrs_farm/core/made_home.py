@@ -133,7 +133,7 @@ def made_homes(word: str) -> list[MadeHome]:
         elif key == "furniture" and value == "none":
             home = replace(home, furniture=False)
         else:
-            raise BadInput(word, option, "is no option of made homes", hint=_HINT)
+            raise BadInput(word, option, "is not an option of made homes", hint=_HINT)
     check_wishes(home.bedrooms, home.area, home.storeys, home.offices or 0)
     return [replace(home, seed=seed) for seed in range(first, last + 1)]
 
@@ -152,7 +152,7 @@ def check_wishes(
         text = "homes have 0 to 4 bedrooms"
         raise BadInput("rooms", f"{low}..{high}", text, hint="rooms=2..4")
     if not 0 < area[0] <= area[1]:
-        raise BadInput("area", f"{area[0]:g}..{area[1]:g}", "is no range", hint="area=60..90")
+        raise BadInput("area", f"{area[0]:g}..{area[1]:g}", "is not a range", hint="area=60..90")
     if storeys not in (1, 2):
         raise BadInput("storeys", str(storeys), "homes have one storey or two", hint="storeys=2")
     if offices and high <= offices:

@@ -77,7 +77,7 @@ def fault_of_motion(motion: Motion) -> str:
     if any(len(row) != width for row in motion.values):
         return f"has rows of other than {width} values"
     if not np.isfinite([*times, *(v for row in motion.values for v in row)]).all():
-        return "has a value that is no number"
+        return "has a value that is not a finite number"
     if not motion.is_of_joint:
         length = np.linalg.norm(np.array(motion.values)[:, 3:], axis=1)
         if np.abs(length - 1).max() > 1e-6:

@@ -23,22 +23,22 @@ class BlurFields(FieldGroup):
     steps = ("light",)
 
     aperture_mm: float = field(
-        0.0, "diameter of the entrance pupil; 0 = everything is sharp", 0, 1000
+        0.0, "diameter of the entrance pupil; 0 = everything in focus", 0, 1000
     )
-    focus_m: float = field(0.0, "depth; 0 = what the middle shows", 0, 1e4)
+    focus_m: float = field(0.0, "focus distance; 0 = depth at the picture's centre", 0, 1e4)
     shutter_s: float = field(
         0.0,
-        "open that long; 0 = nothing moves. Of a walk: along it; things that move blur, too",
+        "exposure time; 0 = no motion blur. The camera moves along the walk, moving objects too",
         0,
         60,
     )
     rolling_s: float = field(
-        0.0, "from the top row's light to the bottom one's; 0 = all at once", 0, 60
+        0.0, "readout time from the top to the bottom row; 0 = global shutter", 0, 60
     )
-    right_mps: float = field(0.0, "motion without a walk, camera axes", -1e3, 1e3)
+    right_mps: float = field(0.0, "camera velocity without a walk, camera axes", -1e3, 1e3)
     up_mps: float = field(0.0, low=-1e3, high=1e3)
     forward_mps: float = field(0.0, low=-1e3, high=1e3)
-    pan_dps: float = field(0.0, "to the right, degrees a second", -1e4, 1e4)
+    pan_dps: float = field(0.0, "to the right, degrees per second", -1e4, 1e4)
     tilt_dps: float = field(0.0, "upwards", -1e4, 1e4)
     roll_dps: float = field(0.0, "clockwise, of the camera", -1e4, 1e4)
 
@@ -64,21 +64,23 @@ SENSOR_PRESETS: Final = _PRESETS["sensor"]
 
 
 class LensFields(FieldGroup):
-    """The lens of every view: what bends straight lines (docs/lenses.md)."""
+    """The lens of every view: projection and distortion (docs/lenses.md)."""
 
     steps = ("cameras",)
 
     preset: Literal["none", "kinect", "tum_vi", "hypersim", "d435", "d455", "fisheye180"] = field(
-        "none", "of a known camera; other fields override it"
+        "none", "a known camera; other fields override it"
     )
-    model: LensModel = field("pinhole", "how directions fall on the picture")
-    width_px: int = field(640, "of the picture that fx to cy are of", high=16384, above=0)
-    height_px: int = field(480, "scaled to image's", high=16384, above=0)
-    fx: Pixels = field(0.0, "px; 0 = by cameras.hfov_rad, of a fisheye by hfov_deg")
+    model: LensModel = field("pinhole", "projection model")
+    width_px: int = field(
+        640, "picture width for fx to cy; scaled to image.width_px", high=16384, above=0
+    )
+    height_px: int = field(480, "picture height for fx to cy", high=16384, above=0)
+    fx: Pixels = field(0.0, "px; 0 = from cameras.hfov_rad, for a fisheye from hfov_deg")
     fy: Pixels = field(0.0, "0 = fx")
     cx: Pixels = field(0.0, "px from the top left corner; 0 = the middle")
     cy: Pixels = 0.0
-    hfov_deg: float = field(0.0, "fisheye without fx: of the width", 0, 360)
+    hfov_deg: float = field(0.0, "fisheye without fx: horizontal field of view", 0, 360)
     k1: Coefficient = field(0.0, "radtan and fisheye, as OpenCV has them")
     k2: Coefficient = 0.0
     k3: Coefficient = 0.0
@@ -86,7 +88,7 @@ class LensFields(FieldGroup):
     p1: Coefficient = field(0.0, "radtan, tangential")
     p2: Coefficient = 0.0
     max_angle_deg: float = field(
-        180.0, "fisheye: of the image circle, from the axis; black beyond", high=180, above=0
+        180.0, "fisheye: angle of the image circle from the axis; black beyond", high=180, above=0
     )
 
     @model_validator(mode="before")
@@ -187,29 +189,27 @@ class SensorFields(FieldGroup):
     steps = ("develop",)
 
     preset: Literal["none", "kinect", "phone", "slr", "webcam"] = field(
-        "none", "a kind of camera; other fields override it"
+        "none", "a type of camera; other fields override it"
     )
-    is_on: bool = field(False, "off: pictures are as the light alone makes them")
+    is_on: bool = field(False, "simulate the sensor; off = noise-free pictures")
     f_number: float = field(2.0, low=0.5, high=64)
     shutter_s: float = field(0.0, "0 = automatic, up to shutter_max_s", 0, 60)
-    shutter_min_s: float = field(1e-4, "the shortest automatic one", high=60, above=0)
-    shutter_max_s: float = field(1 / 30, "the longest automatic one", high=60, above=0)
-    iso_min: float = field(100.0, "the base; full_well_e is of it", 1, 1e6)
-    iso_max: float = field(1600.0, "what automatic exposure goes up to", 1, 1e6)
-    compensation_ev: float = field(0.0, "stops above what is automatic", -10, 10)
-    lag_s: float = field(0.0, "automatic exposure follows a walk's light with this delay", 0, 10)
+    shutter_min_s: float = field(1e-4, "minimum automatic shutter time", high=60, above=0)
+    shutter_max_s: float = field(1 / 30, "maximum automatic shutter time", high=60, above=0)
+    iso_min: float = field(100.0, "base ISO, at which full_well_e holds", 1, 1e6)
+    iso_max: float = field(1600.0, "maximum ISO of automatic exposure", 1, 1e6)
+    compensation_ev: float = field(0.0, "exposure compensation, stops", -10, 10)
+    lag_s: float = field(0.0, "delay of automatic exposure along a walk", 0, 10)
     full_well_e: float = field(6000.0, "electrons that saturate a pixel", 10, 1e7)
     read_noise_e: float = field(3.0, "electrons, standard deviation", 0, 1e4)
-    bits: int = field(10, "of the raw values", 1, 16)
-    black_level: float = field(
-        1 / 16, "of the raw range, at which no light stands: noise has room", 0, 0.5
-    )
-    mosaic: bool = field(True, "a Bayer mosaic (RGGB), demosaiced again")
-    vignetting: Share = field(0.0, "light lost in the corners")
+    bits: int = field(10, "bits of the raw values", 1, 16)
+    black_level: float = field(1 / 16, "raw value of no light, share of the range", 0, 0.5)
+    mosaic: bool = field(True, "simulate a Bayer mosaic (RGGB) and demosaicing")
+    vignetting: Share = field(0.0, "share of light lost in the corners")
     aberration_px: float = field(
-        0.0, "lateral: red against blue in the corners, px of 640 across", 0, 50
+        0.0, "lateral chromatic aberration in the corners, px at a width of 640", 0, 50
     )
-    headroom: float = field(4.0, "saturation over the white of the tone", 1, 100)
+    headroom: float = field(4.0, "saturation level relative to white", 1, 100)
     jpeg_quality: int = field(0, "0 = no JPEG", 0, 100)
 
     @model_validator(mode="before")

@@ -157,9 +157,9 @@ def plugin_homes(word: str) -> list[PluginHome]:
         raise BadInput(word, "", "names no homes of a plugin", hint=_HINT)
     low, high = ends
     if not low <= high < low + MAX_HOMES:
-        raise BadInput(word, numbers[0], f"is no range of up to {MAX_HOMES:,} homes", hint=_HINT)
+        raise BadInput(word, numbers[0], f"is not a range of up to {MAX_HOMES:,} homes", hint=_HINT)
     for key, _, _value in options:
         if not key.isidentifier():
-            raise BadInput(word, key, "is no option's name", hint=_HINT)
+            raise BadInput(word, key, "is not an option name", hint=_HINT)
     pairs = tuple((key, value) for key, _, value in options)
     return [PluginHome(name, seed, pairs) for seed in range(low, high + 1)]

@@ -299,7 +299,7 @@ def recipe_from_json(data: bytes, place: str) -> Recipe:
     try:
         return Recipe.model_validate_json(data)
     except ValidationError:
-        raise BadRecipe(f"{place}: is no recipe of this version") from None
+        raise BadRecipe(f"{place}: is not a recipe of this version") from None
 
 
 def _set(fields: dict[str, Any], path: str, text: str) -> None:

@@ -56,74 +56,69 @@ class ReadFields(FieldGroup):
 
     steps = ("house",)
 
-    max_triangles: int = field(
-        5_000_000, "most triangles of a house; more is refused", high=50_000_000, above=0
-    )
+    max_triangles: int = field(5_000_000, "maximum triangles of a house", high=50_000_000, above=0)
     max_model_triangles: int = field(
-        2_000_000, "most triangles of one model; more is refused", high=50_000_000, above=0
+        2_000_000, "maximum triangles of one model", high=50_000_000, above=0
     )
     max_extent_m: float = field(
-        1_000.0, "farthest from the origin; a piece beyond it is refused", high=100_000.0, above=0
+        1_000.0, "maximum distance of a piece from the origin", high=100_000.0, above=0
     )
-    hidden_levels: bool = field(False, "Sweet Home 3D: read levels not shown, too")
+    hidden_levels: bool = field(False, "Sweet Home 3D: also read hidden levels")
     doors: Literal["drawn", "open"] = field(
-        "drawn", "Sweet Home 3D: `open` swings shut doors between rooms open"
+        "drawn", "Sweet Home 3D: `open` opens closed doors between rooms"
     )
     stand_ins: Literal["pieces", "boxes", "none"] = field(
-        "pieces", "for what a source tells by class and box alone: furniture, plain boxes, nothing"
+        "pieces", "of items given only as class and box: furniture, boxes, nothing"
     )
     strict: bool = field(
-        False, "notes of a source are errors but the harmless kinds, docs/houses/notes.md"
+        False, "notes of a source are errors, except harmless kinds (docs/houses/notes.md)"
     )
 
 
 class DressFields(FieldGroup):
-    """Dressing: how far a home is made to look lived in, between reading and repair (docs/dress.md)."""
+    """Dressing: makes a home look lived in, between reading and repair (docs/dress.md)."""
 
     steps = ("house",)
 
-    seed: int = field(0, "seed of what is chosen; 0 = not dressed", 0, below=2**32)
-    surfaces: Share = field(1.0, "share of rooms that get floors and walls of a style")
-    parts: Share = field(1.0, "share of furniture whose wood, cloth and metal change")
-    swap: Share = field(0.7, "share of furniture that another model of its class replaces")
+    seed: int = field(0, "seed of the dressing; 0 = not dressed", 0, below=2**32)
+    surfaces: Share = field(1.0, "share of rooms with new floors and walls")
+    parts: Share = field(1.0, "share of furniture with new wood, cloth and metal")
+    swap: Share = field(0.7, "share of furniture replaced by another model of its class")
     own_share: Share = field(
         0.5,
-        "how often a piece of your own libraries is chosen where one fits; 0 = as often"
-        " as any other",
+        "probability of a piece from your own libraries where one fits; 0 = as likely as any other",
     )
     furniture: Share = field(
-        1.0, "share of the furniture that fits along free walls and beside beds"
+        1.0, "share of the furniture that fits along free walls and beside beds, added"
     )
-    clutter: Share = field(1.0, "share of the things that fit on furniture")
-    walls: Share = field(1.0, "share of pictures, mirrors, clocks, sockets and switches")
-    textiles: Share = field(1.0, "share of curtains, blinds, rugs, pillows, blankets")
-    lamps: Share = field(1.0, "share of rooms without a lamp that get one")
-    mess: Share = field(0.3, "how little was tidied up: chairs, beds, tables, clothes, pictures")
+    clutter: Share = field(1.0, "share of the small objects that fit on furniture, added")
+    walls: Share = field(1.0, "share of pictures, mirrors, clocks, sockets and switches, added")
+    textiles: Share = field(1.0, "share of curtains, blinds, rugs, pillows and blankets, added")
+    lamps: Share = field(1.0, "share of rooms without a lamp that get one; 0..1")
+    mess: Share = field(0.3, "untidiness of chairs, beds, tables, clothes, pictures; 0 = tidy")
     open_share: Share = field(
-        0.0, "share of doors and drawers that stand open, as far as nothing is in their way"
+        0.0, "share of doors and drawers that are opened, up to the first obstacle"
     )
     float_share: float = field(
         0.0,
-        "share of what one sees in a room that generated things in the air hide, about;"
-        " also of homes that are not dressed",
+        "approximate share of a room's view hidden by generated objects in the air;"
+        " also in homes that are not dressed",
         0,
         0.5,
     )
     style: str = Field(
-        "", max_length=64, description="the style of every home; empty = drawn by the seed"
+        "", max_length=64, description="style of every home; empty = drawn by the seed"
     )
     furnish: Literal["none", "empty", "sparse"] = field(
         "none",
-        "rooms that get furniture first: `empty` = those that have none, `sparse` = those"
-        " with little too",
+        "rooms that are furnished before dressing: `empty` = rooms without furniture,"
+        " `sparse` = also rooms with little",
     )
-    passes: str = Field(
-        "", max_length=256, description="plugins' passes after our own, ':' between"
-    )
+    passes: str = Field("", max_length=256, description="passes of plugins, separated by ':'")
     catalogue: str = Field(
         "",
         max_length=4096,
-        description="libraries beside the furniture package, ':' between; `generated` = no package",
+        description="furniture libraries, separated by ':'; `generated` = without the package",
     )
 
 
@@ -140,24 +135,24 @@ class RepairFields(FieldGroup):
     )
     remove_persons: bool = True
     remove_plants: bool = True
-    fallback_light: bool = field(True, "a ceiling light where nothing lights a room")
+    fallback_light: bool = field(True, "add a ceiling light to rooms without any light")
     lamp_in_every_room: bool = field(
-        False, "a ceiling light in each room where people live that has no lamp"
+        False, "add a ceiling light to each living space without a lamp"
     )
     lamp_lx: float = field(
-        0.0, "mean on the floor that an added lamp is sized for; 0 = 1,600 lm each", 0, 1_000
+        0.0, "mean illuminance of the floor by an added lamp; 0 = 1,600 lm each", 0, 1_000
     )
     add_ceilings: bool = field(
-        False, "a ceiling at the walls' height over rooms that have walls and none"
+        False, "add a ceiling at the walls' height to rooms with walls and no ceiling"
     )
     shade_transmission: float = field(
         0.4, "diffuse transmission of shades that enclose their bulb", 0, 1
     )
     min_escape: float = field(
-        0.2, "lamps whose light output ratio is below this get a translucent shade", 0, 1
+        0.2, "lamps with a lower light output ratio get a translucent shade", 0, 1
     )
     bulb_radius_m: float = field(
-        BULB_RADIUS_M, "radius of a bulb where the source gives none", high=1, above=0
+        BULB_RADIUS_M, "radius of a bulb if the source gives none", high=1, above=0
     )
 
 
@@ -167,7 +162,7 @@ class SurroundingFields(FieldGroup):
     steps = ("house",)
 
     kind: Literal["none", "drawn", "street", "garden", "court", "blocks", "hills"] = field(
-        "none", "on all sides; drawn: by the house's seed, storey and kind of home"
+        "none", "surroundings on all sides; drawn: by the house's seed, storey and type"
     )
 
 
@@ -177,44 +172,42 @@ class CameraFields(FieldGroup):
     steps = ("cameras", "pairs")
 
     preset: str = field(
-        "paper", "whose rules and score: paper, released; photo: as people photograph rooms"
+        "paper", "rules and score: paper, released, or photo: as people photograph rooms"
     )
-    n_sectors: int = field(6, "sectors of a room, of equal angles", 1, 360)
-    cell_m: float = field(0.25, "edge of the viewpoint grid", 0.05, 100)
-    height_min_m: float = field(1.5, "eye above the floor's surface", high=100, above=0)
+    n_sectors: int = field(6, "number of equal sectors of a room", 1, 360)
+    cell_m: float = field(0.25, "cell size of the viewpoint grid", 0.05, 100)
+    height_min_m: float = field(1.5, "minimum height of the eye above the floor", high=100, above=0)
     height_max_m: float = field(1.6, high=100, above=0)
-    tilt_deg: float = field(11.0, "downwards", above=-90, below=90)
+    tilt_deg: float = field(11.0, "camera pitch, downwards", above=-90, below=90)
     tilt_sd_deg: float = field(
-        0.0, "of a normal spread about tilt_deg; 0 = fixed, as in the paper", 0, 30
+        0.0, "standard deviation of the pitch; 0 = fixed, as in the paper", 0, 30
     )
-    roll_sd_deg: float = field(0.0, "of a normal spread of the roll about level; 0 = level", 0, 30)
-    clearance_m: float = field(0.10, "least distance of the eye from any obstacle", 0, 10)
+    roll_sd_deg: float = field(0.0, "standard deviation of the roll; 0 = level", 0, 30)
+    clearance_m: float = field(0.10, "minimum distance of the eye from any obstacle", 0, 10)
     min_objects: int = field(3, low=0, high=65_535)
     min_object_fraction: float = field(
-        0.01, "least share of the picture for an object to count", 0, 1
+        0.01, "minimum share of the picture for an object to count", 0, 1
     )
     max_item_fraction: float = field(
-        1.0, "largest share of the picture of one object; 1 = off, as in the paper", high=1, above=0
+        1.0, "maximum share of the picture of one object; 1 = off, as in the paper", high=1, above=0
     )
     max_wall_fraction: float = field(
-        1.0, "the same of a wall, floor or ceiling; 1 = off", high=1, above=0
+        1.0, "maximum share of a wall, floor or ceiling; 1 = off", high=1, above=0
     )
     max_opening_fraction: float = field(
-        1.0, "photo: of the picture, of all doors and windows together", high=1, above=0
+        1.0, "photo: maximum share of all doors and windows together", high=1, above=0
     )
-    min_score: float = field(0.0, "photo: views of a lower score are left out", 0, 2)
-    min_room_score: float = field(0.0, "photo: but a room's best view stays from here on", 0, 2)
+    min_score: float = field(0.0, "photo: views with a lower score are dropped", 0, 2)
+    min_room_score: float = field(0.0, "photo: the same, for a room's best view", 0, 2)
     likeness: float = field(
         0.0,
-        "photo: weight, beside the score, of how near the class shares of all views are to"
-        " NYUv2's; 0 = off",
+        "photo: weight of the match between the class shares of all views and those of"
+        " NYUv2; 0 = off",
         0,
         100,
     )
     hfov_rad: float = field(2 * 0.5534, "full horizontal field of view", above=0, below=3.1)
-    hfov_spread: float = field(
-        0.0, "photo: part by which the focal length varies, either way", 0, 0.3
-    )
+    hfov_spread: float = field(0.0, "photo: relative variation of the focal length", 0, 0.3)
     score_width_px: int = field(640, high=4096, above=0)
     score_height_px: int = field(480, high=4096, above=0)
     coarse_width_px: int = field(160, high=4096, above=0)
@@ -223,16 +216,16 @@ class CameraFields(FieldGroup):
     source: str = Field(
         "sampled",
         max_length=4096,
-        description="where viewpoints come from, with the options of a plugin's source: NAME,key=value",
+        description="source of the viewpoints; a plugin's may have options: NAME,key=value",
     )
-    file: str = field("", "camera or trajectory file of the user's, for those sources")
+    file: str = field("", "of the sources file and trajectory")
     exact: bool = field(False, "score every candidate at full size")
-    walk_frames: int = field(150, "walk: views along it", 2, MOST_FRAMES)
-    walk_fps: float = field(30.0, "walk: frames a second", high=1_000, above=0)
-    walk_speed_mps: float = field(0.8, "walk: of the eye, at most", 0.1, 10)
-    walk_turn_dps: float = field(60.0, "walk: degrees a second, at most", 5, 720)
-    walk_shake: float = field(0.0, "walk: 1 = as a hand holds a camera", 0, 3)
-    stereo_m: float = field(0.0, "baseline: a view more to the right of each; 0 = none", 0, 10)
+    walk_frames: int = field(150, "walk: number of views", 2, MOST_FRAMES)
+    walk_fps: float = field(30.0, "walk: frames per second", high=1_000, above=0)
+    walk_speed_mps: float = field(0.8, "walk: maximum speed of the eye", 0.1, 10)
+    walk_turn_dps: float = field(60.0, "walk: maximum turn rate, degrees per second", 5, 720)
+    walk_shake: float = field(0.0, "walk: camera shake; 1 = hand-held", 0, 3)
+    stereo_m: float = field(0.0, "baseline: adds a view to the right of each; 0 = off", 0, 10)
 
     @property
     def source_name(self) -> str:
@@ -294,32 +287,30 @@ class LightFields(FieldGroup):
 
     integrator: Literal["path", "metropolis"] = "path"
     spp: int = field(64, "samples per pixel of `path`", 1, MAX_SAMPLES)
-    direct_spp: int = field(512, "direct samples beside Metropolis", 0, MAX_SAMPLES)
+    direct_spp: int = field(512, "direct samples, with metropolis", 0, MAX_SAMPLES)
     mutations_per_pixel: int = field(1024, low=1, high=MAX_SAMPLES)
-    max_depth: int = field(12, "path segments; Russian roulette from rr_depth", 1, 1024)
-    rr_depth: int = field(
-        1, "first vertex; docs/lab/light.md: measured the best of 1 to 6", 1, 1024
-    )
+    max_depth: int = field(12, "maximum path segments", 1, 1024)
+    rr_depth: int = field(1, "first vertex; 1 is the fastest of 1 to 6, docs/lab/light.md", 1, 1024)
     filter: Literal["box", "tent"] = field("tent", "reconstruction filter of a pixel's samples")
     pilot_spp: int = field(4, "32x24 pixels per emitter; 0 = uniform choice", 0, 4096)
     noise: float = field(
         0.0,
-        "relative error to end at: `path` goes on in passes of spp, metropolis makes"
-        " fewer mutations; 0 = one pass, all mutations",
+        "target relative error: `path` adds passes of spp, metropolis does fewer"
+        " mutations; 0 = one pass, all mutations",
         0,
         100,
     )
-    max_spp: int = field(4096, "of `path` when it renders to a noise or a time", 1, MAX_SAMPLES)
+    max_spp: int = field(4096, "maximum of `path` with noise or time_budget_s", 1, MAX_SAMPLES)
     time_budget_s: float = field(
-        0.0, "seconds of light a view, instead of samples or mutations; 0 = off", 0, 604_800
+        0.0, "seconds of light per view, instead of a number of samples; 0 = off", 0, 604_800
     )
     groups: Literal["two", "lamps"] = field(
-        "two", "outdoor and indoor; `lamps`: a layer for each lamp, too (`path`)"
+        "two", "stored groups: outdoor and indoor; `lamps`: also each lamp (`path` only)"
     )
-    chains: int = field(32768, "Markov chains of `metropolis`, in parallel", 16, MAX_SAMPLES)
-    large_step: float = field(0.3, "chance of a fresh path, Kelemen 2002", above=0, below=1)
+    chains: int = field(32768, "parallel Markov chains of `metropolis`", 16, MAX_SAMPLES)
+    large_step: float = field(0.3, "probability of a fresh path, Kelemen 2002", above=0, below=1)
     tail_pixels: int = field(
-        1024, "pixels that a Metropolis path's suffix is shown to; 0 = its own alone", 0, 4096
+        1024, "pixels that share the tail of a Metropolis path; 0 = its own pixel only", 0, 4096
     )
     denoise: bool = True
 
@@ -343,41 +334,39 @@ class SkyFields(FieldGroup):
 
     kind: Literal["sunsky", "panorama"] = "sunsky"
     panoramas: str = field(
-        "", "folder of latitude-longitude HDR pictures, or one; empty = `pbrs-farm skies`"
+        "", "latitude-longitude HDR picture or a folder of them; empty = those of `pbrs-farm skies`"
     )
     time: Literal["day", "dusk", "night", "drawn"] = field(
-        "day", "sunsky: drawn = by the house: dusk or night of a third, overcast of a sixth"
+        "day", "sunsky: drawn = by the house: a third dusk or night, a sixth overcast"
     )
     overcast: bool = field(False, "sunsky: an overcast sky, without a sun")
-    hour: float | None = field(
-        None, "sunsky: by the sun; its place by latitude_deg, day_of_year", 0, 24
-    )
+    hour: float | None = field(None, "sunsky: solar time, with latitude_deg and day_of_year", 0, 24)
     latitude_deg: float = field(48.0, "north of the equator; -z is north", -90, 90)
-    day_of_year: int = field(80, "1 = 1 January; 80 = day and night alike", 1, 366)
+    day_of_year: int = field(80, "1 = 1 January; 80 = equinox", 1, 366)
     sun_elevation_deg: float | None = field(
-        None, "sunsky: above the horizon; none = by hour or time, by day drawn, 15 to 60", -90, 90
+        None, "sunsky: sun above the horizon; empty = by hour or time (by day 15 to 60)", -90, 90
     )
     sun_azimuth_deg: float | None = field(
-        None, "sunsky: from -z towards +x; none = by hour, or drawn by the house", -360, 360
+        None, "sunsky: from -z towards +x; empty = by hour, or drawn by the house", -360, 360
     )
 
 
 class EmissionFields(FieldGroup):
-    """How strong lights are."""
+    """Intensity of lights."""
 
     steps = ("illuminance", "light")
 
     preset: Literal["photometric", "released"] = "photometric"
     sky_lx: float = field(
         10_000.0,
-        "illuminance of open ground by a clear sky without sun, which stands at 30 degrees",
+        "illuminance of open ground by a clear sky alone, sun at 30 degrees",
         high=1e7,
         above=0,
     )
-    sun_lx: float = field(103_000.0, "the sun's, facing it, when it stands at the zenith", 0, 1e7)
-    lamp_lm: float = field(1_600.0, "a Sweet Home 3D lamp of power 0.5", high=1e7, above=0)
-    lm_per_watt: float = field(13.0, "SUNCG's watts", high=1e4, above=0)
-    compensate_shades: bool = field(True, "flux is what leaves the lamp, shade and all")
+    sun_lx: float = field(103_000.0, "illuminance by the sun at the zenith", 0, 1e7)
+    lamp_lm: float = field(1_600.0, "flux of a Sweet Home 3D lamp of power 0.5", high=1e7, above=0)
+    lm_per_watt: float = field(13.0, "luminous efficacy for SUNCG's watts", high=1e4, above=0)
+    compensate_shades: bool = field(True, "flux is measured outside the shade")
     lamp_kelvin_min: float = field(2700.0, low=500, high=40_000)
     lamp_kelvin_max: float = field(3000.0, low=500, high=40_000)
     released_bulb: float = field(400.0, "radiance, W m-2 sr-1", 0, 1e7)
@@ -400,28 +389,24 @@ class ToneFields(FieldGroup):
 
     preset: Literal["photo", "released"] = "photo"
     key: float = field(0.18, "released: Reinhard's key value", high=1000, above=0)
-    white_balance: float = field(
-        0.7, "how far the light's colour is turned to white; 1 = all the way", 0, 1
-    )
+    white_balance: float = field(0.7, "correction of the light's colour; 0 = none, 1 = white", 0, 1)
     camera: Literal["neutral", "phone", "slr", "webcam", "kinect", "drawn"] = field(
-        "neutral", "photo: what takes the pictures (docs/light.md); drawn: one of these a view"
+        "neutral", "photo: camera of the pictures (docs/light.md); drawn: one of these per view"
     )
-    variants: int = field(0, "more pictures of mlt_il_ol, each by a camera that is drawn", 0, 8)
-    warmth_ev: float = field(0.0, "stops of red over blue after balance", -4, 4)
-    tint_ev: float = field(0.0, "stops of green over both after balance", -4, 4)
-    white: float = field(10.0, "photo: radiance over a matt white's that becomes 255", 1, 1e6)
-    flare: Share = field(0.002, "photo: of the picture's mean light, as a veil over all of it")
-    glare: Share = field(0.0, "of the light, spread wide about what is bright")
-    exposure_ev: float = field(0.0, "photo: stops above the key", -8, 8)
-    contrast: float = field(
-        1.42, "photo: slope of encoded tones about the middle; 1 = none", 0.25, 4
-    )
+    variants: int = field(0, "more pictures of mlt_il_ol, by random cameras", 0, 8)
+    warmth_ev: float = field(0.0, "red over blue after white balance, stops", -4, 4)
+    tint_ev: float = field(0.0, "green over red and blue after white balance, stops", -4, 4)
+    white: float = field(10.0, "photo: radiance that becomes 255, over matt white", 1, 1e6)
+    flare: Share = field(0.002, "photo: veiling glare, share of the mean light added to all pixels")
+    glare: Share = field(0.0, "share of the light spread widely around bright areas")
+    exposure_ev: float = field(0.0, "photo: exposure above the key, stops", -8, 8)
+    contrast: float = field(1.42, "photo: slope of the tone curve at mid-grey; 1 = none", 0.25, 4)
     local_contrast: Share = field(
-        0.0, "photo: how far large differences of light are taken out, detail kept"
+        0.0, "photo: compression of large differences of light; keeps detail"
     )
-    sharpening: float = field(0.0, "photo: of the difference to a blurred picture, added", 0, 4)
+    sharpening: float = field(0.0, "photo: amount of unsharp masking", 0, 4)
     pictures: str = Field(
-        "", max_length=256, description="plugins' pictures beside the modes', ':' between"
+        "", max_length=256, description="additional pictures of plugins, separated by ':'"
     )
 
     @field_validator("pictures")
@@ -435,12 +420,12 @@ class RasterFields(FieldGroup):
 
     steps = ("opengl_dl", "opengl_il")
 
-    samples: int = field(4, "per pixel, resolved", 1, 64)
-    lights_per_object: int = field(8, "best ones, paper section 3.2", 1, 256)
+    samples: int = field(4, "samples per pixel", 1, 64)
+    lights_per_object: int = field(8, "brightest lights of an object, paper section 3.2", 1, 256)
 
 
 class HistogramFields(FieldGroup):
-    """The histograms of a view and its quality numbers, written beside it (paper section 3.3).
+    """The histograms and quality figures of a view (paper section 3.3).
 
     Bins are powers of two, so that every coarser binning is an exact sum of these.
     """
@@ -450,10 +435,12 @@ class HistogramFields(FieldGroup):
     colour_space: Literal["rgb", "ycbcr"] = field("rgb", "sRGB-encoded; joint bins")
     colour_bins: Literal[2, 4, 8, 16] = field(8, "per channel, three channels jointly")
     depth_bins: Literal[8, 16, 32, 64, 128, 256] = 128
-    depth_min_m: float = field(0.0, "nearer counts as the first bin", 0, 1e6)
-    depth_max_m: float = field(10.0, "farther counts as the last bin", high=1e6, above=0)
-    near_m: float = field(0.25, "what is nearer counts as touching the camera", high=1e6, above=0)
-    object_fraction: float = field(0.01, "of the picture, to be an object", 0, 1)
+    depth_min_m: float = field(0.0, "nearer depths count in the first bin", 0, 1e6)
+    depth_max_m: float = field(10.0, "farther depths count in the last bin", high=1e6, above=0)
+    near_m: float = field(0.25, "nearer surfaces count as touching the camera", high=1e6, above=0)
+    object_fraction: float = field(
+        0.01, "minimum share of the picture for an object to count", 0, 1
+    )
 
     @model_validator(mode="after")
     def _depth_grows(self) -> Self:
@@ -465,26 +452,26 @@ class HistogramFields(FieldGroup):
 class SelectionFields(FieldGroup):
     """Image selection (paper section 3.3) and the thresholds of image quality."""
 
-    min_colour: float = field(0.70, "kept when above, paper section 3.3", 0, 1)
-    min_depth: float = field(0.70, "kept when above, paper section 3.3", 0, 1)
+    min_colour: float = field(0.70, "minimum colour similarity, paper section 3.3", 0, 1)
+    min_depth: float = field(0.70, "minimum depth similarity, paper section 3.3", 0, 1)
     score_mode: Literal["mlt_il_ol", "mlt_ol", "opengl_il", "opengl_dl"] = field(
-        "mlt_il_ol", "scored where a view lacks mlt_il_ol"
+        "mlt_il_ol", "mode to score if a view has no mlt_il_ol"
     )
-    per_room_cap: int = field(0, "best views kept per room; 0 = all", 0, 1_000_000_000)
+    per_room_cap: int = field(0, "maximum views per room, best first; 0 = all", 0, 1_000_000_000)
     balance: Literal["none", "classes"] = field(
-        "none", "take of the kept views those that balance the classes"
+        "none", "keep a subset of the kept views that balances the classes"
     )
-    balance_share: float = field(0.5, "share of the kept views taken", high=1, above=0)
+    balance_share: float = field(0.5, "share of the kept views in that subset", high=1, above=0)
     black_modes: Literal["scored", "light", "all"] = field(
-        "scored", "modes whose picture must not be black: scored, path-traced, all"
+        "scored", "modes that must not be black: scored, path-traced, all"
     )
-    min_brightness: float = field(0.06, "median sRGB luma; too dark below", 0, 1)
-    max_blown: float = field(0.50, "share of saturated pixels", 0, 1)
-    max_surface: float = field(0.85, "share of the largest instance", 0, 1)
-    max_near: float = field(0.30, "share nearer than near_m: inside it", 0, 1)
-    min_objects: int = field(3, "objects of object_fraction and more", 0, 65_535)
-    max_noise: float = field(1.0, "relative error of the raw light", 0, 1e6)
+    min_brightness: float = field(0.06, "minimum median sRGB luma", 0, 1)
+    max_blown: float = field(0.50, "maximum share of saturated pixels", 0, 1)
+    max_surface: float = field(0.85, "maximum share of one instance", 0, 1)
+    max_near: float = field(0.30, "maximum share nearer than near_m", 0, 1)
+    min_objects: int = field(3, "minimum number of objects above object_fraction", 0, 65_535)
+    max_noise: float = field(1.0, "maximum relative error of the raw light", 0, 1e6)
     min_room_lx: float = field(
-        0.0, "by all light on a room's floor; views of darker rooms are not made", 0, 1e6
+        0.0, "minimum illuminance of a room's floor by all light; darker rooms get no views", 0, 1e6
     )
-    max_missing_textures: int = field(3, "of the house", 0, 1_000_000)
+    max_missing_textures: int = field(3, "maximum missing textures of the house", 0, 1_000_000)

@@ -28,13 +28,13 @@ class RigCamera(FieldGroup):
     name: Name
     translation_m: Annotated[tuple[Metres, Metres, Metres], exactly(3)] = (0.0, 0.0, 0.0)
     rotation_wxyz: Annotated[tuple[float, float, float, float], exactly(4)] | None = field(
-        None, "unit quaternion, rig from camera; instead of the three angles"
+        None, "unit quaternion, rig from camera; replaces the three angles"
     )
     yaw_deg: Degrees = field(0.0, "to the right")
     pitch_deg: Degrees = field(0.0, "up, after yaw")
     roll_deg: Degrees = field(0.0, "clockwise, after yaw and pitch")
-    hfov_deg: float = field(0.0, "of a pin-hole's width; 0 = as all cameras have it", 0, below=175)
-    lens: LensFields | None = field(None, "a lens of its own, as the recipe's group lens")
+    hfov_deg: float = field(0.0, "horizontal field of view; 0 = the recipe's", 0, below=175)
+    lens: LensFields | None = field(None, "lens of this camera, as the recipe's group lens")
 
     @field_validator("rotation_wxyz")
     @classmethod
@@ -43,7 +43,7 @@ class RigCamera(FieldGroup):
     ) -> tuple[float, float, float, float] | None:
         length = 1.0 if value is None else float(np.linalg.norm(value))
         if abs(length - 1) > _UNIT:
-            raise ValueError(f"is no rotation: its length is {length:.4g}, not 1")
+            raise ValueError(f"is not a rotation: its length is {length:.4g}, not 1")
         return value
 
     @model_validator(mode="after")

@@ -27,7 +27,7 @@ OUTLIER_SHARE = 0.2  # share of rooms furnished in another taste than the home's
 def rgb(code: str) -> Rgb:
     """sRGB-encoded 0..1 of six hexadecimal digits; ValueError for anything else."""
     if len(code) != 6:
-        raise ValueError(f"{code!r} is no colour of six hexadecimal digits")
+        raise ValueError(f"{code!r} is not a colour of six hexadecimal digits")
     r, g, b = (int(code[i : i + 2], 16) / 255 for i in (0, 2, 4))
     return (r, g, b)
 

@@ -57,14 +57,14 @@ def export(
     folder, out = Path(folder), Path(out)
     form = form_of(name)
     if not isinstance(form, ViewForm):
-        raise BadInput("--to", name, "is a form of homes", hint="export_homes writes it")
+        raise BadInput("--to", name, "exports homes", hint="export_homes writes it")
     choice = choice or Choice()
     if options or choice.options is None:
         choice = replace(choice, options=options_from(form, options))
     if choice.classes is not None and not form.has_classes:
         owners = [f.name for f in all_forms() if isinstance(f, ViewForm) and f.has_classes]
         hint = f"--to {', '.join(owners)}"
-        raise BadInput("--classes", "", f"{name} has no classes of your own", hint=hint)
+        raise BadInput("--classes", "", f"{name} has fixed classes", hint=hint)
     entries = finished_entries(folder, selection)
     if views is not None:
         entries = [v for v in entries if (v.house.id, v.id) in views]

@@ -13,19 +13,19 @@ class ViewOptions(Record):
 
     layers: tuple[str, ...] = option(
         (),
-        "labels by name (`pbrs-farm layers`), default all there are but radiance",
+        "layers to export; `layers` lists them (default: all stored ones except radiance)",
         metavar="LAYER",
         many_words=True,
     )
     modes: tuple[str, ...] = option(
         (),
-        "opengl_dl opengl_il mlt_ol mlt_il_ol (default all there are)",
+        "lighting modes: opengl_dl opengl_il mlt_ol mlt_il_ol (default: all stored ones)",
         metavar="MODE",
         many_words=True,
     )
-    size: str | None = option(None, "resize to, e.g. 320x240 (default as rendered)", metavar="WxH")
+    size: str | None = option(
+        None, "picture size, e.g. 320x240 (default as rendered)", metavar="WxH"
+    )
     classes: Path | None = option(
-        None,
-        "classes of your own: CSV with columns from,id,name (default NYU40)",
-        metavar="FILE.csv",
+        None, "custom classes: CSV with columns from,id,name (default NYU40)", metavar="FILE.csv"
     )

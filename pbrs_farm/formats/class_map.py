@@ -150,7 +150,7 @@ def _cells(path: Path) -> Iterator[tuple[int, dict[str, str]]]:
                 raise BadInput(path, f"line {reader.line_num}", text, hint=_hint(columns))
             yield reader.line_num, dict(zip(columns, (cell.strip() for cell in cells), strict=True))
     except csv.Error as error:
-        raise BadInput(path, f"line {reader.line_num}", f"is no CSV: {error}") from None
+        raise BadInput(path, f"line {reader.line_num}", f"is not valid CSV: {error}") from None
     if columns is None:
         raise BadInput(path, "", "is empty", hint=_hint(_COLUMNS))
 
@@ -160,7 +160,7 @@ def _columns(path: Path, line: int, cells: list[str]) -> list[str]:
     place = f"line {line}"
     for column in columns:
         if column not in _COLUMNS:
-            fault = f"{_quoted(column)} is no column"
+            fault = f"{_quoted(column)} is not a column"
             raise BadInput(path, place, fault, hint=hint_of_choice(column, _COLUMNS))
         if columns.count(column) > 1:
             raise BadInput(path, place, f"has the column {column} twice")
@@ -180,7 +180,7 @@ def _table_row(path: Path, line: int, cells: dict[str, str]) -> ClassRule:
     if not word:
         raise BadInput(path, place, "from is empty")
     if not (number.isascii() and number.isdigit() and len(number) < 7 and int(number) <= _MAX_ID):
-        text = f"id {_quoted(number)} is no whole number of 0..{_MAX_ID}"
+        text = f"id {_quoted(number)} is not a whole number of 0..{_MAX_ID}"
         raise BadInput(path, place, text, hint="0 is nothing")
     if int(number) and not name:
         raise BadInput(path, place, f"class {number} has no name")
@@ -193,7 +193,7 @@ def _table_row(path: Path, line: int, cells: dict[str, str]) -> ClassRule:
         near = get_close_matches(word[:MAX_NAME], NYU40_NAMES, n=1, cutoff=_MISSPELT)
         if near:
             hint = f"{question(near)} a pattern such as {shown(word)}* says items of that name"
-            raise BadInput(path, place, f"{_quoted(word)} is no class of NYU40", hint=hint)
+            raise BadInput(path, place, f"{_quoted(word)} is not a class of NYU40", hint=hint)
     return ClassRule(word, int(number), name)
 
 

@@ -144,7 +144,7 @@ def gltf_from_glb(data: bytes, file: str) -> Gltf:
     """
     # Header: magic, version, length of the file.
     if len(data) < 20 or data[:4] != _MAGIC:
-        raise BadHouse(file, "", "is no GLB file")
+        raise BadHouse(file, "", "is not a GLB file")
     version, length = struct.unpack_from("<II", data, 4)
     if version != 2:
         raise BadHouse(file, "", f"is glTF {version}; only glTF 2.0 is read")
@@ -153,7 +153,7 @@ def gltf_from_glb(data: bytes, file: str) -> Gltf:
     chunks = _chunks(data, length, file)
     document = json_from_bytes(chunks.get(_JSON_CHUNK, b""), file)
     if not isinstance(document, dict):
-        raise BadHouse(file, "", "the JSON chunk is no object")
+        raise BadHouse(file, "", "the JSON chunk is not an object")
     binary = chunks.get(_BIN_CHUNK)
     return Gltf(document, () if binary is None else (binary,), file)
 

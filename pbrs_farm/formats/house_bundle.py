@@ -94,7 +94,7 @@ def house_from_bundle(glb_data: bytes, json_data: bytes) -> House:
     """
     data = json_from_bytes(json_data, "house.json")
     if not isinstance(data, dict) or data.get("format") != FORMAT:
-        raise BadHouse("house.json", "format", f"expected {FORMAT!r}; this is no house bundle")
+        raise BadHouse("house.json", "format", f"expected {FORMAT!r}; this is not a house bundle")
     if data.get("glb_sha256") != keys.sha256(glb_data):
         raise BadHouse("house.json", "glb_sha256", "house.glb is not the one it was written with")
     # Put arrays and pictures of house.glb where house.json left them out.

@@ -127,7 +127,7 @@ def read_dataset(file: Path) -> NDArray[Any]:
         with h5py.File(file, "r") as opened:
             return np.asarray(opened["dataset"][...])
     except (OSError, KeyError, ValueError, TypeError) as error:
-        raise BadInput(file, "dataset", f"is no data set of HDF5: {error}"[:200]) from None
+        raise BadInput(file, "dataset", f"is not a data set of HDF5: {error}"[:200]) from None
 
 
 def _h5py() -> Any:

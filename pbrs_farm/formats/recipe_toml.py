@@ -43,7 +43,7 @@ def recipe_from_toml(path: Path, overrides: Mapping[str, str]) -> Recipe:
         fields = tomllib.loads(text_from_bytes(data))
     # ValueError: not UTF-8, no TOML, or an integer of thousands of digits.
     except (ValueError, RecursionError) as error:
-        raise BadRecipe(f"{path}: is no TOML: {error}") from None
+        raise BadRecipe(f"{path}: is not valid TOML: {error}") from None
     base = fields.pop("recipe", "fast")
     if not isinstance(base, str) or base not in RECIPE_NAMES:
         hint = hint_of_choice(str(base), RECIPE_NAMES)

@@ -44,7 +44,7 @@ def rig_from_toml(path: Path) -> RigFields:
         fields = tomllib.loads(text_from_bytes(data))
     # ValueError: not UTF-8, no TOML, or an integer of thousands of digits.
     except (ValueError, RecursionError) as error:
-        raise BadInput(path, "", f"is no TOML: {error}") from None
+        raise BadInput(path, "", f"is not valid TOML: {error}") from None
     return rig_from_table(fields, path)
 
 

@@ -46,7 +46,7 @@ def json_from_value(value: Any) -> Any:
 def _list_from_array(value: Any) -> Any:
     if isinstance(value, (np.ndarray, np.generic)):
         return value.tolist()
-    raise TypeError(f"{type(value).__name__} is no JSON value")
+    raise TypeError(f"{type(value).__name__} is not a JSON value")
 
 
 def json_bytes(value: Any) -> bytes:

@@ -262,7 +262,7 @@ def _laid_out(surface: Surface, scale_m: float) -> Surface:
 def _set_light(house: House, edit: SetLight, _fields: ReadFields) -> House:
     def lit(item: Item) -> Item:
         if not item.lights:
-            raise BadInput(house.id, item.id, "is no lamp", hint="home.add_light adds one")
+            raise BadInput(house.id, item.id, "is not a lamp", hint="home.add_light adds one")
         return replace(item, lights=tuple(_shining(light, edit) for light in item.lights))
 
     return _changed(house, edit.items, lit)

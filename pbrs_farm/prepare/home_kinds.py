@@ -114,7 +114,7 @@ def _made_source(word: str, _files: SourceFiles) -> SourceRef:
     companions, package = "", furniture_package.cached() if home.furniture else None
     if home.furniture and package is None:
         raise MachineFailed(
-            "made homes take their furniture from a package that is not fetched",
+            "generated homes need the furniture package, which is not downloaded",
             hint="`pbrs-farm homes --furniture` (120 MB), or made:1,furniture=none",
         )
     if package is not None and package.note:

@@ -139,7 +139,7 @@ def resolve(word: str, files: SourceFiles | None = None, *, models: str = "") ->
     word, part = _parted(word)
     path = Path(word)
     if not _is_utf8(word):
-        raise BadHouse(word, "", "the path is no UTF-8", hint="rename the file or its folder")
+        raise BadHouse(word, "", "the path is not UTF-8", hint="rename the file or its folder")
     if path.name.endswith(SAVED_SUFFIX):
         return _of_saved_home(path, files)
     # The form of the word decides first, then the file at the path.
@@ -157,7 +157,7 @@ def resolve(word: str, files: SourceFiles | None = None, *, models: str = "") ->
         is_inside = entry.main_file and path.name == entry.main_file
         word = str(real_path(path.parent if is_inside else path))
     if part and kind != "plan":
-        raise BadHouse(word, f"#{part}", "names a part of a file that is no floor plan")
+        raise BadHouse(word, f"#{part}", "#PART is only for floor plans")
     folder = models and str(real_path(Path(models)))
     return _source_of(kind, word, files or SourceFiles(), folder, part)
 
@@ -207,7 +207,7 @@ def _format_at(path: Path) -> Format:
         hint = f"export it as .glb; supported: {summary()}"
         raise BadHouse(str(path), "", f"{path.suffix} files are not read", hint=hint)
     if path.is_file() and not any(suffix in home_format.suffixes for home_format in formats()):
-        raise BadHouse(path, "", "is no home", hint=f"supported: {summary()}")
+        raise BadHouse(path, "", "is not a home", hint=f"supported: {summary()}")
     # A missing file gets the error message of its format.
     named = (home_format for home_format in formats() if suffix in home_format.suffixes)
     default = format_of_kind(_DEFAULT_KIND)
@@ -266,7 +266,7 @@ def suncg_list(root: Path, list_file: Path) -> list[str]:
     ids = [line.strip() for line in text_given(list_file, error=BadHouse).splitlines()]
     for number, house in enumerate(ids, 1):
         if len(house.encode()) > _LONGEST_ID and not house.startswith("#"):
-            text = f"an id of {len(house)} letters is no folder's name"
+            text = f"an id of {len(house)} letters is too long for a folder name"
             raise BadHouse(list_file, f"line {number}", text)
     return [str(root / "house" / i) for i in ids if i and not i.startswith("#")]
 

@@ -245,7 +245,7 @@ def panorama_for_house(recipe: Recipe, house_id: str) -> tuple[str, NDArray[np.f
         return folder.name, decode_radiance(_bytes(folder), folder.name)
     if not folder.is_dir():
         hint = "`pbrs-farm skies` fetches four; or --set sky.kind=sunsky"
-        raise BadRecipe(f"sky.panoramas: {folder} is no folder of panoramas", hint=hint)
+        raise BadRecipe(f"sky.panoramas: {folder} is not a folder of panoramas", hint=hint)
     # Choose by name and house, not by the folder's order: each machine takes the same.
     files = {p.name: p for p in folder.iterdir() if p.suffix.lower() in SUFFIXES}
     name = choose_panorama(list(files), house_id, recipe.seed)

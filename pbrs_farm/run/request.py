@@ -27,14 +27,14 @@ class LibraryOptions(Record):
 
     catalogue: tuple[str, ...] = option(
         (),
-        "your own library, repeatable: .sh3f (models), .sh3t (textures), a folder of OBJ or GLB, of"
-        " 3D-FUTURE, hssd-models or objathor; `generated` leaves out the furniture package",
+        "add a furniture library, repeatable: .sh3f (models), .sh3t (textures), a folder of OBJ or GLB,"
+        " 3D-FUTURE, hssd-models or objathor; `generated` omits the furniture package",
         group="dressing",
         metavar="LIBRARY",
     )
     pictures: tuple[str, ...] = option(
         (),
-        "your own photographs as pictures on walls, repeatable: a folder of JPEG or PNG",
+        "folder of JPEG or PNG files to hang as pictures on walls, repeatable",
         group="dressing",
         metavar="DIR",
         into="catalogue",
@@ -46,13 +46,13 @@ class DressOptions(Record):
 
     dress: str | None = option(
         None,
-        "dress each home once by each seed, as a house of its own: 3, 1..20 or 1,4,7",
+        "seeds for dressing; each gives one more variant of each home: 3, 1..20 or 1,4,7",
         group="dressing",
         metavar="SEEDS",
     )
     furnish: Literal["none", "empty", "sparse"] | None = option(
         None,
-        "furnish rooms that have nothing (empty) or little (sparse) in them before the home is dressed (docs/homes.md)",
+        "before dressing, furnish rooms without furniture (empty) or with little (sparse) (docs/homes.md)",
         group="dressing",
         sets="dress.furnish",
     )
@@ -62,12 +62,10 @@ class RecipeOptions(Record):
     """The recipe by name, and what overrides its fields."""
 
     recipe: str = option(
-        "fast",
-        f"{', '.join(RECIPE_NAMES)}, or your own FILE.toml (default {{default}})",
-        group="recipe",
+        "fast", f"{', '.join(RECIPE_NAMES)}, or a FILE.toml (default {{default}})", group="recipe"
     )
     set: tuple[str, ...] = option(
-        (), "override a field", group="recipe", metavar="GROUP.FIELD=VALUE"
+        (), "override a field; `recipes` lists them", group="recipe", metavar="GROUP.FIELD=VALUE"
     )
     size: str | None = option(None, "picture size, e.g. 640x480", group="recipe", metavar="WxH")
     strict: bool = option(False, "treat recoverable faults of a home as errors", group="recipe")
@@ -76,7 +74,7 @@ class RecipeOptions(Record):
 class SeededRecipeOptions(RecipeOptions):
     """As RecipeOptions, with the recipe's seed."""
 
-    seed: int | None = option(None, "the recipe's seed (default 0)", group="recipe", sets="seed")
+    seed: int | None = option(None, "seed of the recipe (default 0)", group="recipe", sets="seed")
 
 
 class LightOptions(Record):
@@ -84,22 +82,22 @@ class LightOptions(Record):
 
     noise: str | None = option(
         None,
-        "end a view's light at this estimated relative error, e.g. 0.05 (light.noise):"
-        " path adds samples, metropolis leaves out mutations",
+        "stop the light of a view at this estimated relative error, e.g. 0.05 (light.noise):"
+        " path adds samples, metropolis does fewer mutations",
         group="light",
         metavar="E",
         sets="light.noise",
     )
     time_budget: str | None = option(
         None,
-        "seconds of light a view, instead of samples or mutations (light.time_budget_s)",
+        "seconds of light per view, instead of a number of samples or mutations (light.time_budget_s)",
         group="light",
         metavar="S",
         sets="light.time_budget_s",
     )
     groups: Literal["two", "lamps"] | None = option(
         None,
-        "lamps: store the light of each lamp, too, for `relight VIEW --lamp` (light.groups;"
+        "lamps: also store the light of each lamp, for `relight VIEW --lamp` (light.groups;"
         " path only; default two: outdoor and indoor)",
         group="light",
         sets="light.groups",
@@ -111,58 +109,58 @@ class CameraOptions(Record):
 
     cameras: str | None = option(
         None,
-        f"where viewpoints come from: {', '.join(CAMERA_SOURCES.names())} (docs/cameras.md)",
+        f"source of the viewpoints: {', '.join(CAMERA_SOURCES.names())} (docs/cameras.md)",
         group="viewpoints",
         metavar="SOURCE",
         sets="cameras.source",
     )
     trajectory: Path | None = option(
         None,
-        "your own walk, as TUM rows t x y z qx qy qz qw (docs/motion.md)",
+        "follow this path: rows of TUM's format, t x y z qx qy qz qw (docs/motion.md)",
         group="viewpoints",
         metavar="FILE",
     )
     frames: int | None = option(
         None,
-        "frames of a walk (default 150)",
+        "number of frames of a walk (default 150)",
         group="viewpoints",
         metavar="N",
         sets="cameras.walk_frames",
     )
     fps: float | None = option(
         None,
-        "frames a second of a walk (default 30)",
+        "frames per second of a walk (default 30)",
         group="viewpoints",
         metavar="F",
         sets="cameras.walk_fps",
     )
     doors: Literal["drawn", "open"] | None = option(
         None,
-        "open: doors between rooms stand open, where their model has a hinge (read.doors)",
+        "open: open the doors between rooms if their model has a hinge (read.doors; default drawn)",
         group="viewpoints",
         sets="read.doors",
     )
     stereo: float | None = option(
         None,
-        "a second view B metres to the right of each, e.g. 0.065",
+        "add a second view B metres to the right of each, e.g. 0.065",
         group="viewpoints",
         metavar="B",
         sets="cameras.stereo_m",
     )
     rig: Path | None = option(
         None,
-        "several cameras at the same instants, by a file rig.toml (docs/cameras.md)",
+        "take each view with the cameras of this rig.toml (docs/cameras.md)",
         group="viewpoints",
         metavar="FILE",
     )
 
 
 class ModelsOption(Record):
-    """Where the models lie that a home's file names."""
+    """The folder of the models that a home's file names."""
 
     models: str = option(
         "",
-        "folder of the models that a scene of HSSD, 3D-FRONT or Holodeck names (docs/houses/data_sets.md)",
+        "folder of the models of an HSSD, 3D-FRONT or Holodeck scene (docs/houses/data_sets.md)",
         metavar="DIR",
     )
 
@@ -191,37 +189,37 @@ class Wanted(Record):
 
     modes: Annotated[tuple[Mode, ...], BeforeValidator(_modes)] = option(
         ALL_MODES,
-        "opengl_dl opengl_il mlt_ol mlt_il_ol (default all)",
-        group="what is made",
+        "lighting modes: opengl_dl opengl_il mlt_ol mlt_il_ol (default all)",
+        group="output",
         metavar="MODE",
         many_words=True,
     )
     layers: tuple[str, ...] = option(
         (),
-        "optional layers to write besides the usual ones; `layers` lists them",
-        group="what is made",
+        "optional layers to add to the default ones; `layers` lists them",
+        group="output",
         metavar="LAYER",
         many_words=True,
     )
     n_views: int = option(
         0,
-        "at most N views a house (default: all)",
+        "at most N views per home (default: all)",
         ge=0,
         name="views",
-        group="what is made",
+        group="output",
         metavar="N",
         least=1,
-        hint="leave it out for all views",
+        hint="omit it for all views",
     )
     pairs: bool = option(
         False,
-        "pairs.parquet: what each two views of a room have in common (docs/motion.md)",
-        group="what is made",
+        "write pairs.parquet: overlap and relative pose of each two views of a room (docs/motion.md)",
+        group="output",
     )
     tracks: bool = option(
         False,
-        "tracks.npz: surface points followed through the frames of a walk (docs/motion.md)",
-        group="what is made",
+        "write tracks.npz: surface points tracked through the frames of a walk (docs/motion.md)",
+        group="output",
     )
 
 
@@ -236,7 +234,7 @@ def wanted_of(request: Wanted) -> Wanted:
         if layer not in LAYER:
             raise BadInput("--layers", layer, "no such layer", hint=hint_of_choice(layer, OPTIONAL))
         if layer in LIGHT_LAYERS and not any(mode.groups for mode in want.modes):
-            text, hint = "is made of traced light", "--modes mlt_ol mlt_il_ol"
+            text, hint = "needs a path-traced mode", "--modes mlt_ol mlt_il_ol"
             raise BadInput("--layers", layer, text, hint=hint)
     layer_names = {name for layer in want.layers for name in (layer, *LAYER[layer].beside)}
     return want.model_copy(update={"layers": tuple(x for x in OPTIONAL if x in layer_names)})
@@ -247,25 +245,25 @@ class ProcessLimitOptions(Record):
 
     jobs: int = option(
         1,
-        "processes (default 1, with a second one beside it for most steps but light); each view uses all cores",
-        group="the run",
+        "render processes (default 1, plus one for all steps but light); each view uses all cores",
+        group="processes",
         metavar="N",
         least=1,
     )
     step_timeout: float = option(
-        3600.0, "seconds a step may take (default 3600)", group="the run", metavar="S"
+        3600.0, "time limit of a step, seconds (default 3600)", group="processes", metavar="S"
     )
     silence: float = option(
         0.0,
-        "seconds a process may be silent (default: as --step-timeout)",
-        group="the run",
+        "restart a process without a sign of life for S seconds (default: as --step-timeout)",
+        group="processes",
         metavar="S",
         least=0,
     )
     memory: float = option(
         0.0,
-        "memory a process may hold (default: its share of the machine)",
-        group="the run",
+        "memory limit of a process (default: its share of the machine)",
+        group="processes",
         metavar="MB",
         least=0,
     )
@@ -275,9 +273,9 @@ class ProcessOptions(ProcessLimitOptions):
     """How this machine's processes do a run."""
 
     update: bool = option(
-        False, "give the output folder this recipe, rendering again what differs", group="the run"
+        False, "replace the recipe of the output folder; repeat changed steps", group="processes"
     )
-    as_json: bool = option(False, "a JSON line per event", name="json", group="the run")
+    as_json: bool = option(False, "print a JSON line per event", name="json", group="processes")
 
 
 class Request(Wanted, LightOptions, SeededRecipeOptions, LibraryOptions, DressOptions):

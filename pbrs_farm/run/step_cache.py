@@ -223,7 +223,7 @@ def camera_file_text(fields: CameraFields) -> str:
     except OSError as error:
         raise BadInput(fields.file or "cameras.file", "", fault_of(error)) from None
     except UnicodeDecodeError:
-        raise BadInput(fields.file, "", "cannot be read: is no UTF-8 text") from None
+        raise BadInput(fields.file, "", "is not UTF-8 text") from None
 
 
 def required_source(work: Work) -> SourceRef:

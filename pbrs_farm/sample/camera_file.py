@@ -55,7 +55,7 @@ class GivenCamera(BaseModel):
             rotation = np.array(poses[0])[:3, :3]
             proper = np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-4)
             if not proper or np.linalg.det(rotation) < 0:
-                raise ValueError("world_from_camera is no rigid pose")
+                raise ValueError("world_from_camera is not a rigid pose")
         return self
 
     @model_validator(mode="after")

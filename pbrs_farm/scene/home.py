@@ -1062,5 +1062,5 @@ def recipe_of(recipe: str | Path | Recipe) -> Recipe:
 
         return recipe_from_toml(Path(recipe), {})
     if not isinstance(recipe, str):
-        raise BadRecipe(f"{recipe!r} is no recipe")
+        raise BadRecipe(f"{recipe!r} is not a recipe")
     return recipe_from_name(recipe)

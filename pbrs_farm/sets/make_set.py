@@ -79,7 +79,7 @@ def claim_folder(out: Path, data_set: DataSet) -> None:
             raise BadInput(out, data_set.file, "holds another set: the file differs", hint=hint)
         return
     if out.exists() and not out.is_dir():
-        raise BadInput(out, "", "is no folder")
+        raise BadInput(out, "", "is not a folder")
     files = [path.name for path in sorted(out.iterdir())] if out.is_dir() else []
     ours = (_PARTS, data_set.file)
     files = [name for name in files if name not in ours and not name.startswith(".")]
@@ -87,7 +87,7 @@ def claim_folder(out: Path, data_set: DataSet) -> None:
     if sets:
         raise BadInput(out, sets[0], "is another set's file", hint="name a new folder")
     if files:
-        raise BadInput(out, files[0], "is no part of this set", hint="name a new folder")
+        raise BadInput(out, files[0], "is not a part of this set", hint="name a new folder")
     FolderStore(out).put(data_set.file, data_set.data)
 
 

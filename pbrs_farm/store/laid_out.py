@@ -320,7 +320,7 @@ class LaidOutStore:
         except ObjectMissing:
             return None
         if pack is None:
-            raise StoreFailed(place, "is no pack of a view", hint="remove it: it is made again")
+            raise StoreFailed(place, "is not a pack of a view", hint="remove it: it is made again")
         return pack
 
     def _remember(self, place: str, pack: Pack | None) -> None:

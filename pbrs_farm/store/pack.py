@@ -92,7 +92,9 @@ def pack_from_head(data: bytes, key: str) -> Pack | None:
             for n, step, offset, size in index["members"]
         }
     except (tarfile.HeaderError, ValueError, KeyError, TypeError):
-        raise StoreFailed(key, "is no pack of a view", hint="remove it: it is made again") from None
+        raise StoreFailed(
+            key, "is not a pack of a view", hint="remove it: it is made again"
+        ) from None
     return Pack(rows, data)
 
 

@@ -50,7 +50,7 @@ class LightResult:
         """
         groups = GROUPS_OF_MODE[mode]
         if not groups:
-            raise ValueError(f"{mode} is no sum of light groups")
+            raise ValueError(f"{mode} is not a sum of light groups")
         total = self.group(groups[0])
         for group in groups[1:]:
             total = total + self.group(group)

@@ -175,7 +175,7 @@ class HypersimFolder:
 
     def save(self, refs: Sequence[ViewRef], place: str | Path) -> None:
         hint = "it has no house.glb: read its frames as samples"
-        raise BadInput(self.url, "", "frames of Hypersim are no views of a root", hint=hint)
+        raise BadInput(self.url, "", "frames of Hypersim are not views of a root", hint=hint)
 
     def _file(self, ref: ViewRef, name: str) -> Path:
         camera, frame = self._frames[ref]

@@ -93,7 +93,7 @@ def test_a_pipe_without_a_writer_is_no_file_where_opening_waits(
     os.mkfifo(tmp_path / "pipe")
     (tmp_path / "file").write_bytes(b"\r\n\x1a")
     monkeypatch.delattr(os, "O_NONBLOCK")
-    with pytest.raises(OSError, match="is no regular file") as caught:
+    with pytest.raises(OSError, match="is not a regular file") as caught:
         open_unwaiting(tmp_path / "pipe")
     assert caught.value.errno == errno.EINVAL
     with os.fdopen(open_unwaiting(tmp_path / "file"), "rb") as file:

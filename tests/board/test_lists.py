@@ -198,7 +198,7 @@ def test_a_store_that_is_no_folder_is_listed_alike(root: Path, tmp_path: Path) -
 
 
 def test_a_damaged_index_is_made_anew(root: Path, tmp_path: Path) -> None:
-    (tmp_path / "index.sqlite").write_bytes(b"this is no database" * 100)
+    (tmp_path / "index.sqlite").write_bytes(b"this is not a database" * 100)
     assert read_queries(root, tmp_path).n_views() == 4
 
 

@@ -82,7 +82,7 @@ def test_one_damaged_view_json_costs_its_own_view_alone(root):
     (house_of(root) / "views/v0/view.json").write_text("[" * 100_000)
     certificate = verify(root, sample=10)
     assert certificate.n_views == 1
-    assert any("view.json: is no JSON" in line for line in certificate.failures)
+    assert any("view.json: is not valid JSON" in line for line in certificate.failures)
     assert certificate.counts["ray: depth"].checked == 10
 
 

@@ -128,9 +128,9 @@ def test_a_recipe_written_as_a_file_is_read_as_itself(name: str, tmp_path: Path)
     ("text", "says"),
     [
         (None, "no such file"),
-        ("[light", "is no TOML"),
-        ("\xff\xff", "is no TOML"),
-        (f"[light]\nspp = {'9' * 5000}", "is no TOML"),
+        ("[light", "is not valid TOML"),
+        ("\xff\xff", "is not valid TOML"),
+        (f"[light]\nspp = {'9' * 5000}", "is not valid TOML"),
         ('recipe = "fst"', "did you mean fast?"),
         ("recipe = 3", "no recipe 3"),
         ("[light]\nsp = 3", "light.sp: no such field, did you mean light.spp"),

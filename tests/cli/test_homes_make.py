@@ -60,10 +60,10 @@ def test_a_plan_of_ones_own_becomes_a_home_of_its_name(tmp_path: Path) -> None:
         (["0"], "expected 1 home or more"),
         (["--programme", "none.json"], "none.json"),
         (["--apartment", "7"], "needs --plan FILE.csv"),
-        (["--programme", "none.json", "--storeys", "2"], "the rooms of one storey"),
+        (["--programme", "none.json", "--storeys", "2"], "describes one storey only"),
         (["--seed", "-1"], "is below 0: try --seed 1"),
         (["--storeys", "5"], "one storey or two: try storeys=2"),
-        (["--plan", "none.json", "--rooms", "2"], "leaves no choice of --rooms"),
+        (["--plan", "none.json", "--rooms", "2"], "fixes the rooms: omit --rooms"),
     ],
 )
 def test_what_cannot_be_made_is_one_line_with_what_works(

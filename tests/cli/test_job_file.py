@@ -71,7 +71,7 @@ def test_a_template_s_options_hold_for_the_homes_named_beside_it_but_for_those_g
     args = submit_arguments(job, given, p, "job.toml")
     assert (args.homes, args.recipe, args.views, args.gpu) == (["x.sh3d"], "fast", 9, True)
     assert job_like(written(tmp_path, "[pack]\n"), ["x"]) == {"homes": ["x"], "pack": {}}
-    with pytest.raises(BadInput, match="rendr: is no table of a job"):
+    with pytest.raises(BadInput, match="rendr: is not a table of a job"):
         job_like(written(tmp_path, "[rendr]\n"), ["x"])
     with pytest.raises(BadInput, match=r"none\.toml"):
         job_like(str(tmp_path / "none.toml"), ["x"])
@@ -87,12 +87,12 @@ def test_homes_and_programmes_are_no_jobs(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("homes = [", "is no TOML"),
+        ("homes = [", "is not valid TOML"),
         ("homes = 3", "expected a list of homes"),
         ("homes = []", "expected a list of homes"),
-        ('homes = ["a"]\n[rendr]\n', "is no table of a job.*render"),
-        ('homes = ["a"]\nrender = 3\n', "is no table of a job"),
-        ("homes = " + "[" * 3000, "is no TOML"),
+        ('homes = ["a"]\n[rendr]\n', "is not a table of a job.*render"),
+        ('homes = ["a"]\nrender = 3\n', "is not a table of a job"),
+        ("homes = " + "[" * 3000, "is not valid TOML"),
     ],
 )
 def test_a_file_that_is_no_job_is_one_line(tmp_path: Path, text: str, message: str) -> None:

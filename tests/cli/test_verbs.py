@@ -77,7 +77,7 @@ def test_a_machine_without_opengl_alone_can_render_by_path_tracing(monkeypatch, 
     monkeypatch.setattr(doctor, "examine", lambda *_: findings)
     assert main(["doctor"]) == 0
     text = capsys.readouterr().out
-    assert "can render by path tracing; OpenGL's pictures are left out" in text
+    assert "can render by path tracing; pictures of OpenGL are skipped" in text
     assert "gives the pictures opengl_dl and opengl_il" in text
     assert "cannot render" not in text
 
@@ -112,7 +112,7 @@ def test_homes_lists_the_nine_homes_and_how_to_fetch_them(tmp_path, monkeypatch,
     assert {"name": "Studio", "n_levels": 1, "n_rooms": 5} in rows
     text = printed(capsys, "homes")
     assert all(row["name"] in text for row in rows)
-    assert "not fetched yet: pbrs-farm homes --fetch" in text
+    assert "not downloaded yet: pbrs-farm homes --fetch" in text
     # Homes that need no fetching are homes, too.
     house = builtin_home()
     levels = len(house.levels)
@@ -335,7 +335,7 @@ def test_the_options_of_run_are_in_groups_before_its_examples(
         main(["run", "--help"])
     text = capsys.readouterr().out
     places = [
-        text.index(f"\n{t}:") for t in ("viewpoints", "dressing", "recipe", "light", "the run")
+        text.index(f"\n{t}:") for t in ("viewpoints", "dressing", "recipe", "light", "processes")
     ]
     assert places == sorted(places)
     assert "\nexamples:\n  pbrs-farm run Studio " in text

@@ -49,7 +49,7 @@ def test_a_turn_takes_the_shorter_arc() -> None:
         (Motion("a", "leaf", (0.0, 0.0), ((0.0,), (1.0,))), "ascend"),
         (Motion("a", "leaf", (0.0,), ((0.0,), (1.0,))), "1 times and 2 rows"),
         (Motion("a", "", (0.0,), ((0.0,),)), "other than 7"),
-        (Motion("a", "leaf", (0.0,), ((float("nan"),),)), "no number"),
+        (Motion("a", "leaf", (0.0,), ((float("nan"),),)), "not a finite number"),
         (Motion("a", "", (0.0,), ((0, 0, 0, 2, 0, 0, 0),)), "length 1"),
         (Motion("a", "", (), ()), "0 times"),
     ],

@@ -275,7 +275,7 @@ def test_category_maps_hold_the_users_classes(root, tmp_path, own, size):
 
 
 def test_a_form_without_classes_refuses_those_of_the_user(root, tmp_path, own):
-    with pytest.raises(BadInput, match="classes: released has no classes of your own"):
+    with pytest.raises(BadInput, match="classes: released has fixed classes"):
         export(root, tmp_path / "x", "released", choice=own)
 
 
@@ -285,7 +285,7 @@ def test_the_verb_reads_the_table(root, tmp_path, own, capsys):
     assert "rest" in (tmp_path / "y/data.yaml").read_text()
     (tmp_path / "bad.csv").write_text("from,id,name\nchiar,1,seat\n")
     assert main([*words, str(tmp_path / "bad.csv"), "--out", str(tmp_path / "z")]) == 1
-    assert "line 2: 'chiar' is no class of NYU40" in capsys.readouterr().err
+    assert "line 2: 'chiar' is not a class of NYU40" in capsys.readouterr().err
 
 
 def test_at_another_size_labels_boxes_and_k_agree(root, tmp_path):

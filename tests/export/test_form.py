@@ -58,7 +58,7 @@ def test_the_bench_of_sets_reads_every_form_of_views_back() -> None:
 def test_an_unknown_form_is_answered_with_those_there_are(root: Path, tmp_path: Path) -> None:
     with pytest.raises(BadInput, match=r"no such form.*coco.*yolo-seg"):
         export(root, tmp_path / "x", "voc")
-    with pytest.raises(BadInput, match="is a form of homes"):
+    with pytest.raises(BadInput, match="exports homes"):
         export(root, tmp_path / "x", "gltf")
     with pytest.raises(
         BadInput, match=r"no such form of a home.*gltf, habitat, mjcf, sdf, urdf, usd, usdz\)"

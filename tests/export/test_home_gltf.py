@@ -108,4 +108,4 @@ def test_a_folder_without_a_home_and_options_of_views_are_one_line(
     with pytest.raises(BadInput, match=r"holds no house\.glb"):
         export_homes(tmp_path, tmp_path / "out", "gltf")
     assert main(["export", str(tmp_path), "--to", "gltf", "--split"]) == 1
-    assert "--to gltf writes homes" in capsys.readouterr().err
+    assert "--to gltf exports homes" in capsys.readouterr().err

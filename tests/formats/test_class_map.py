@@ -63,19 +63,19 @@ def test_a_class_of_parts_of_the_building_alone_is_structure(tmp_path):
 @pytest.mark.parametrize(
     ("rows", "match"),
     [
-        (["chair,1,a", "chiar,2,b"], "line 3: 'chiar' is no class of NYU40.*did you mean chair"),
+        (["chair,1,a", "chiar,2,b"], "line 3: 'chiar' is not a class of NYU40.*did you mean chair"),
         (["night_stand,1,a"], "line 2: .*did you mean night stand"),
         (["chair,1"], "line 2: 2 cells, not 3"),
         ([",1,a"], "line 2: from is empty"),
-        (["chair,one,a"], "line 2: id 'one' is no whole number"),
-        (["chair,65536,a"], r"line 2: id '65536' is no whole number of 0\.\.65535"),
+        (["chair,one,a"], "line 2: id 'one' is not a whole number"),
+        (["chair,65536,a"], r"line 2: id '65536' is not a whole number of 0\.\.65535"),
         (["chair,-1,a"], "line 2: id '-1'"),
         (["chair,1,"], "line 2: class 1 has no name"),
         (["chair,1,a\x1bb"], "line 2: name .* cannot be printed"),
         (["", "# x", "chair,1,a", "Chair,1,a"], "line 5: 'chair' stands in line 4 already"),
         (["chair,1,a", "sofa,1,b"], "line 3: class 1 is 'b', but 'a' above"),
         (["chair,1,a", "sofa,2,a"], "line 3: 'a' is class 2, but 1 above"),
-        (['chair,1,"a'], "line 2: is no CSV"),
+        (['chair,1,"a'], "line 2: is not valid CSV"),
         ([], "names no class"),
         (["chair,0,"], "names no class"),
     ],
@@ -90,7 +90,7 @@ def test_what_is_wrong_with_a_table_is_told_with_its_line(tmp_path, rows, match)
     [
         ("", "is empty"),
         ("from,id\nchair,1\n", "line 1: has no column name"),
-        ("from,ids,name\n", "line 1: 'ids' is no column.*did you mean id"),
+        ("from,ids,name\n", "line 1: 'ids' is not a column.*did you mean id"),
         ("from,id,name,id\n", "line 1: has the column id twice"),
     ],
 )

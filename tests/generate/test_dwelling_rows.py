@@ -100,7 +100,7 @@ def test_the_home_of_an_apartment_reads_as_a_house(tmp_path: Path) -> None:
         (ROWS, "", r"has 2 apartments: a1, a2.*--apartment a1"),
         (ROWS, "b9", r"has no apartment 'b9'"),
         ([], "", "has no row of the type area"),
-        ([area("ROOM", "POLYGON ((0 0, 1")], "a1", "line 2: has a geometry that is no WKT polygon"),
+        ([area("ROOM", "POLYGON ((0 0, 1")], "a1", "line 2: its geometry is not a WKT polygon"),
         ([area("SHAFT", rect(0, 0, 1, 1))], "a1", "without rooms"),
     ],
 )

@@ -43,7 +43,7 @@ def _models() -> dict[str, bytes | None]:
     return {
         "missing": None,
         "empty": b"",
-        "text": b"this is no model\n" * 50,
+        "text": b"this is not a model\n" * 50,
         "cut": zip_of({"a.obj": BOX_OBJ})[:60],
         "collada": b"<?xml version='1.0'?><COLLADA><library_geometries/></COLLADA>",
         "studio": b"\x4d\x4d" + struct.pack("<I", 2**31) + b"\x02\0" * 40,

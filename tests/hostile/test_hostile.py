@@ -36,7 +36,7 @@ def test_every_family_has_cases_and_every_case_a_name_of_its_own() -> None:
 
 
 CASE = Case("some/case", "format", lambda _place: [], neighbours=0)
-FINE = Ended(1, "pbrs-farm: bad.sh3d: is no zip", 1.0, 1.0, 100.0, "")
+FINE = Ended(1, "pbrs-farm: bad.sh3d: is not a zip", 1.0, 1.0, 100.0, "")
 
 
 @pytest.mark.parametrize(

@@ -70,7 +70,7 @@ def test_a_part_of_a_file_is_a_house_of_its_own(tmp_path: Path) -> None:
     assert len(read_house(upper, ReadFields()).levels) == 1
     apartment = resolve(f"{write_swiss(tmp_path)}#apartment=a1")
     assert read_house(apartment, ReadFields()).id == apartment.house_id
-    with pytest.raises(BadHouse, match="no floor plan"):
+    with pytest.raises(BadHouse, match="only for floor plans"):
         resolve("builtin#floor=1")
     with pytest.raises(BadInput, match="no apartment"):
         read_house(resolve(f"{path.parent / 'geometries.csv'}#apartment=zz"), ReadFields())

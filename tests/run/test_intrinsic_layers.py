@@ -36,7 +36,7 @@ def test_a_residual_brings_albedo_and_shading_along():
 
 
 def test_what_is_made_of_light_is_refused_where_there_is_none(tmp_path, capsys):
-    with pytest.raises(BadInput, match="--layers: shading: is made of traced light"):
+    with pytest.raises(BadInput, match="--layers: shading: needs a path-traced mode"):
         wanted(["opengl_dl"], ["shading"])
     words = ["run", "builtin", "--recipe", "preview", "--out", str(tmp_path / "out")]
     assert main([*words, "--layers", "residual", "--set", "light.integrator=metropolis"]) != 0

@@ -174,8 +174,8 @@ def test_progress_counts_the_views_that_will_be_made(tmp_path: Path) -> None:
 
 
 def test_what_was_refused_before_the_run_is_one_of_its_failures(tmp_path: Path) -> None:
-    summary = run(tmp_path, refused=[("bad.sh3f", "bad.sh3f: is no furniture library")])
-    assert summary.failures == [("bad.sh3f", "bad.sh3f: is no furniture library", "")]
+    summary = run(tmp_path, refused=[("bad.sh3f", "bad.sh3f: is not a furniture library")])
+    assert summary.failures == [("bad.sh3f", "bad.sh3f: is not a furniture library", "")]
     assert summary.n_views == 2
 
 

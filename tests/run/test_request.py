@@ -25,7 +25,7 @@ from types import ModuleType
 
 text = Path(sys.argv[1]).read_text()
 new = """    pairs: bool = option("""
-added = """    n_dogs: int = option(0, "dogs a house", name="dogs", group="what is made", least=1)
+added = """    n_dogs: int = option(0, "dogs a house", name="dogs", group="output", least=1)
 """
 assert new in text
 module = ModuleType("pbrs_farm.run.request")
@@ -86,7 +86,7 @@ def test_what_is_not_given_is_the_field_s_default() -> None:
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["--views", "0"], "--views: 0: expected 1 or more (leave it out for all views)"),
+        (["--views", "0"], "--views: 0: expected 1 or more (omit it for all views)"),
         (["--jobs", "0"], "--jobs: 0: expected 1 or more"),
         (["--memory", "nan"], "--memory: nan: expected 0 or more"),
         (["--silence", "-1"], "--silence: -1.0: expected 0 or more"),

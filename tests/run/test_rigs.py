@@ -247,7 +247,7 @@ def test_a_recipe_with_a_rig_is_written_and_read_as_the_same(tmp_path: Path) -> 
         ("[[cameras]]\nname = 'a'\nrotation_wxyz = [1, 0, 0, 0]\nyaw_deg = 3", "cameras[0]"),
         ("[[cameras]]\nname = 'a'\n[[cameras]]\nname = 'a'", "two cameras are called a"),
         ("[[cameras]]\nname = 'a'\nlens = {model = 'bent'}", "cameras[0].lens.model"),
-        ("[[cameras]", "is no TOML"),
+        ("[[cameras]", "is not valid TOML"),
     ],
 )
 def test_a_file_that_is_no_rig_is_an_error_of_one_line_with_its_place(

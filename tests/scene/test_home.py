@@ -132,7 +132,7 @@ def test_lamps_are_set_and_added(home: pf.Home) -> None:
     assert added.room_id == "0_0"
     assert added.lights[0].direction == (0, -1, 0)
     assert spot.house.materials[added.surfaces[0].material].kind is MaterialKind.BULB
-    with pytest.raises(BadInput, match="is no lamp"):
+    with pytest.raises(BadInput, match="is not a lamp"):
         home.light("sofa", lm=10)
 
 
@@ -155,7 +155,7 @@ def test_a_model_stands_where_it_is_put(home: pf.Home, tmp_path: Path) -> None:
     assert exact.bounds.mean(0) == pytest.approx([2, 1, 3], abs=1e-6)
     with pytest.raises(BadInput, match="there is an item of that id"):
         on_table.place(model, at=(1, 0, 1), name="can 1")
-    with pytest.raises(BadInput, match="no rigid"):
+    with pytest.raises(BadInput, match="not a rigid"):
         home.place(model, pose=np.eye(4) * 2)
     with pytest.raises(BadInput, match="no free place"):
         home.place(model, on="picture")

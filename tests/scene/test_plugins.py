@@ -91,7 +91,7 @@ def test_a_reader_of_a_plugin_reads_its_files(installed: dict[str, str], tmp_pat
     (tmp_path / "bad.room").write_text('{"width": 4}')
     bad = run(installed, tmp_path, "run", "bad.room", "--out", "p", *FEW)
     assert bad.returncode == 1
-    assert "bad.room: is no room: 'depth'" in bad.stdout + bad.stderr
+    assert "bad.room: is not a room: 'depth'" in bad.stdout + bad.stderr
 
 
 @pytest.mark.slow

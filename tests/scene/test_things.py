@@ -61,7 +61,7 @@ def test_a_thing_stands_in_a_home() -> None:
         ({"name": "bed", "width_m": 9}, r"bed, width_m: 9 does not fit, expected a number in 0\."),
         ({"name": "bed", "slats": 2}, "bed, slats: 2 does not fit, expected True or False"),
         ({"name": "bed", "sleepers": 1.5}, "bed, sleepers: 1.5 does not fit, expected a whole"),
-        ({"name": "bed", "head": "slat"}, "bed, head: 'slat' is no choice .did you mean slats"),
+        ({"name": "bed", "head": "slat"}, "bed, head: 'slat' is not a choice .did you mean slats"),
         ({"name": "bed", "frame": "#12"}, "bed, frame: '#12' does not fit, expected \"#rrggbb\""),
         ({"name": "cup", "width_m": 1}, "cup: has no parameter 'width_m'"),
         ({"name": "toilet", "lid": 1}, "toilet: has no parameter 'lid'"),

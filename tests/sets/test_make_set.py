@@ -153,7 +153,7 @@ def test_another_folder_is_refused_in_one_line(
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "thesis.tex").write_text("")
     assert main(["make", str(file), "--out", str(tmp_path / "mine")]) == 1
-    assert "thesis.tex: is no part of this set" in capsys.readouterr().err
+    assert "thesis.tex: is not a part of this set" in capsys.readouterr().err
     assert main(["make", str(file), "--out", str(made), "--shard", "3/2"]) == 1
     assert "--shard: 3/2: expected one of so many shards (e.g. 3/16)" in capsys.readouterr().err
 

@@ -318,13 +318,20 @@ def test_a_forged_message_ends_no_worker(farm: SmallFarm) -> None:
             "body_encoding": "base64", "delivery_mode": 2,
         },
     }  # fmt: skip
-    forged = ("no JSON", "[1]", "{}", '{"properties": 3}', "[" * 100_000, json.dumps(envelope))
+    forged = (
+        "not valid JSON",
+        "[1]",
+        "{}",
+        '{"properties": 3}',
+        "[" * 100_000,
+        json.dumps(envelope),
+    )
     for text in forged:
         farm.redis.client.lpush("pbrs:gl", text)
     farm.wait_done()
     farm.check_complete(n_repeats=0)
     logs = "".join(p.read_text() for p in farm.folder.glob("w*.log"))
-    assert logs.count("dropped what is no message") == len(forged) - 1
+    assert logs.count("dropped an invalid message") == len(forged) - 1
     assert "celery.backend_cleanup" in logs  # an unregistered task, told and thrown away
     assert all(farm.processes[name].poll() is None for name in ("w1", "w2"))
 

@@ -240,7 +240,7 @@ def test_failures_are_counted_as_tasks_and_attempts_apart(farm: Farm) -> None:
 @pytest.mark.parametrize(
     ("message", "headline"),
     [
-        ("broken.sh3d: Home: is no home of Sweet Home 3D 7", "broken.sh3d: Home: is no home of Sweet Home 3D #"),
+        ("broken.sh3d: Home: is not a home of Sweet Home 3D 7", "broken.sh3d: Home: is not a home of Sweet Home 3D #"),
         ("2BedroomApartment: wall w3 is 0.03 m thick", "2BedroomApartment: wall w# is # m thick"),
         ("needs 1200MB, has 512 MB", "needs #MB, has # MB"),
         ("room 4 of house 0123456789abcdef", "room # of house #"),

@@ -44,7 +44,7 @@ class Rights:
             )
         user = self._users.named_by(self._token.reveal())
         if user is None:
-            raise BadInput("PBRS_TOKEN", "", "is no user's token")
+            raise BadInput("PBRS_TOKEN", "", "is not a user's token")
         return user
 
     def check_owner(self, job: str, owner: str) -> None:

@@ -143,7 +143,7 @@ def new_user(name: str, **limits: Any) -> tuple[User, str]:
     """
     if not _NAME.fullmatch(name):
         hint = "a letter or digit, then letters, digits, _ . -; 40 at most, no capitals"
-        raise BadInput("users", repr(name[:60]), "is no name of a user", hint=hint)
+        raise BadInput("users", repr(name[:60]), "is not a user name", hint=hint)
     token = secrets.token_urlsafe(24)
     return User(name, token_digest(token), **limits), token
 

@@ -51,7 +51,7 @@ class Channel(kombu_redis.Channel):  # type: ignore[misc]
         try:
             return super()._brpop_read(**options)
         except (JSONDecodeError, UnicodeDecodeError, RecursionError) as error:
-            _log.error("dropped what is no message: %s", error)
+            _log.error("dropped an invalid message: %s", error)
             return True
 
 
@@ -69,7 +69,7 @@ class Transport(kombu_redis.Transport):  # type: ignore[misc]
         if _has(message, _ENVELOPE) and _has(message["properties"], _PROPERTIES):
             super()._deliver(message, queue)
         else:
-            _log.error("dropped what is no message from the queue %s", queue)
+            _log.error("dropped an invalid message from the queue %s", queue)
 
 
 def _has(value: Any, fields: Mapping[str, type]) -> bool:

@@ -35,7 +35,7 @@ def read_room(given: GivenFile, _fields: ReadFields) -> House:
         size = json.loads(path.read_text())
         w, d, h = (float(size[name]) for name in ("width", "depth", "height"))
     except (ValueError, KeyError, TypeError) as error:
-        raise BadHouse(path, "", f"is no room: {error}") from None
+        raise BadHouse(path, "", f"is not a room: {error}") from None
     t = 0.1
     walls = [
         ((-t, 0, -t), (w + t, h, 0)), ((-t, 0, d), (w + t, h, d + t)),

@@ -42,7 +42,7 @@ def write_tapvid(views: list[ChosenView], out: Path, _choice: Choice) -> None:
         hint = "pbrs-farm run HOME --cameras walk --tracks"
         raise BadInput("--to", "tapvid", "no view is a frame of a sequence", hint=hint)
     (out / _FILE).write_bytes(pickle.dumps(videos, _PROTOCOL))
-    name_left_out(out, stills, "is no frame of a film, or another camera's of a rig")
+    name_left_out(out, stills, "is not a film frame of the rig's first camera")
 
 
 def _video(frames: list[ChosenView]) -> dict[str, Any]:
@@ -57,7 +57,7 @@ def _video(frames: list[ChosenView]) -> dict[str, Any]:
     number = {name: k for k, name in enumerate(tracks["frames"].tolist())}
     unknown = [frame.id for frame in frames if frame.id not in number]
     if unknown:
-        raise BadInput(path, unknown[0], "is no frame of these tracks")
+        raise BadInput(path, unknown[0], "is not a frame of these tracks")
     columns = [number[frame.id] for frame in frames]
     pictures = [
         array_from_png(frame.data(required_picture(frame, "tapvid")), f"{house.id}/{frame.id}")

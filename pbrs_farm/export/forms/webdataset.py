@@ -14,7 +14,7 @@ from pbrs_farm.views.shard_tar import write_samples
 class WebDatasetOptions(Record):
     """The options of the form."""
 
-    shard_size: int = option(500, "views a tar (default 500)", metavar="N", least=1)
+    shard_size: int = option(500, "views per tar (default 500)", metavar="N", least=1)
 
 
 def write_webdataset(views: list[ChosenView], out: Path, choice: Choice) -> None:

@@ -88,7 +88,7 @@ def families() -> Mapping[str, Family]:
     for plugin in plugins("furniture").values():
         module = plugin.load()
         if not isinstance(module, ModuleType) or not described_in((module,), Family):
-            raise BadInput(plugin.mark, plugin.entry.value, "is no module with a family in it")
+            raise BadInput(plugin.mark, plugin.entry.value, "is not a module with a family in it")
         modules.append(module)
     return described_in((*_MODULES, *modules), Family)
 

@@ -92,7 +92,7 @@ def _checked(value: Any, hint: Any, drawn: Any, place: str) -> Any:
         if isinstance(limits, Choice):
             if value not in limits.words:
                 hint = hint_of_choice(str(value), limits.words)
-                raise BadInput("thing", place, f"{value!r} is no choice", hint=hint)
+                raise BadInput("thing", place, f"{value!r} is not a choice", hint=hint)
             return value
         is_whole = kind is not int or (isinstance(value, int) and not isinstance(value, bool))
         return (

@@ -89,10 +89,10 @@ def _root(path: Path) -> Element:
         root: Element = fromstring(data)
     except (ParseError, DefusedXmlException, ValueError) as error:
         raise BadInput(
-            path, "", f"is no SVG: {str(error) or 'entities are not read'}"[:200]
+            path, "", f"is not valid SVG: {str(error) or 'entities are not read'}"[:200]
         ) from None
     if not str(root.tag).endswith("svg"):
-        raise BadInput(path, "", "is no SVG: its first element is no svg")
+        raise BadInput(path, "", "is not valid SVG: its first element is not svg")
     return root
 
 
@@ -162,12 +162,12 @@ def _polygon(path: Path, text: str, matrix: _Matrix) -> Polygon | None:
     if len(text) > 40 * _MOST_POINTS:
         raise BadInput(path, "points", f"a polygon has over {_MOST_POINTS} corners")
     if "nan" in text.lower() or "inf" in text.lower():
-        raise BadInput(path, "points", "a polygon has a corner that is no place")
+        raise BadInput(path, "points", "a polygon has an invalid corner")
     n = [float(x) for x in _NUMBER.findall(text)]
     a, b, c, d, e, f = matrix
     ring = [(a * x + c * y + e, b * x + d * y + f) for x, y in zip(n[::2], n[1::2], strict=False)]
     if any(not math.isfinite(v) or abs(v) > 1e7 for p in ring for v in p):
-        raise BadInput(path, "points", "a polygon has a corner that is no place")
+        raise BadInput(path, "points", "a polygon has an invalid corner")
     if len(ring) < 3:
         return None
     return largest_part(shapely.make_valid(Polygon(ring)))

@@ -136,7 +136,7 @@ def _read_rows(path: Path) -> Iterator[tuple[int, dict[str, str]]]:
     except OSError as error:
         raise BadInput(path, "", fault_of(error)) from None
     except (csv.Error, UnicodeDecodeError) as error:
-        raise BadInput(path, "", f"is no table of text: {error}") from None
+        raise BadInput(path, "", f"is not a text table: {error}") from None
 
 
 def _floors(path: Path) -> dict[str, dict[str, str]]:
@@ -179,15 +179,15 @@ def _parse_row(path: Path, line: int, row: dict[str, str], kind: str) -> _Row:
         except shapely.errors.ShapelyError:
             shape = None
     if shape is not None and not np.isfinite(shapely.get_coordinates(shape)).all():
-        raise BadInput(path, f"line {line}", "has a coordinate that is no place in metres")
+        raise BadInput(path, f"line {line}", "has a coordinate that is not in metres")
     if isinstance(shape, MultiPolygon):
         shape = max(shape.geoms, key=lambda part: part.area, default=None)
     if not isinstance(shape, Polygon) or shape.is_empty:
-        raise BadInput(path, f"line {line}", "has a geometry that is no WKT polygon")
+        raise BadInput(path, f"line {line}", "its geometry is not a WKT polygon")
     # North is up: the plan's second coordinate runs downwards.
     ring = shapely.get_coordinates(shape.exterior) * [1, -1]
     if not all(map(math.isfinite, (*shape.bounds,))) or abs(ring).max() > 1e9:
-        raise BadInput(path, f"line {line}", "has a coordinate that is no place in metres")
+        raise BadInput(path, f"line {line}", "has a coordinate that is not in metres")
     elevation, height = (_parse_number(row.get(key)) for key in ("elevation", "height"))
     return _Row(kind, row["entity_subtype"].upper(), Polygon(ring), elevation, height)
 

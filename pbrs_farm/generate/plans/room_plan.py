@@ -107,7 +107,7 @@ def _storey_of_scan(path: Path, scan: _Scan, left_out: LeftOut, *, is_top: bool)
         pose = _parse_pose(path, f"wall {k}", surface)
         edges = surface.completedEdges
         if surface.dimensions[0] > _SPURIOUS_M and edges is not None and len(edges) < 2:
-            left_out.add(f"a wall over {_SPURIOUS_M:g} m with fewer than two edges is no wall")
+            left_out.add(f"a wall over {_SPURIOUS_M:g} m with fewer than two edges is not a wall")
             continue
         if abs(pose[1, 1]) < _UPRIGHT:
             left_out.add("a wall that leans stands upright")

@@ -74,7 +74,7 @@ def _entity(path: Path, number: int, line: str) -> tuple[str, str, list[float]]:
     """(kind, class or wall, numbers) of a line."""
     match = _LINE.fullmatch(line)
     if match is None:
-        raise BadInput(path, f"line {number}", "is no wall, door, window or bbox of a layout")
+        raise BadInput(path, f"line {number}", "is not a wall, door, window or bbox of a layout")
     kind, fields = match[2], [f.strip() for f in match[3].split(",")]
     word = "" if kind == "Wall" else fields.pop(0).strip("'\"")
     try:
@@ -85,7 +85,7 @@ def _entity(path: Path, number: int, line: str) -> tuple[str, str, list[float]]:
     if not low <= len(numbers) <= high:
         raise BadInput(path, f"line {number}", f"has a {kind} of {len(numbers)} numbers, not {low}")
     if not all(math.isfinite(n) and abs(n) < 1e9 for n in numbers):
-        raise BadInput(path, f"line {number}", "has a number that is no length in metres")
+        raise BadInput(path, f"line {number}", "has a number that is not a length")
     return kind, word, numbers
 
 

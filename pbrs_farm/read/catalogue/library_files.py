@@ -215,5 +215,5 @@ def rgb_from_hex(text: str) -> tuple[float, float, float]:
     """
     digits = text.removeprefix("#")
     if not re.fullmatch(r"([0-9a-fA-F]{2})?[0-9a-fA-F]{6}", digits):
-        raise ValueError(f"{text[:20]!r} is no colour")
+        raise ValueError(f"{text[:20]!r} is not a colour")
     return int(digits[-6:-4], 16) / 255, int(digits[-4:-2], 16) / 255, int(digits[-2:], 16) / 255

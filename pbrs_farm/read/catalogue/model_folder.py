@@ -165,7 +165,7 @@ def _find_rule_and_size(
         notes.add(
             "wrong-size",
             place,
-            f"{_size_text(size)} is no {rule.group.replace('_', ' ')}: left out",
+            f"{_size_text(size)} is the wrong size for {rule.group.replace('_', ' ')}: left out",
         )
     return None, size
 

@@ -163,7 +163,7 @@ def _quarters(text: str) -> int:
         return _AXES[word]
     numbers = [float(v) for v in word.replace(",", " ").split()]
     if len(numbers) != 3 or abs(numbers[1]) > 0.5 * max(abs(numbers[0]), abs(numbers[2])):
-        raise ValueError(f"front {text!r} is no axis: +z, -z, +x or -x")
+        raise ValueError(f"front {text!r} is not an axis: +z, -z, +x or -x")
     x, _y, z = numbers
     return (_AXES["+z" if z > 0 else "-z"]) if abs(z) >= abs(x) else _AXES["+x" if x > 0 else "-x"]
 

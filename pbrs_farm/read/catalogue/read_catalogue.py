@@ -122,10 +122,10 @@ def _given(
         library = _read_furniture_library(path, notes, FURNITURE)
     else:
         hint = ".sh3f, .sh3t or a folder of OBJ and GLB, or of pictures, is read"
-        raise BadInput(path, "", "is no catalogue", hint=hint)
+        raise BadInput(path, "", "is not a catalogue", hint=hint)
     if not may_be_empty and (library is None or not (library.pieces or library.pictures)):
         why = next((n.text for n in [*notes.found][n_before:]), "")
-        raise BadInput(path, "", "holds nothing that can be used", hint=why)
+        raise BadInput(path, "", "no usable piece or picture", hint=why)
     return library
 
 

@@ -220,7 +220,7 @@ def _bounded_picture(data: bytes, name: str) -> tuple[Texture, float]:
     picture.thumbnail((_PHOTOGRAPH_EDGE_PX, _PHOTOGRAPH_EDGE_PX), Image.Resampling.LANCZOS)
     aspect = picture.width / picture.height
     if not 0.2 < aspect < 5:
-        raise ValueError(f"{picture.width} x {picture.height} pixels are no picture for a wall")
+        raise ValueError(f"{picture.width} x {picture.height} pixels cannot be a picture on a wall")
     file = io.BytesIO()
     picture.save(file, "JPEG", quality=90)
     return Texture(keys.sha256(file.getvalue())[:16], name, "image/jpeg", file.getvalue()), aspect

@@ -39,13 +39,13 @@ def number_array(n: int, then: Callable[[F64], F64] = np.asarray) -> PlainValida
 
 def _file_name(value: str) -> str:
     if not NAME.fullmatch(value):
-        raise ValueError(f"{value[:60]!r} is no name of a model or a texture")
+        raise ValueError(f"{value[:60]!r} is not a name of a model or a texture")
     return value
 
 
 def _parse_hex_colour(value: Any) -> Any:
     if not isinstance(value, str) or not _COLOUR.fullmatch(value):
-        raise ValueError(f"{str(value)[:40]!r} is no #rrggbb")
+        raise ValueError(f"{str(value)[:40]!r} is not #rrggbb")
     return tuple(int(value[k : k + 2], 16) / 255 for k in (1, 3, 5))
 
 

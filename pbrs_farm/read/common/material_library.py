@@ -83,7 +83,7 @@ def opened_picture(data: bytes, *, whole: bool = False) -> Image.Image:
     except (Image.DecompressionBombError, Image.DecompressionBombWarning):
         raise ValueError("the picture is too large") from None
     except UnidentifiedImageError:
-        raise ValueError("is no picture of a known kind") from None
+        raise ValueError("is not a picture of a known kind") from None
     except (OSError, SyntaxError, EOFError, IndexError, KeyError, TypeError):
         raise ValueError("the picture cannot be decoded: damaged or cut short") from None
 

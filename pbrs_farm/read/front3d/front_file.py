@@ -164,7 +164,7 @@ def numbers(value: Any, n: int, file: str, place: str) -> F64:
     try:
         vector = np.array(value if isinstance(value, list) else [None], np.float64)
     except (ValueError, TypeError, OverflowError):
-        raise BadHouse(file, place, "is no list of numbers") from None
+        raise BadHouse(file, place, "is not a list of numbers") from None
     if vector.ndim != 1 or (n and len(vector) != n):
         raise BadHouse(file, place, f"expected {n or 'a flat list of'} numbers")
     if not (np.isfinite(vector) & (np.abs(vector) < 1e12)).all():
@@ -183,7 +183,7 @@ def _meshes(
         flat = numbers(row.get("xyz"), 0, file, f"{place}.xyz")
         index = numbers(row.get("faces"), 0, file, f"{place}.faces")
         if len(flat) % 3 or len(index) % 3:
-            raise BadHouse(file, f"{place}.xyz", "is no list of corners: not three numbers each")
+            raise BadHouse(file, f"{place}.xyz", "is not a list of corners: not three numbers each")
         points, faces = flat.reshape(-1, 3), index.reshape(-1, 3).astype(np.int32)
         if len(faces) and not (faces.min() >= 0 and faces.max() < len(points)):
             raise BadHouse(

@@ -77,7 +77,7 @@ def gltf_document(data: bytes, file: str, fetch: Fetch) -> Gltf:
     """
     gltf = _parse_gltf(data, file)
     if not isinstance(gltf.document.get("asset"), dict):
-        raise BadHouse(file, "asset", "is missing; this is no glTF file")
+        raise BadHouse(file, "asset", "is missing; this is not a glTF file")
     _check_extensions(gltf)
     # Load what the accessors read from.
     buffers = gltf.document.get("buffers", [])
@@ -137,7 +137,7 @@ def uri_bytes(gltf: Gltf, uri: Any, place: str, fetch: Fetch) -> bytes:
     Raises MissingFile if the file does not exist, BadHouse for an invalid uri.
     """
     if not isinstance(uri, str):
-        raise BadHouse(gltf.file, place, "uri is no text")
+        raise BadHouse(gltf.file, place, "uri is not text")
     if uri.startswith("data:"):
         head, _, body = uri.partition(",")
         try:
@@ -212,7 +212,7 @@ def parent_from_node(gltf: Gltf, node: dict[str, Any], index: int) -> F64:
     # Turn the unit quaternion into a rotation, then scale and move (T * R * S).
     length = (x * x + y * y + z * z + w * w) ** 0.5
     if not 0.5 < length < 2:
-        raise BadHouse(gltf.file, f"{place}.rotation", "is no unit quaternion")
+        raise BadHouse(gltf.file, f"{place}.rotation", "is not a unit quaternion")
     x, y, z, w = x / length, y / length, z / length, w / length
     m = np.eye(4)
     m[:3, :3] = [
@@ -383,7 +383,7 @@ def _faces(
     if "indices" in primitive:
         raw = accessor_array(gltf, primitive["indices"])
         if raw.shape[1] != 1 or raw.dtype.kind != "u":
-            raise BadHouse(gltf.file, f"{place}.indices", "are no vertex numbers")
+            raise BadHouse(gltf.file, f"{place}.indices", "are not vertex numbers")
         order = raw[:, 0].astype(np.int64)
         if len(order) and order.max() >= n:
             raise BadHouse(gltf.file, place, "a face names a vertex that does not exist")
@@ -392,7 +392,7 @@ def _faces(
     mode = primitive.get("mode", _TRIANGLES)
     if mode == _TRIANGLES:
         if len(order) % 3:
-            raise BadHouse(gltf.file, place, f"{len(order)} corners are no triangles")
+            raise BadHouse(gltf.file, place, f"{len(order)} corners are not triangles")
         return order.reshape(-1, 3).astype(np.int32)
     # Number the triangles of a fan or a strip; a strip turns every second one over.
     k = np.arange(max(len(order) - 2, 0))

@@ -428,7 +428,7 @@ def _matrix_of_instance(row: dict[str, Any], place: str, file: str) -> F64:
     moved = numbers(where, row.get("translation", [0, 0, 0]), 3, f"{place}.translation")
     w, x, y, z = numbers(where, row.get("rotation", [1, 0, 0, 0]), 4, f"{place}.rotation")
     if not 0.5 < float(np.linalg.norm([w, x, y, z])) < 2:
-        raise BadHouse(file, f"{place}.rotation", "is no unit quaternion")
+        raise BadHouse(file, f"{place}.rotation", "is not a unit quaternion")
     (size,) = numbers(where, [row.get("uniform_scale", 1.0)], 1, f"{place}.uniform_scale")
     sizes = numbers(where, row.get("non_uniform_scale", [1, 1, 1]), 3, f"{place}.non_uniform_scale")
     matrix = np.eye(4)

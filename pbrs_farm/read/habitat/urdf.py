@@ -136,7 +136,7 @@ def _parsed(data: bytes, file: str) -> Element:
     try:
         root: Element = fromstring(data, forbid_dtd=True)
     except (ParseError, DefusedXmlException, ValueError, LookupError, RecursionError) as error:
-        raise BadHouse(file, "", f"is no XML that is read: {str(error)[:100]}") from None
+        raise BadHouse(file, "", f"is not valid XML: {str(error)[:100]}") from None
     if root.tag != "robot":
         raise BadHouse(file, "", f"begins with <{str(root.tag)[:40]}>, not <robot>")
     return root
@@ -146,7 +146,7 @@ def _named(row: Element, tag: str, links: Mapping[str, Any], file: str) -> str:
     child = row.find(tag)
     name = "" if child is None else str(child.get("link"))
     if name not in links:
-        raise BadHouse(file, f"joint {str(row.get('name'))[:60]}", f"its {tag} is no link")
+        raise BadHouse(file, f"joint {str(row.get('name'))[:60]}", f"its {tag} is not a link")
     return name
 
 

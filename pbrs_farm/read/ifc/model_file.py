@@ -86,7 +86,7 @@ def _check_step_file(data: bytes, path: Path) -> None:
     if head[:1] in (b"{", b"["):
         raise BadHouse(path, "", "is JSON (IFC5), which is not read", hint=hint)
     if not head.startswith(b"ISO-10303-21"):
-        raise BadHouse(path, "", "is no IFC file: it does not begin with ISO-10303-21")
+        raise BadHouse(path, "", "is not an IFC file: it does not begin with ISO-10303-21")
     if len(data) > _MOST_BYTES:
         raise BadHouse(path, "", f"is larger than {_MOST_BYTES // 2**20} MB")
     plain = _STRING.sub(b"''", data)

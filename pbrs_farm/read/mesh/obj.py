@@ -181,7 +181,7 @@ def _word_at_fault(lines: list[bytes], what: str, kind: type[int] | type[float])
                 text = shown(word.decode("utf-8", "replace"), 40)
                 name = "an index" if kind is int else "a number"
                 return f"`{what}` line {number}", f"{text!r} is not {name}"
-    return f"a `{what}` line", "a word is no number"
+    return f"a `{what}` line", "expected a number"
 
 
 def _indices(part: _Part, pools: tuple[F64, ...], file: str) -> I64:

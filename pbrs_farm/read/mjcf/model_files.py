@@ -98,7 +98,7 @@ def _parsed(folder: RootFolder, name: str) -> Element:
     try:
         root: Element = fromstring(data, forbid_dtd=True)
     except (ParseError, DefusedXmlException, ValueError, LookupError, RecursionError) as error:
-        raise BadHouse(name, "", f"is no XML that is read: {str(error)[:100]}") from None
+        raise BadHouse(name, "", f"is not valid XML: {str(error)[:100]}") from None
     if not name.endswith(".urdf") and root.tag not in ("mujoco", "mujocoinclude"):
         raise BadHouse(name, "", f"begins with <{str(root.tag)[:40]}>, not <mujoco>")
     return root

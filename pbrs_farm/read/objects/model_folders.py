@@ -130,7 +130,7 @@ def _library(path: Path) -> list[ObjectModel]:
     archive, _sha256 = opened_archive(path)
     data = archive.read(FURNITURE)
     if data is None:
-        raise BadInput(path, "", f"is no furniture library: no {FURNITURE} in it")
+        raise BadInput(path, "", f"is not a furniture library: no {FURNITURE} in it")
     if len(data) > _MAX_CATALOGUE_BYTES:
         raise BadInput(path, FURNITURE, "the catalogue is too large")
     rows, names = numbered_entries(parse_properties(data)), set(archive.names())

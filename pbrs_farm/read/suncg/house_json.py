@@ -39,7 +39,7 @@ def _flag(value: Any) -> bool:
 def _parse_state(value: Any) -> int:
     text = str(int(value) if isinstance(value, bool) else "0" if value is None else value)
     if not re.fullmatch(r"\d{1,3}", text):
-        raise ValueError(f"{text[:40]!r} is no state")
+        raise ValueError(f"{text[:40]!r} is not a state")
     return int(text)
 
 

@@ -152,7 +152,7 @@ def _record(folder: RootFolder, house_id: str, file: str, notes: Notes) -> House
     """house.json below the root, with notes on irregularities."""
     # Check the id first: it becomes part of paths.
     if not _HOUSE_ID.fullmatch(house_id):
-        raise BadHouse(folder.root, "house", f"{house_id[:80]!r} is no house id")
+        raise BadHouse(folder.root, "house", f"{house_id[:80]!r} is not a house id")
     data = folder.read(file, max_bytes=MAX_HOUSE_BYTES)
     if data is None:
         hint = "pass ROOT/house/<id> of a SUNCG root"

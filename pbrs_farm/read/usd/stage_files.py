@@ -132,7 +132,7 @@ def _name_below_root(folder: StageFolder, layer: str, asset: str) -> str | None:
         return None
     if not real.is_file():
         if is_layer:
-            raise BadHouse(folder.path, layer, f"{asset[:80]!r} is no regular file")
+            raise BadHouse(folder.path, layer, f"{asset[:80]!r} is not a regular file")
         return None
     if is_layer and real.stat().st_size > MAX_SCENE_BYTES:
         text = f"{asset[:80]!r} is larger than {MAX_SCENE_BYTES / 1e6:.0f} MB"
@@ -226,7 +226,7 @@ def damaged(path: Path, error: Exception) -> BadHouse:
         match = _SAID.search(str(error))
     except UnicodeDecodeError:
         match = None
-    text = " ".join((match[1] if match else "is no USD file").split())
+    text = " ".join((match[1] if match else "is not a USD file").split())
     for path_text in {str(path), str(path.parent) + "/"}:
         text = text.replace(path_text, "")
     return BadHouse(path, "", f"damaged: {text.strip(': ')}")

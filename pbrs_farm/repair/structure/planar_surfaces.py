@@ -107,7 +107,7 @@ def floors_and_ceilings_from_house(house: House, table: TagTable) -> FloorsAndCe
             if planar:
                 surfaces.planar.extend(planar)
             elif item.surfaces:
-                surfaces.left[index] = "it is no closed solid and has no face that lies flat"
+                surfaces.left[index] = "it is not a closed solid and has no horizontal face"
     return surfaces
 
 

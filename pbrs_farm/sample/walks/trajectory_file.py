@@ -111,7 +111,7 @@ def _pose_of_line(words: list[str], line: int, file: str) -> Pose:
     length = float(np.linalg.norm(quaternion))
     if abs(length - 1) > _UNIT:
         raise BadInput(
-            file, place, f"qx qy qz qw is no rotation: its length is {length:.4g}, not 1"
+            file, place, f"qx qy qz qw is not a unit quaternion: its length is {length:.4g}, not 1"
         )
     world_from_opencv = np.eye(4)
     world_from_opencv[:3, :3] = Rotation.from_quat(quaternion).as_matrix()

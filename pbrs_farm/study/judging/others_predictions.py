@@ -122,7 +122,7 @@ def _checked(array: NDArray[Any], path: Path, task: StudyTask) -> NDArray[Any]:
         form = "(H, W, 3)" if n_axes == 3 else "(H, W)"
         raise BadInput(path, "", f"expected {form}, got {array.shape}")
     if not np.isfinite(array).all():
-        raise BadInput(path, "", "holds what is no finite number")
+        raise BadInput(path, "", "has a value that is not a finite number")
     if task.name == "segmentation":
         return np.asarray(np.clip(array, 0, 255), np.uint8)
     values: NDArray[Any] = array.astype(np.float32)

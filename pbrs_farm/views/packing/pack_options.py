@@ -11,20 +11,20 @@ class PackOptions(Record):
 
     layers: tuple[str, ...] = option(
         (),
-        "colour normal depth class40 instance boundary (default all)",
+        "layers: colour normal depth class40 instance boundary (default all)",
         metavar="LAYER",
         many_words=True,
     )
     modes: tuple[str, ...] = option(
         (),
-        "opengl_dl opengl_il mlt_ol mlt_il_ol (default all there are)",
+        "lighting modes: opengl_dl opengl_il mlt_ol mlt_il_ol (default: all stored ones)",
         metavar="MODE",
         many_words=True,
     )
-    size: str | None = option(None, "resize to, e.g. 320x240 (default as rendered)", metavar="WxH")
-    shard_size: int = option(200, "views a shard (default 200)", metavar="N", least=1)
+    size: str | None = option(
+        None, "picture size, e.g. 320x240 (default as rendered)", metavar="WxH"
+    )
+    shard_size: int = option(200, "views per shard (default 200)", metavar="N", least=1)
     colour: str = option(
-        "png",
-        "png (default) keeps every bit; jpeg:95 is a quarter as large and loses a little",
-        metavar="FORM",
+        "png", "png (default) is lossless; jpeg:95 is lossy and a quarter as large", metavar="FORM"
     )

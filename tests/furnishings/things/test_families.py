@@ -149,7 +149,9 @@ def test_what_is_wrong_with_a_plugins_furniture_is_named(
 
 def test_a_plugin_that_names_no_families_is_refused(install: Callable[[str, str], None]) -> None:
     install("empty_package", "N = 1")
-    with pytest.raises(BadInput, match=r"empty_package 1\.0: empty_package: is no module with a"):
+    with pytest.raises(
+        BadInput, match=r"empty_package 1\.0: empty_package: is not a module with a"
+    ):
         with_families(EMPTY)
 
 

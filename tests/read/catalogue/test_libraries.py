@@ -113,14 +113,14 @@ def test_a_damaged_library_of_the_packages_becomes_a_note(tmp_path: Path, data: 
     assert not catalogue.pieces
     assert [n.kind for n in catalogue.notes] == ["damaged-library"]
     # Of the user's own nothing passes in silence.
-    with pytest.raises(BadInput, match="holds nothing that can be used"):
+    with pytest.raises(BadInput, match="no usable piece or picture"):
         catalogue_from([], given=[path])
 
 
 def test_a_library_of_one_s_own_without_a_known_class_is_refused(tmp_path: Path) -> None:
     path = library(tmp_path, [entry("Zzz")])
     assert [n.kind for n in catalogue_from([path]).notes] == ["no-classes"]
-    with pytest.raises(BadInput, match=r"nothing that can be used \(no piece"):
+    with pytest.raises(BadInput, match=r"no usable piece or picture \(no piece"):
         catalogue_from([], given=[path])
 
 
@@ -131,5 +131,5 @@ def test_a_catalogue_that_does_not_exist_is_one_clear_line(tmp_path: Path) -> No
 
 def test_a_file_of_another_kind_is_no_catalogue(tmp_path: Path) -> None:
     (tmp_path / "x.txt").write_text("hello")
-    with pytest.raises(BadInput, match="is no catalogue"):
+    with pytest.raises(BadInput, match="is not a catalogue"):
         catalogue_from([], given=[tmp_path / "x.txt"])

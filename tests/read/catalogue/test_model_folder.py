@@ -70,7 +70,7 @@ def test_an_empty_folder_is_no_catalogue(tmp_path: Path) -> None:
 
 def test_a_folder_of_which_nothing_can_be_used_says_why(tmp_path: Path) -> None:
     (tmp_path / "sofa.glb").write_bytes(b"junk")
-    with pytest.raises(BadInput, match="holds nothing that can be used") as caught:
+    with pytest.raises(BadInput, match="no usable piece or picture") as caught:
         catalogue_from([], given=[tmp_path])
     assert "sofa.glb" in str(caught.value)
 
@@ -165,7 +165,7 @@ def test_a_model_of_another_unit_is_scaled_and_one_of_no_size_is_refused(
 ) -> None:
     put(tmp_path / "armchair" / "a.glb", box_glb(*size))
     if found == "wrong-size":
-        with pytest.raises(BadInput, match="7 x 7 x 9 m is no armchair"):
+        with pytest.raises(BadInput, match="7 x 7 x 9 m is the wrong size for armchair"):
             catalogue_from([], given=[tmp_path])
         return
     catalogue = catalogue_from([], given=[tmp_path])
@@ -223,7 +223,7 @@ def test_the_verb_says_what_is_used_and_writes_what_is_refused(
     assert main(["catalogue", str(tmp_path / "own"), "--refused", str(refused)]) == 0
     assert capsys.readouterr().out == (
         "1 piece, 0 pictures\n       1 armchair\n"
-        "1 wrong-size: own#armchair/huge: 7 x 7 x 9 m is no armchair: left out\n"
+        "1 wrong-size: own#armchair/huge: 7 x 7 x 9 m is the wrong size for armchair: left out\n"
     )
     assert refused.read_text().splitlines()[1].startswith("wrong-size,own#armchair/huge,")
 
@@ -237,7 +237,7 @@ def test_the_verb_writes_what_is_refused_where_nothing_can_be_used(
     assert main(["catalogue", str(tmp_path / "own"), "--refused", str(refused)]) == 1
     said = capsys.readouterr()
     assert said.out.startswith("0 pieces, 0 pictures\n1 wrong-size: own#armchair/huge")
-    assert "holds nothing that can be used" in said.err
+    assert "no usable piece or picture" in said.err
     assert refused.read_text().splitlines()[1].startswith("wrong-size,own#armchair/huge,")
-    with pytest.raises(BadInput, match="holds nothing that can be used"):
+    with pytest.raises(BadInput, match="no usable piece or picture"):
         catalogue_from([], given=[tmp_path / "own"])

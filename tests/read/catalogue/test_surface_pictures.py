@@ -61,7 +61,7 @@ def test_a_large_library_gives_some_of_each_kind(tmp_path: Path) -> None:
 def test_a_damaged_texture_library_is_refused(tmp_path: Path, data: bytes) -> None:
     path = tmp_path / "bad.sh3t"
     path.write_bytes(data)
-    with pytest.raises(BadInput, match="nothing that can be used"):
+    with pytest.raises(BadInput, match="no usable piece or picture"):
         catalogue_from([], given=[path])
 
 

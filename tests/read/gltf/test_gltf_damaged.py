@@ -52,9 +52,9 @@ def test_a_damaged_scene_is_refused_naming_the_place(edit: Any, place: str) -> N
 @pytest.mark.parametrize(
     ("data", "name", "said"),
     [
-        (b"a list of things", "list.glb", "is no GLB file"),
+        (b"a list of things", "list.glb", "is not a GLB file"),
         (b"a list of things", "list.gltf", "no valid JSON"),
-        (b' {"nodes": []}', "text.glb", "this is no glTF file"),
+        (b' {"nodes": []}', "text.glb", "this is not a glTF file"),
     ],
 )
 def test_what_is_no_scene_is_called_so(data: bytes, name: str, said: str) -> None:

@@ -144,8 +144,8 @@ def test_a_change_of_the_urdf_or_its_models_is_seen(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "text"),
     [
-        ("<robot", "<sdf", "no XML"),
-        ('child link="door"', 'child link="dor"', "its child is no link"),
+        ("<robot", "<sdf", "not valid XML"),
+        ('child link="door"', 'child link="dor"', "its child is not a link"),
         ('child link="drawer"', 'child link="door"', "hangs on two links"),
         (
             'parent link="root"/><child link="body"',
@@ -172,5 +172,5 @@ def test_a_pose_of_words_is_refused(tmp_path: Path) -> None:
 
 def test_entities_are_refused() -> None:
     text = b'<!DOCTYPE r [<!ENTITY a "b">]><robot><link name="&a;"/></robot>'
-    with pytest.raises(BadHouse, match="no XML"):
+    with pytest.raises(BadHouse, match="not valid XML"):
         robot_from_urdf(text, "x.urdf")

@@ -209,7 +209,7 @@ def test_shapes_that_are_not_read_are_a_note(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "what"),
     [
-        ("<mujoco", "no XML"),
+        ("<mujoco", "not valid XML"),
         ("<mujoco><worldbody><geom type='ball'/></worldbody></mujoco>", "MuJoCo does not load it"),
         ("<mujoco><worldbody><body name='a'/></worldbody></mujoco>", "no floor"),
         ("<mujoco><include file='b.xml'/><worldbody/></mujoco>", "MuJoCo does not load it"),

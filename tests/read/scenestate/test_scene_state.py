@@ -154,7 +154,7 @@ FAULTS = {
     "a huge number": (_changed([*_WALL, "points", 0], [1e30, 0, 0]), r"elements\[2\]"),
     "no height": (_changed([*_WALL, "height"], None), r"elements\[2\].*height"),
     "up and front are one": (_changed(["front"], [0, 1, 0]), "up, front"),
-    "elements are no list": (_changed(["arch", "elements"], {}), "elements"),
+    "elements are not a list": (_changed(["arch", "elements"], {}), "elements"),
     "no floor": (_changed(["arch", "elements"], []), "has no floor"),
     "a flat matrix": (_changed(["object"], [{"modelId": "a.b", "transform": {"data": [0] * 16}}]), r"object\[0\]"),
     "three numbers a matrix": (_changed(["object"], [{"modelId": "a.b", "transform": {"data": [0] * 3}}]), "16 numbers"),

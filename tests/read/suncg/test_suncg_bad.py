@@ -231,7 +231,7 @@ def test_a_house_without_any_room_is_refused(root: Path) -> None:
 
 @pytest.mark.parametrize("house_id", ["", "..", "../x", "a/b", "x" * 65, "\0"])
 def test_ids_that_are_no_names_are_refused(root: Path, house_id: str) -> None:
-    with pytest.raises(BadHouse, match="no house id"):
+    with pytest.raises(BadHouse, match="not a house id"):
         read_suncg(root, house_id, ReadFields())
 
 

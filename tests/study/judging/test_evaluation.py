@@ -499,7 +499,7 @@ def test_a_folder_without_predictions_of_these_views_is_an_error(
 ) -> None:
     words = ["evaluate", str(run), "--on", f"photos={pairs}", "--predictions", str(pairs)]
     assert main([*words, "--out", str(pairs / "e")]) == 1
-    assert "no prediction of any view" in capsys.readouterr().err
+    assert "no prediction for any evaluated view" in capsys.readouterr().err
 
 
 def test_weights_of_the_package_are_judged_by_their_task(
@@ -513,10 +513,10 @@ def test_weights_of_the_package_are_judged_by_their_task(
     assert evaluation["figures"] == judged["figures"]
     assert judged["figures"]["network"]["n_pixels"] > 0
     assert main(words[:-3]) == 1
-    assert "--out must say where the page goes" in capsys.readouterr().err
+    assert "needs --out" in capsys.readouterr().err
     assert main(["evaluate", "--on", str(pairs)]) == 1
     assert main(["evaluate", str(out), "--task", "normals"]) == 1
-    assert capsys.readouterr().err.count("either a run or a task is named") == 2
+    assert capsys.readouterr().err.count("give either a RUN or --task") == 2
 
 
 def test_figures_of_no_pixel_are_null_in_json_and_a_dash_in_tables(

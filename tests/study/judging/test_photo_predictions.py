@@ -208,7 +208,7 @@ def test_predict_without_a_photograph_says_how(
     run: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["predict", str(run), "--out", "nowhere"]) == 1
-    assert "no photograph is named" in capsys.readouterr().err
+    assert "no photograph given" in capsys.readouterr().err
 
 
 def test_shipped_weights_are_small_whole_and_have_a_card() -> None:

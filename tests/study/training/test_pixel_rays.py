@@ -215,7 +215,7 @@ def test_a_network_without_rays_takes_no_field_of_view(
     picture.write_bytes(png_from_array(np.zeros((40, 40, 3), np.uint8)))
     words = ["predict", "--task", "boundaries", str(picture), "--out", str(tmp_path / "out")]
     assert main([*words, "--hfov", "60"]) == 1
-    assert "--hfov: 60: this network is told no rays" in capsys.readouterr().err
+    assert "--hfov: 60: this network does not use rays" in capsys.readouterr().err
 
 
 def test_another_lens_changes_what_a_run_says(run: Path) -> None:

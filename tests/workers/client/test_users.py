@@ -49,7 +49,7 @@ def test_a_user_steers_his_own_jobs_an_admin_all_and_each_order_leaves_a_line(
     assert team["nobody"].view(job).user == "ann"
     with pytest.raises(BadInput, match="is a job of ann"):
         team["bob"].pause(job)
-    for who, text in (("nobody", "a token says who asks"), ("stranger", "is no user's token")):
+    for who, text in (("nobody", "a token says who asks"), ("stranger", "is not a user's token")):
         with pytest.raises(BadInput, match=text):
             team[who].cancel(job)
         with pytest.raises(BadInput, match=text):
@@ -82,7 +82,7 @@ def test_users_outlive_a_redis_that_lost_them_and_one_admin_stays(team: dict[str
         with pytest.raises(BadInput, match="nobody would be an admin"):
             change()
     remove_user(root, "bob")
-    with pytest.raises(BadInput, match="is no user's token"):
+    with pytest.raises(BadInput, match="is not a user's token"):
         team["bob"].pause(job)
     assert [row["user"] for row in user_rows(root)] == ["ann", "root"]
 
@@ -96,7 +96,7 @@ def test_the_verb_prints_a_token_once_and_refuses_what_is_no_quota(
     assert main(["users"]) == 0
     assert "asks nobody" in capsys.readouterr().out
     assert main(["users", "add", "root"]) == 0
-    found = re.fullmatch(r"root's token, kept nowhere: (\S{32})\n", capsys.readouterr().out)
+    found = re.fullmatch(r"root's token, not stored: (\S{32})\n", capsys.readouterr().out)
     assert found is not None
     monkeypatch.setenv("PBRS_TOKEN", found[1])
     assert main(["users", "add", "ann", "--share", "2", "--slot-hours", "9"]) == 0

@@ -131,7 +131,7 @@ class _Reader:
         try:
             pairs = raw.decode("utf-8", "surrogatepass")
         except UnicodeDecodeError:
-            raise self._fail("a text that is no UTF-8") from None
+            raise self._fail("text that is not UTF-8") from None
         return pairs.encode("utf-16", "surrogatepass").decode("utf-16", "replace")
 
     def _remember(self, value: Any) -> Any:
