@@ -183,6 +183,6 @@ def priority_from_text(text: str) -> int:
     0 goes first. A sign, a space or a second digit is an error, so that "10" is not read as 1.
     """
     if len(text) != 1 or not text.isascii() or not text.isdigit():
-        hint = f"a number from 0, which goes first, to {LEAST_URGENT}"
+        hint = f"a number from 0, the first, to {LEAST_URGENT}"
         raise BadInput(repr(text[:40]), "", "not a priority", hint=hint)
     return int(text)

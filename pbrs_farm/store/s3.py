@@ -189,7 +189,7 @@ class S3Store:
                 return StoreRefused(key, f"no bucket {self._bucket!r}")
             return ObjectMissing(key, f"no such object in {self.url}")
         if isinstance(error, kinds.UnauthenticatedError | kinds.PermissionDeniedError):
-            return StoreRefused(key, f"{self.url} refuses these credentials", hint=_short(text))
+            return StoreRefused(key, f"{self.url} rejects these credentials", hint=_short(text))
         if isinstance(error, kinds.GenericError | OSError):
             return StoreUnavailable(key, f"{self.url} does not answer", hint=_short(text))
         return StoreFailed(key, f"{self.url}: {_short(text)}")

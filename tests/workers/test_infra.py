@@ -61,7 +61,7 @@ def test_s3_refuses_wrong_credentials_and_a_missing_bucket_in_one_line() -> None
     settings = settings_from_environment().store
     bad = replace(settings.s3, secret_key=Secret("wrong"), retry_timeout_s=1.0)
     for url, chosen, text in (
-        ("s3://pbrs/x", replace(settings, s3=bad), "refuses these credentials"),
+        ("s3://pbrs/x", replace(settings, s3=bad), "rejects these credentials"),
         ("s3://no-such-bucket-here/x", settings, "no bucket"),
     ):
         with pytest.raises(StoreFailed, match=text) as caught:

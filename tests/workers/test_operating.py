@@ -49,7 +49,7 @@ def test_one_store_has_one_id_whatever_its_url(tmp_path: Path) -> None:
 def test_submit_is_refused_where_no_worker_has_the_store(farm: Farm) -> None:
     theirs = {"store_url": "file:///elsewhere", "store_id": "0123"}
     registry_of(farm, worker="w7", **theirs).heartbeat()
-    with pytest.raises(BadInput, match=r"no worker has this store, they have file:///elsewhere"):
+    with pytest.raises(BadInput, match=r"no worker uses this store; they use file:///elsewhere"):
         submit(farm)
     assert farm.jobs() == []
     # Nothing was written into the store that is none of theirs.
@@ -64,7 +64,7 @@ def test_what_plugins_workers_lack_is_told_at_submit(
 ) -> None:
     assert farm.check_plugins(["kitchen of lab 1.0"]) == []  # nobody is there to say anything
     registry_of(farm, worker="w7").heartbeat()
-    with pytest.raises(BadInput, match=r"no worker has them all: w7 lacks kitchen of lab 1\.0"):
+    with pytest.raises(BadInput, match=r"no worker has all plugins: w7 lacks kitchen of lab 1\.0"):
         farm.check_plugins(["kitchen of lab 1.0"])
     marks = ("kitchen of lab 1.0", "height of lab 1.0")
     monkeypatch.setattr("workers.ledger.worker_registry.installed_marks", lambda: marks)
@@ -83,7 +83,7 @@ def test_a_worker_of_another_store_refuses_the_task_and_says_so(farm: Farm) -> N
     ledger = RedisLedger(replace(farm.config, store_id="ffff"), farm.ledger.client)
     claim = ledger.claim(d.job.job_id, task, token="t", recipe=d.job.recipe.digest())
     assert (claim.verdict, claim.detail) == ("store", store_id(farm.store))
-    assert farm.explain(d.job.job_id, task)[0]["state"] == "waits before it is tried again"
+    assert farm.explain(d.job.job_id, task)[0]["state"] == "waits before the next attempt"
     assert farm.status(d.job.job_id)["failures"] == {}
 
 
@@ -92,7 +92,7 @@ def test_why_says_that_all_workers_have_another_store(farm: Farm) -> None:
     d.dispatch()
     registry_of(farm, store_id="ffff").heartbeat()
     (row,) = farm.explain(d.job.job_id, "h0")
-    assert row["because"] == "every worker that takes geometry has another store than the job"
+    assert row["because"] == "all workers for geometry use another store"
 
 
 # Draining
@@ -233,7 +233,7 @@ def test_failures_are_counted_as_tasks_and_attempts_apart(farm: Farm) -> None:
     assert status["failures"] == {"bug": 1}
     assert status["failed_attempts"] == {"bug": 3}
     text = status_text(status)
-    assert "tasks failed for good: 1 bug" in text
+    assert "permanently failed tasks: 1 bug" in text
     assert "attempts failed: 3 bug" in text
 
 
@@ -277,7 +277,7 @@ def test_why_says_that_the_holder_is_silent_and_when_its_lease_ends(farm: Farm) 
     rows = farm.explain(d.job.job_id, task)
     text = explanation_text(rows)
     assert "the worker has been silent for 100s" in text
-    assert "then the task is given to another" in text
+    assert "then another worker gets the task" in text
 
 
 @pytest.mark.parametrize(

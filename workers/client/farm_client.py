@@ -49,7 +49,7 @@ _LOADING_S = 900.0
 # A small job is cut finer, so that its last batch does not leave the other slots idle.
 _BATCHES_PER_SLOT = 4
 _SLOTS_UNKNOWN = 2
-_WAIT = "wait for it; after 15 minutes it counts as dead"
+_WAIT = "wait; after 15 minutes the submission counts as dead"
 _HOUSE_STATES = ("open", "done", "quarantined")
 
 
@@ -148,7 +148,7 @@ class Farm:
             urls = ", ".join(sorted(set(theirs.values()))[:3])
             hint = "--store URL, or PBRS_STORE; or start workers on this store"
             raise BadInput(
-                self.store.url, "", f"no worker has this store, they have {urls}", hint=hint
+                self.store.url, "", f"no worker uses this store; they use {urls}", hint=hint
             )
 
     def check_plugins(self, marks: Collection[str]) -> list[str]:
@@ -163,8 +163,8 @@ class Farm:
         }
         lines = [f"{name} lacks {', '.join(marks)}" for name, marks in lacking.items() if marks]
         if living and len(lines) == len(living):
-            hint = "install the same package and version where workers run"
-            raise BadInput("plugins", "", f"no worker has them all: {lines[0]}", hint=hint)
+            hint = "install the same package and version on the workers"
+            raise BadInput("plugins", "", f"no worker has all plugins: {lines[0]}", hint=hint)
         return lines
 
     def recover(self, job: str, progress: Callable[[str], None] = lambda _line: None) -> JobView:
@@ -335,7 +335,7 @@ class Farm:
         chosen = attempt if attempt is not None else max(logs, default=0)
         if chosen not in logs:
             self.check_task(job, task)
-            hint = "logs are kept of failed attempts and of tasks that run for a minute"
+            hint = "logs exist for failed attempts and for tasks that run longer than a minute"
             if logs:
                 hint = f"of attempts {', '.join(map(str, sorted(logs)))}"
             raise BadInput(text, "", "no log stored", hint=hint)

@@ -45,7 +45,7 @@ def keep_from_text(text: str) -> float:
     """
     match = _KEEP.fullmatch(text)
     if match is None:
-        raise BadInput("--keep", text, "no time", hint="30d, 12h or 2w")
+        raise BadInput("--keep", text, "not a time", hint="30d, 12h or 2w")
     return int(match[1]) * _UNITS[match[2]]
 
 

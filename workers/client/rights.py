@@ -39,9 +39,7 @@ class Rights:
             return self._acting
         if not self._token:
             hint = "an admin's `pbrs-farm users add NAME` prints a token"
-            raise BadInput(
-                "PBRS_TOKEN", "", "this farm has users: a token says who asks", hint=hint
-            )
+            raise BadInput("PBRS_TOKEN", "", "this farm needs a user's token", hint=hint)
         user = self._users.named_by(self._token.reveal())
         if user is None:
             raise BadInput("PBRS_TOKEN", "", "is not a user's token")
@@ -55,7 +53,9 @@ class Rights:
         """
         user = self.who()
         if user is not None and not user.is_admin and user.name != owner:
-            raise BadInput(job, "", f"is a job of {owner or 'no user'}", hint="an admin may")
+            raise BadInput(
+                job, "", f"is a job of {owner or 'no user'}", hint="ask its owner or an admin"
+            )
 
     def check_admin(self, what: str) -> None:
         """Raises BadInput where a user who is no admin asks.
@@ -74,7 +74,7 @@ class Rights:
         user = self.who()
         if user is not None and not (user.is_admin or user.may_preempt):
             hint = f"an admin's `pbrs-farm users limit {user.name} --may-preempt yes`"
-            raise BadInput("--preempt", user.name, "may submit no urgent job", hint=hint)
+            raise BadInput("--preempt", user.name, "may not submit urgent jobs", hint=hint)
 
     def note(self, what: str, of: str, answer: str) -> None:
         """Keep the line of a change: when, who, from where, what, and what came of it.

@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     pass
 
 _TEXTS = {letter: name.lower() for name, letter in STATES.items()} | {
-    STATES["LOADED"]: "loaded, its house not admitted yet",
-    STATES["FAILED"]: "failed for good",
+    STATES["LOADED"]: "waiting: its house is not admitted yet",
+    STATES["FAILED"]: "failed permanently",
 }
 # States that may have an obstacle.
 _WAITING = {_TEXTS[STATES[name]] for name in ("LOADED", "READY", "QUEUED")}
@@ -73,12 +73,12 @@ def _row_of_task(
         row["views"] = list(batches[int(unit)])
     # Ready, but only after a delay.
     if letter == STATES["READY"] and "not_before" in facts:
-        row["state"] = "waits before it is tried again"
+        row["state"] = "waits before the next attempt"
     if "claim" in facts:
         hold = hold_from_text(job, task, facts["claim"])
         row["worker"], row["for_s"] = hold.worker, round(ledger.now() - hold.since, 1)
         if hold.is_preempted:
-            row["state"] += ", makes room for an urgent job"
+            row["state"] += ", is interrupted for an urgent job"
     row |= {name: facts[name] for name in ("attempts", "tried") if name in facts}
     if "fault" in facts:
         row["fault"] = json.loads(facts["fault"])
@@ -104,7 +104,7 @@ def _facts_of_holder(
 def _obstacle(registry: Registry, view: JobView, task: str) -> str:
     """Why a task that could run does not: the job, storage or the workers; "" for its turn."""
     if view.state == "running" and view.blocked_queues:
-        return f"others go first: {view.blocked_why}"
+        return f"blocked: {view.blocked_why}"
     if view.state != "running":
         return f"the job is {view.state}: {view.fields.get('reason', '')}".rstrip(": ")
     if reason := registry.breaker():
@@ -117,12 +117,12 @@ def _obstacle(registry: Registry, view: JobView, task: str) -> str:
         if w.age_s <= ALIVE_S and queue in w.fields.get("queues", "").split(",")
     ]
     if not takers:
-        return f"no worker takes {queue}"
+        return f"no worker serves {queue}"
     store = view.fields.get("store_id", "")
     if store and all(w.fields.get("store_id", store) not in (store, "") for w in takers):
-        return f"every worker that takes {queue} has another store than the job"
+        return f"all workers for {queue} use another store"
     if all(w.fields.get("drain") == "1" for w in takers):
-        return f"every worker that takes {queue} is leaving"
+        return f"all workers for {queue} are stopping"
     return ""
 
 

@@ -10,9 +10,9 @@ from workers.ledger.task_ledger import WITH_FAILURES
 
 # Counts of a status by class of fault -> what they count.
 _COUNTS: Final = {
-    "failures": "tasks failed for good",
+    "failures": "permanently failed tasks",
     "failed_attempts": "attempts failed",
-    "handed_back": "handed back",
+    "handed_back": "interrupted",
 }
 
 
@@ -48,11 +48,11 @@ def status_text(status: Mapping[str, Any]) -> str:
             counts = ", ".join(f"{n} {k}" for k, n in sorted(status[name].items()))
             lines.append(f"{text}: {counts}")
     if status["state"] == WITH_FAILURES:
-        lines.append(f"`pbrs-farm failures {status['job']}` says what failed")
+        lines.append(f"`pbrs-farm failures {status['job']}` lists them")
     if status.get("held_back"):
-        lines.append(f"others go first: {status['held_back']}")
+        lines.append(f"blocked: {status['held_back']}")
     if status.get("waits_for"):
-        lines.append(f"begins when {', '.join(status['waits_for'])} is done")
+        lines.append(f"starts when {', '.join(status['waits_for'])} is done")
     lines += [f"refuses: {r['worker']}: {r['why']}" for r in status["refusing"]]
     if status["storage"] != "ok":
         lines.append(f"storage: {status['storage']}")
@@ -79,7 +79,7 @@ def explanation_text(rows: Sequence[Mapping[str, Any]]) -> str:
             silent = "left the farm" if age is None else f"has been silent for {duration_text(age)}"
             lines.append(f"    the worker {silent}")
         if "lease_s" in row:
-            then = ", then the task is given to another" if "silent_s" in row else ""
+            then = ", then another worker gets the task" if "silent_s" in row else ""
             lines.append(f"    its lease ends in {duration_text(row['lease_s'])}{then}")
         if "because" in row:
             lines.append(f"    {row['because']}")
@@ -96,7 +96,7 @@ def failures_text(kinds: Sequence[Mapping[str, Any]]) -> str:
     kinds: of `Farm.failures`. Five tasks of each are named, the command repeats one of them.
     """
     if not kinds:
-        return "nothing failed for good"
+        return "no permanent failures"
     parts = []
     for kind in kinds:
         more = f" and {kind['n'] - 5} more" if kind["n"] > 5 else ""
@@ -157,7 +157,7 @@ def jobs_text(rows: Sequence[Mapping[str, Any]]) -> str:
 def users_text(rows: Sequence[Mapping[str, Any]]) -> str:
     """A user a line: his share, his quotas, what he uses."""
     if not rows:
-        return "no users: the farm asks nobody who he is"
+        return "no users: the farm checks no tokens"
     lines = [f"{'user':<24}{'share':>7}{'running':>9}{'of':>7}{'slot-h':>9}{'of':>9}  may"]
     for row in rows:
         may = [name for name in ("admin", "preempt") if row[name]]
@@ -172,7 +172,7 @@ def changes_text(rows: Sequence[Mapping[str, str]]) -> str:
     """A change a line, the newest first."""
     names = ("utc", "user", "from", "what", "of", "answer")
     lines = ("  ".join(row[name] or "-" for name in names) for row in rows)
-    return "\n".join(lines) or "nothing was changed"
+    return "\n".join(lines) or "no changes"
 
 
 def duration_text(seconds: float | None) -> str:

@@ -39,7 +39,7 @@ def add_user(farm: Farm, name: str, limits: Mapping[str, Any]) -> str:
     farm.users.restore(farm.store)
     users = farm.users.all()
     if name in users:
-        raise BadInput("users", name, "is there already", hint="`users limit` changes what he may")
+        raise BadInput("users", name, "already exists", hint="see `users limit`")
     user, token = new_user(name, **{"is_admin": not users, **limits})
     _check_admin_left([*users.values(), user])
     farm.users.save({**users, name: user}, farm.store)
@@ -75,7 +75,7 @@ def remove_user(farm: Farm, name: str) -> None:
     del users[known_user(users, name).name]
     if users:
         _check_admin_left(users.values())
-    farm.rights.note("users remove", name, "his jobs go on")
+    farm.rights.note("users remove", name, "the user's jobs continue")
     farm.users.save(users, farm.store)
 
 
@@ -104,7 +104,7 @@ def user_rows(farm: Farm) -> list[dict[str, Any]]:
 
 def _check_admin_left(users: Iterable[User]) -> None:
     if not any(user.is_admin for user in users):
-        raise BadInput("users", "", "nobody would be an admin any more")
+        raise BadInput("users", "", "this is the last admin")
 
 
 def _said(limits: Mapping[str, Any]) -> str:

@@ -278,6 +278,6 @@ def celery_sender(app: Any) -> Send:
         except away as error:
             # Unsent tasks stay "q" in the ledger, and are resent when they are old.
             why = error.__cause__ if isinstance(error, BatchPublishError) else error
-            raise LedgerUnavailable(f"the broker took no message: {why}") from error
+            raise LedgerUnavailable(f"the broker accepts no messages: {why}") from error
 
     return send

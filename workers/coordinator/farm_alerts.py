@@ -57,7 +57,7 @@ class FarmAlerts:
             alerts |= self._of_job(view, now)
         for worker in workers:
             if worker.state == "dead" and worker.age_s < _LOST_S:
-                since = f"silent for {worker.age_s:.0f} s; its tasks go to others"
+                since = f"silent for {worker.age_s:.0f} s; other workers get its tasks"
                 alerts[f"lost worker {worker.name}"] = since
         self._trouble_at = None if not breaker else self._trouble_at or now
         if self._trouble_at is not None and now - self._trouble_at >= _STORE_S:
@@ -87,7 +87,7 @@ class FarmAlerts:
         if view.state != "running" or not waiting or done + failed != sum(history.ended[-1][1:]):
             history.moved_at = now
         elif now - history.moved_at >= _STUCK_S:
-            text = f"{waiting:.0f} tasks wait and none has ended for {(now - history.moved_at) / 60:.0f} minutes"
+            text = f"{waiting:.0f} tasks are waiting, and none has finished for {(now - history.moved_at) / 60:.0f} minutes"
             alerts[f"stuck job {view.job_id}"] = text
         history.ended.append((now, failed, done))
         return alerts

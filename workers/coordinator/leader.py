@@ -198,7 +198,7 @@ class Coordinator:
         chosen = choose_victims(views, self._ledger.holds, self._registry.workers())
         for job, holds in groupby(chosen, key=lambda hold: hold.job):
             n = self._ledger.preempt(job, self._token, list(holds))
-            _log.info("%d tasks of job %s make room for an urgent one", n, job)
+            _log.info("interrupting %d tasks of job %s for an urgent job", n, job)
 
     def _block_jobs(self, views: list[JobView]) -> list[JobView]:
         """The jobs with the queues where they are blocked now; writes what changed to the ledger."""
@@ -293,7 +293,7 @@ def _restore_users(config: FarmConfig, table: UserTable) -> None:
     """Take the store's users where Redis lost them."""
     try:
         if config.store_url and table.restore(store_from_url(config.store_url, config.store)):
-            _log.info("users are taken from the store")
+            _log.info("loading users from the store")
     except PbrsError as error:
         _log.warning("users are not known yet: %s", error)
 

@@ -89,7 +89,7 @@ class FarmCollector:
         )
         yield from self._progress(views)
         yield from self._users(views)
-        expired = CounterMetricFamily("pbrs_leases_expired", "leases that ran out", labels=["job"])
+        expired = CounterMetricFamily("pbrs_leases_expired", "expired leases", labels=["job"])
         for view in views:
             expired.add_metric([view.job_id], view.counts.get("expired", 0))
         yield expired
@@ -98,10 +98,10 @@ class FarmCollector:
         """Views an hour and time left, as `status` shows them."""
         slots = self._registry.slots()
         blocked = GaugeMetricFamily(
-            "pbrs_job_held_back", "1 while its user's slot-hours are spent", labels=["job"]
+            "pbrs_job_held_back", "1 while the user's slot-hours are used up", labels=["job"]
         )
-        rate = GaugeMetricFamily("pbrs_views_per_hour", "views finished an hour", labels=["job"])
-        eta = GaugeMetricFamily("pbrs_eta_seconds", "time a job will take yet", labels=["job"])
+        rate = GaugeMetricFamily("pbrs_views_per_hour", "views finished per hour", labels=["job"])
+        eta = GaugeMetricFamily("pbrs_eta_seconds", "remaining time of a job", labels=["job"])
         paused = GaugeMetricFamily("pbrs_job_paused", "1 while a job is paused", labels=["job"])
         for view in views:
             rate.add_metric([view.job_id], views_per_hour(view))
@@ -116,7 +116,7 @@ class FarmCollector:
     def _users(self, views: list[JobView]) -> Iterator[Metric]:
         """A row per user: current share of the farm."""
         users, spent = self._table.all(), self._table.spent_h()
-        running = GaugeMetricFamily("pbrs_user_tasks_running", "tasks that run", labels=["user"])
+        running = GaugeMetricFamily("pbrs_user_tasks_running", "running tasks", labels=["user"])
         hours = GaugeMetricFamily(
             "pbrs_user_slot_hours", f"used in {SPENT_DAYS} days", labels=["user"]
         )
@@ -128,7 +128,7 @@ class FarmCollector:
 
 def _queue_slots(workers: list[WorkerView]) -> Metric:
     """Tasks of a queue that live workers can run; 0 where nobody takes it."""
-    metric = GaugeMetricFamily("pbrs_queue_slots", "slots that take it", labels=["queue"])
+    metric = GaugeMetricFamily("pbrs_queue_slots", "slots that serve the queue", labels=["queue"])
     for queue in QUEUES:
         takers = (w for w in workers if queue in w.fields.get("queues", "").split(","))
         metric.add_metric(
@@ -139,11 +139,13 @@ def _queue_slots(workers: list[WorkerView]) -> Metric:
 
 def _workers(workers: list[WorkerView]) -> Iterator[Metric]:
     """A row per worker seen in the last hour."""
-    age = GaugeMetricFamily("pbrs_worker_silence_seconds", "since its heartbeat", labels=["worker"])
-    slots = GaugeMetricFamily(
-        "pbrs_worker_slots", "tasks it runs at once", labels=["worker", "state"]
+    age = GaugeMetricFamily(
+        "pbrs_worker_silence_seconds", "time since the last heartbeat", labels=["worker"]
     )
-    memory = GaugeMetricFamily("pbrs_worker_bytes", "memory its processes hold", labels=["worker"])
+    slots = GaugeMetricFamily(
+        "pbrs_worker_slots", "maximum simultaneous tasks", labels=["worker", "state"]
+    )
+    memory = GaugeMetricFamily("pbrs_worker_bytes", "memory of its processes", labels=["worker"])
     for worker in workers:
         age.add_metric([worker.name], worker.age_s)
         memory.add_metric([worker.name], 2**20 * float(worker.fields.get("memory_mb", 0)))
@@ -152,9 +154,7 @@ def _workers(workers: list[WorkerView]) -> Iterator[Metric]:
 
 
 def _tasks(views: list[JobView]) -> Metric:
-    metric = GaugeMetricFamily(
-        "pbrs_tasks", "tasks now in a state", labels=["job", "stage", "state"]
-    )
+    metric = GaugeMetricFamily("pbrs_tasks", "tasks by state", labels=["job", "stage", "state"])
     names = {STATES[name.upper()]: name for name in ("ready", "queued", "running", "failed")}
     for view in views:
         for stage in STAGES:
@@ -173,7 +173,7 @@ def _done(views: list[JobView]) -> Metric:
 
 
 def _faults(views: list[JobView]) -> Metric:
-    metric = CounterMetricFamily("pbrs_faults", "attempts that failed", labels=["job", "class"])
+    metric = CounterMetricFamily("pbrs_faults", "failed attempts", labels=["job", "class"])
     for view in views:
         # Export 0 for classes without a failure: Prometheus sees no rise of a missing series.
         for name in get_args(FaultClass):
@@ -182,7 +182,7 @@ def _faults(views: list[JobView]) -> Metric:
 
 
 def _houses_metric(views: list[JobView]) -> Metric:
-    metric = GaugeMetricFamily("pbrs_houses", "houses in a state", labels=["job", "state"])
+    metric = GaugeMetricFamily("pbrs_houses", "houses by state", labels=["job", "state"])
     for view in views:
         metric.add_metric([view.job_id, "waiting"], view.n_waiting_houses)
         for state in ("open", "done", "quarantined"):

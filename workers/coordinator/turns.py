@@ -129,7 +129,7 @@ def find_blocked_jobs(
         elif before and not view.is_urgent:
             pools = set().union(*(waiting[name] for name in before))
             names = ", ".join(sorted(name or "jobs without a user" for name in before))
-            why = f"it is the turn of {names}"
+            why = f"tasks of {names} go first"
             blocks[view.job_id] = Block(tuple(sorted(pools)), why, at_once=False)
     return blocks
 

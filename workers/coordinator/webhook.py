@@ -59,7 +59,7 @@ class Webhook:
             self._post(notice(view))
         except (OSError, ValueError) as error:
             self._tries[view.job_id, view.outcome] += 1
-            _log.warning("the webhook took nothing: %s", error)
+            _log.warning("the webhook accepts nothing: %s", error)
             if self._tries[view.job_id, view.outcome] < _MOST_TRIES:
                 return
         self._ledger.set_notified(view.job_id, view.outcome)
@@ -128,7 +128,7 @@ def watch_jobs(
             webhook.look(views)
             look_at(views)
         except LedgerUnavailable as error:
-            _log.warning("no notice: %s", error)
+            _log.warning("cannot send a notice: %s", error)
         finally:
             busy.release()
 

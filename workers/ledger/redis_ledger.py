@@ -565,15 +565,15 @@ class RedisLedger:
             yield
         # From the special to the general; the URL is shown without its password.
         except redis.AuthenticationError as error:
-            raise LedgerUnavailable(f"{self._where} refuses these credentials: {error}") from error
+            raise LedgerUnavailable(f"{self._where} rejects these credentials: {error}") from error
         except redis.exceptions.NoPermissionError as error:
             raise LedgerUnavailable(f"{self._where} denies: {error}") from error
         except RefusedForNow as error:
             is_full = error.prefix == "OOM"
-            hint = "raise maxmemory" if is_full else "it passes, or Redis' own log says why"
-            raise LedgerUnavailable(f"{self._where} refuses for now: {error}", hint=hint) from error
+            hint = "raise maxmemory" if is_full else "wait, or see the log of Redis"
+            raise LedgerUnavailable(f"{self._where} refused: {error}", hint=hint) from error
         except (redis.ConnectionError, redis.TimeoutError) as error:
-            hint = "is it running? PBRS_REDIS_URL names it"
+            hint = "is it running? see PBRS_REDIS_URL"
             raise LedgerUnavailable(f"no Redis at {self._where}: {error}", hint=hint) from error
 
 

@@ -50,7 +50,7 @@ class Heartbeat(bootsteps.StartStopStep):  # type: ignore[misc]
             # The supervisor started Celery, and Celery its slots and their renderers.
             memory_mb = tree_mb(os.getppid())
             if self._registry.heartbeat(is_leaving=is_leaving, memory_mb=memory_mb):
-                _log.info("drained: finishing what runs, then leaving")
+                _log.info("drained: stopping after the running tasks")
                 # Celery's warm shutdown: no more messages, what runs ends.
                 touch(self._config.leaving_file)
                 state.should_stop = os.EX_OK

@@ -245,15 +245,15 @@ class HouseRunner:
             # Not uploaded: this worker sees it at the path it was submitted by, or cannot do it.
             if is_left_in_place(source) and not source.given.path.exists():
                 raise MachineFailed(
-                    f"this worker does not see {source.location}",
-                    hint="such sources are not uploaded: mount them at the path they were submitted by",
+                    f"this worker cannot read {source.location}",
+                    hint="such sources are not uploaded: mount them at the same path on all workers",
                 )
             return source
         name = source.location.rpartition("/")[2]
         # Uploaded: write it under its own name, which readers go by.
         data = self._store.get(source.location)
         if keys.sha256(data) != source.sha256:
-            raise BadHouse(source.location, "", "not the file that was submitted")
+            raise BadHouse(source.location, "", "changed since it was submitted")
         path = folder / name
         path.write_bytes(data)
         return source.model_copy(update={"location": str(path)})

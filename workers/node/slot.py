@@ -173,7 +173,7 @@ class Slot:
             result = Result.model_validate(ended.body)
             if result.left_out and not self._is_lack_told:
                 self._is_lack_told = True
-                _log.warning("pictures of OpenGL are left out here: %s", result.left_out)
+                _log.warning("skipping pictures of OpenGL: %s", result.left_out)
             end = Finished(ended.seconds, result.batches, result.n_views or len(request.views))
             self._ended[str(first.task)] = end
             _log.info("%s of job %s: done in %.1f s", first.task, first.job, ended.seconds)
@@ -199,7 +199,7 @@ class Slot:
     def _hand_back(self, tasks: Sequence[_Claimed]) -> None:
         """Return claimed tasks that were not started, uncounted."""
         for item in tasks:
-            fault = Fault("preempted", "preempted: not begun", "not begun", self._config.worker)
+            fault = Fault("preempted", "preempted, not started", "not begun", self._config.worker)
             give = partial(
                 self._ledger.fail, item.job, str(item.task), item.claim.token, fault, delay_s=0.0
             )
@@ -303,7 +303,7 @@ class Slot:
             if claim.verdict == "version":
                 reason = f"job {job} has steps of another version; `pbrs-farm adopt {job}`"
             if claim.verdict == "store":
-                reason = f"job {job} lies in another store than {shown_url(self._config.store_url)}"
+                reason = f"job {job} is in another store than {shown_url(self._config.store_url)}"
             with contextlib.suppress(LedgerUnavailable):
                 self._registry.note_rejection(reason)
         if waits and claim.verdict in _WAIT_AFTER_REJECTION:

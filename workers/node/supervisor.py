@@ -97,7 +97,7 @@ def check_machine(config: FarmConfig) -> None:
         raise MachineFailed("no store", hint="PBRS_STORE=file:///folder or s3://bucket/prefix")
     free_mb = shutil.disk_usage(config.scratch).free / 2**20
     if free_mb < config.min_free_mb:
-        text = f"{config.scratch}: {free_mb:.0f} MB free, {config.min_free_mb} wanted"
+        text = f"{config.scratch}: {free_mb:.0f} MB free, {config.min_free_mb} needed"
         hint = "PBRS_FARM_SCRATCH names another folder"
         raise MachineFailed(text, hint=hint)
 
@@ -215,7 +215,7 @@ def wait_while_drained(config: FarmConfig, orders: Orders) -> bool:
             if not is_logged:
                 is_logged = True
                 _log.info(
-                    "drained: taking no work until `pbrs-farm drain --undo %s`", config.worker
+                    "drained: accepting no tasks until `pbrs-farm drain --undo %s`", config.worker
                 )
         time.sleep(_POLL_S)
     with contextlib.suppress(LedgerUnavailable):

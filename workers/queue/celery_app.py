@@ -35,7 +35,7 @@ def _encode(value: Any) -> str:
 
 def _decode(data: str | bytes) -> Any:
     if len(data) > MAX_MESSAGE:
-        raise ValueError(f"a message of {len(data)} bytes; {MAX_MESSAGE} are allowed")
+        raise ValueError(f"a message of {len(data)} bytes; the maximum is {MAX_MESSAGE}")
     return json.loads(data)
 
 

@@ -91,11 +91,11 @@ def test_why_says_what_keeps_a_task_from_running(farm: Farm) -> None:
         (row,) = farm.explain(job, "h0")
         return str(row.get("because", ""))
 
-    assert because() == "no worker takes geometry"
+    assert because() == "no worker serves geometry"
     farm.registry.heartbeat()
     assert because() == ""
     assert farm.registry.drain("w1")
-    assert because() == "every worker that takes geometry is leaving"
+    assert because() == "all workers for geometry are stopping"
     farm.registry.open_breaker("disk full")
     assert because() == "storage is unhealthy: disk full"
     farm.pause(job)

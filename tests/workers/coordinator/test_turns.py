@@ -138,7 +138,7 @@ def test_a_waiting_user_goes_before_only_where_that_mends_more_than_a_slot() -> 
 def test_jobs_of_who_holds_more_leave_what_comes_to_who_waits_and_only_there() -> None:
     ann, bob = of_user("a", "ann", gl_r=4, gl_q=5), of_user("b", "bob", gl_r=1, light_q=2)
     assert find_blocked_jobs([ann, bob], {}, {}) == {
-        "a": Block(("light",), "it is the turn of bob", at_once=False)
+        "a": Block(("light",), "tasks of bob go first", at_once=False)
     }
     # By shares, and never because of somebody who has nothing that waits.
     assert find_blocked_jobs([ann, bob], {"ann": User("ann", share=3.0)}, {}) == {}

@@ -203,7 +203,7 @@ def test_a_service_waits_for_redis_but_not_where_it_is_refused(
     stranger = replace(
         config, redis_url=Secret(f"redis://nobody:x@127.0.0.1:{redis_server.port}/0")
     )
-    with pytest.raises(LedgerUnavailable, match="refuses these credentials"):
+    with pytest.raises(LedgerUnavailable, match="rejects these credentials"):
         RedisLedger(stranger).wait_until_there(600.0)
 
 

@@ -28,9 +28,9 @@ def test_a_worker_may_not_claim_of_a_job_that_is_blocked_on_one_of_its_queues(
     (task,) = d.dispatch()
     for name, queues in (("w1", ("geometry", "light")), ("w2", ("geometry",))):
         Registry(with_config(ledger, worker=name, queues=queues)).heartbeat()
-    ledger.set_blocked(JOB_ID, ("light",), "it is the turn of bob")
+    ledger.set_blocked(JOB_ID, ("light",), "tasks of bob go first")
     claim = d.claim(task, "w1")
-    assert (claim.verdict, claim.detail) == ("blocked", "it is the turn of bob")
+    assert (claim.verdict, claim.detail) == ("blocked", "tasks of bob go first")
     # It is ready again after a second, without an attempt, and another worker takes it.
     assert d.dispatch() == []
     ledger.client.zadd(f"{ledger.config.prefix}{{{JOB_ID}}}:later", {task: 0})

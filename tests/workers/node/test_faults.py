@@ -61,7 +61,7 @@ def test_a_worker_that_does_not_see_a_suncg_folder_is_itself_at_fault(tmp_path: 
     )
     (house / "house.json").rename(tmp_path / "moved.json")
     house.rmdir()
-    with pytest.raises(MachineFailed, match=r"does not see .*0a1b") as caught:
+    with pytest.raises(MachineFailed, match=r"cannot read .*0a1b") as caught:
         HouseRunner(store, n_threads=1).run(request, lambda _step: None)
     assert class_of(caught.value) == "machine"
 
