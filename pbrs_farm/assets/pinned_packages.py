@@ -87,7 +87,7 @@ def download_pinned(pin: Pin, folder: Path) -> Path:
         raise MachineFailed(f"{url}: {error}", hint=_hint(pin)) from None
     if digest.hexdigest() != pin.sha256:
         path.unlink(missing_ok=True)
-        text = f"{url}: is not the file that was asked for (sha256 {digest.hexdigest()[:16]}...)"
+        text = f"{url}: has another checksum (sha256 {digest.hexdigest()[:16]}...)"
         raise MachineFailed(text, hint=_hint(pin))
     return path
 

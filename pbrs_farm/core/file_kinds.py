@@ -66,7 +66,7 @@ _KINDS: Final = (
     _kind(rb"\s*(<!DOCTYPE html|<html)", "an HTML page", ".html .htm .xhtml",
           "the address that it came from gives a page: fetch the file itself"),
     _kind(rb"version https://git-lfs\.github\.com/spec", "a pointer of Git LFS", "",
-          "`git lfs pull` fetches the file that it stands for"),
+          "`git lfs pull` fetches the file"),
 )
 # fmt: on
 

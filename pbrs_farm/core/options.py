@@ -168,5 +168,5 @@ def _word(value: Any, info: FieldInfo, shown: Option, file: str, place: str) -> 
     choices = choices_of(info, shown)
     if choices is not None and word not in choices:
         hint = hint_of_choice(str(word), [str(choice) for choice in choices])
-        raise BadInput(file, place, f"{word} is none of them", hint=hint)
+        raise BadInput(file, place, f"{word} is not a choice", hint=hint)
     return word

@@ -25,7 +25,7 @@ class Record(BaseModel):
 
 def _nyu40(name: object) -> object:
     if name not in NYU40_NAMES:
-        raise ValueError(f"class {name!r} is none of NYU40")
+        raise ValueError(f"class {name!r} is not in NYU40")
     return NYU40_NAMES.index(str(name))
 
 

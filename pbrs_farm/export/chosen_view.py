@@ -71,9 +71,7 @@ class Choice:
                 hint = f"of {', '.join(_MODES)}"
                 raise BadInput("--modes", mode, "no such lighting mode", hint=hint)
         if self.size is not None and _RADIANCE in (self.layers or ()):
-            raise BadInput(
-                "--size", "", "radiance.exr is not resized", hint="leave out one of them"
-            )
+            raise BadInput("--size", "", "radiance.exr is not resized", hint="omit one of them")
 
     def of(self, kind: type[_Options]) -> _Options:
         """The form's options, of the type that its FORM names."""
@@ -154,7 +152,7 @@ class ChosenView:
         """
         lacks = [name for name in _NEEDED if name not in self.entry.facts]
         if lacks:
-            raise BadInput(self.entry.folder / "view.json", lacks[0], "is not there")
+            raise BadInput(self.entry.folder / "view.json", lacks[0], "is missing")
         facts = self.entry.facts if self.choice.size is None else self._resized_facts()
         if self.choice.classes is None:
             return facts
@@ -233,7 +231,7 @@ def require_lens(view: ChosenView, form: str, *models: str) -> None:
     """
     model = view.facts.get("lens", {}).get("model", "pinhole")
     if model not in ("pinhole", *models):
-        text = f"lens.model {model}: this form knows {', '.join(('pinhole', *models))}"
+        text = f"lens.model {model}: this format supports {', '.join(('pinhole', *models))}"
         raise BadInput(f"--to {form}", view.id, text, hint="another --to")
 
 

@@ -53,7 +53,7 @@ def _home_form(name: str) -> HomeForm:
     if not isinstance(form, HomeForm):
         forms = (form_of(form_name) for form_name in form_names())
         hint = f"of {', '.join(form.name for form in forms if isinstance(form, HomeForm))}"
-        raise BadInput("--to", name, "no such form of a home", hint=hint)
+        raise BadInput("--to", name, "no such format of homes", hint=hint)
     return form
 
 
@@ -77,7 +77,7 @@ def house_folders(folder: Path) -> list[Path]:
     folders = [f for f in folders if (f / "house.glb").is_file() and (f / "house.json").is_file()]
     if not folders:
         hint = "an output folder of `run`, `dress` or `repair`"
-        raise BadInput(folder, "", "holds no house.glb and house.json", hint=hint)
+        raise BadInput(folder, "", "has no house.glb and house.json", hint=hint)
     return folders
 
 

@@ -157,7 +157,7 @@ def _by_split(views: list[ViewEntry], shares: SplitShares | None) -> dict[str, l
 def _selected(folder: Path, run: str) -> set[tuple[str, str]]:
     file = folder / keys.selection_key(run, "jsonl")
     if not file.is_file():
-        raise BadInput(file, "", "no such selection", hint="pbrs-farm select makes one")
+        raise BadInput(file, "", "no such selection", hint="run pbrs-farm select")
     try:
         # Each line has the view and `kept`.
         rows = [json.loads(line) for line in read_regular(file).splitlines()]
@@ -165,7 +165,7 @@ def _selected(folder: Path, run: str) -> set[tuple[str, str]]:
     except OSError as error:
         raise BadInput(file, "", fault_of(error)) from None
     except (ValueError, KeyError, TypeError):
-        raise BadInput(file, "", "not a selection", hint="pbrs-farm select makes one") from None
+        raise BadInput(file, "", "not a selection", hint="run pbrs-farm select") from None
 
 
 def remarks_of(out: Path) -> list[str]:

@@ -126,7 +126,7 @@ def form_of(name: str) -> Form:
     """
     names = form_names()
     if name not in names:
-        raise BadInput("--to", name, "no such form", hint=hint_of_choice(name, names))
+        raise BadInput("--to", name, "no such format", hint=hint_of_choice(name, names))
     form: Form = FORMS.entry(name)
     return form
 

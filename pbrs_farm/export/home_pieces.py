@@ -29,7 +29,7 @@ from pbrs_farm.geometry.surface_points import surface_points
 
 _Options = TypeVar("_Options", bound=Record)
 COLLISION: Final = "convex parts within 5 mm, no more than 32"
-COLLIDES: Final = f"things collide as {COLLISION}"
+COLLIDES: Final = f"items collide as {COLLISION}"
 _MOST_KG: Final = 150.0
 _LARGE_M: Final = 0.5  # maximum size of a loose piece that opens
 _RESTING_M: Final = 0.03  # maximum gap between an item and its support

@@ -77,6 +77,6 @@ def required_picture(view: ChosenView, form: str) -> str:
     form is the name that the message uses.
     """
     if view.picture is None:
-        hint = "run it with --modes, or export labels in another form"
+        hint = "run it with --modes, or export to a format without pictures"
         raise BadInput(f"{view.house.id}/{view.id}", "", f"{form} needs a picture", hint=hint)
     return view.picture

@@ -153,8 +153,8 @@ def _emptied(item: Item, instance: int) -> Item:
 def _move(house: House, edit: MoveItems, _fields: ReadFields) -> House:
     for motion in house.motions:
         if motion.item in edit.items and not motion.is_of_joint:
-            text = "moves as it was recorded"
-            raise BadInput(house.id, motion.item, text, hint="move it before it is recorded")
+            text = "has recorded motion"
+            raise BadInput(house.id, motion.item, text, hint="move it before recording")
     matrix = np.array(edit.world_from_world)
     return _changed(house, edit.items, lambda item: _at_home(house, moved_item(item, matrix)))
 
@@ -355,7 +355,7 @@ def _file(path: str, sha256: str) -> bytes:
     except OSError as error:
         raise BadInput(path, "", fault_of(error)) from None
     if keys.sha256(data) != sha256:
-        raise BadInput(path, "", "changed since the home was made", hint="make the home again")
+        raise BadInput(path, "", "changed since the home was loaded", hint="load the home again")
     return data
 
 

@@ -104,7 +104,7 @@ def _of_libraries(libraries: tuple[tuple[Path, int], ...], has_package: bool | N
     if package is not None:
         note = package.note and Note("package-version", furniture_package.PACKAGE, package.note)
         return replace(catalogue, notes=(note, *catalogue.notes)) if note else catalogue
-    text = "furniture package not fetched: `pbrs-farm homes --furniture` fetches it (120 MB)"
+    text = "furniture package not downloaded: `pbrs-farm homes --furniture` (120 MB)"
     return replace(
         catalogue, notes=(Note(NO_FURNITURE, furniture_package.PACKAGE, text), *catalogue.notes)
     )

@@ -67,7 +67,7 @@ def format_of_plugin(name: str) -> Format:
     reader = plugin("readers", name)
     entry = reader.load()
     if not isinstance(entry, Format):
-        raise MachineFailed(f"plugin {reader.mark} brings no Format", hint="docs/plugins.md")
+        raise MachineFailed(f"plugin {reader.mark} has no Format", hint="docs/plugins.md")
     return entry
 
 

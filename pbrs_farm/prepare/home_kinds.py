@@ -164,12 +164,12 @@ def _finish_plugin(source: SourceRef, recipe: Recipe, finish: Finish) -> Finishe
     that belong to the run, and for a source with a seed of dressing.
     """
     if source.dress_seed:
-        raise BadInput(source.location, "--dress", "a plugin dresses its homes itself")
+        raise BadInput(source.location, "--dress", "plugins dress their homes themselves")
     home = _plugin_home(source.location).make()
     groups = {path.partition(".")[0] for path, _value in home.settings}
     if foreign := groups - _GROUPS_OF_PLUGINS:
-        text = f"sets recipe fields of {', '.join(sorted(foreign))}, which belong to the run"
-        raise BadInput(source.location, "", text, hint="fields of read, dress and repair alone")
+        text = f"sets recipe fields of {', '.join(sorted(foreign))}, which are set by the run"
+        raise BadInput(source.location, "", text, hint="only fields of read, dress and repair")
     finished = finish(home.source, with_settings(recipe, dict(home.settings)))
     return finished._replace(house=replace(finished.house, id=source.house_id))
 

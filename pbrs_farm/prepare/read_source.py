@@ -40,7 +40,7 @@ def _house_of(source: SourceRef, fields: ReadFields) -> House:
         return kind.read(source, fields)
     entry = format_of_source(source)
     if entry is None:
-        raise BadHouse(source.location, "", f"is of a kind that is not read here: {source.kind}")
+        raise BadHouse(source.location, "", f"unsupported kind: {source.kind}")
     # The source alone names its house, whatever the reader calls it.
     with naming_kind(source.given.path):
         return replace(entry.read(source.given, fields), id=home_id(source))

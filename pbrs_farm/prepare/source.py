@@ -59,7 +59,7 @@ def variants(source: SourceRef, seeds: Sequence[int]) -> list[SourceRef]:
     if source.kind in HOME_KIND and not HOME_KIND[source.kind].is_home:
         return [source]
     if source.edits and any(seeds):
-        raise BadHouse(source.word, "", "has edits: a home is dressed before it is edited")
+        raise BadHouse(source.word, "", "has edits: dress a home before editing it")
     return [
         source.model_copy(
             update={"house_id": keys.dressed_id(source.house_id, seed), "dress_seed": seed}
@@ -108,7 +108,7 @@ def homes_left_below(folder: Path) -> str:
     else:
         names = " and ".join(path.name for path in below)
         words = " ".join(quote(str(path)) for path in below)
-    return f"homes lie one folder deeper, in {names}: `pbrs-farm run {words}` takes them"
+    return f"the homes are one folder deeper, in {names}: `pbrs-farm run {words}`"
 
 
 def _holds_homes(folder: Path) -> bool:
@@ -179,11 +179,11 @@ def _of_saved_home(path: Path, files: SourceFiles | None) -> SourceRef:
     """The source that saved_home wrote; BadHouse for a damaged file and for a home that has changed."""
     saved = checked(SavedHome, text_given(path, error=BadHouse).encode(), str(path), error=BadHouse)
     if saved.home.endswith(SAVED_SUFFIX):
-        raise BadHouse(path, "home", "names another file of a home with edits")
+        raise BadHouse(path, "home", "refers to another file of a home with edits")
     (dressed,) = variants(resolve(saved.home, files, models=saved.models), [saved.dress_seed])
     source = dressed.edited(*saved.edits) if saved.edits else dressed
     if source.house_id != saved.house_id:
-        text = f"{saved.home} is another home now than when this was saved"
+        text = f"{saved.home} has changed since this was saved"
         raise BadHouse(path, "house_id", text, hint="save it again")
     return source
 
@@ -202,7 +202,7 @@ def _format_at(path: Path) -> Format:
         raise BadHouse(path, "", "not recognised as a house", hint=hint)
     if suffix in _MODEL_SUFFIXES:
         hint = f"`pbrs-farm objects {path} --out DIR` renders single models"
-        raise BadHouse(str(path), "", "is a model or a library of models, no home", hint=hint)
+        raise BadHouse(str(path), "", "is a model or a library of models, not a home", hint=hint)
     if suffix in _UNREAD_SUFFIXES:
         hint = f"export it as .glb; supported: {summary()}"
         raise BadHouse(str(path), "", f"{path.suffix} files are not read", hint=hint)
@@ -238,9 +238,9 @@ def _source_of(kind: str, location: str, files: SourceFiles, models: str, part: 
     bare = SourceRef(kind=kind, location=location, house_id="", sha256="", models=models, part=part)
     entry, file = format_of_source(bare), bare.given
     if entry is None:
-        raise BadHouse(location, "", f"is of a kind that is not read here: {kind}")
+        raise BadHouse(location, "", f"unsupported kind: {kind}")
     if entry.main_file and file.path.parent.name != "house":
-        raise BadHouse(file.path, "", "does not lie in a folder named house", hint=_ROOT_HINT)
+        raise BadHouse(file.path, "", "is not in a folder named house", hint=_ROOT_HINT)
     sha = digest_of_file(file.path / entry.main_file if entry.main_file else file.path, files)
     # The id depends on the file alone, so companions never rename a house; a part is its own house.
     stem = f"{file.path.stem}-{part}" if part else file.path.stem
@@ -282,14 +282,14 @@ def check_unchanged(source: SourceRef) -> None:
     if now.sha256 == source.sha256 and now.companions == source.companions:
         return
     if source.kind in ("plugin", "reader") and now.house_id[:-8] == source.house_id[:-8]:
-        text = f"the plugin of {source.location} here is another one than was asked for"
+        text = f"{source.location} needs another version of its plugin"
         raise MachineFailed(text, hint="install the same version everywhere")
     is_of_package = source.kind in HOME_KIND and HOME_KIND[source.kind].is_of_package
     if is_of_package or (source.kind == "sweethome3d" and now.sha256 == source.sha256):
         # The file is the same or comes from the package: this machine's package differs.
         raise MachineFailed(
-            f"the package here holds another {source.location} or other models than was asked for",
-            hint="another version of the package; `pbrs-farm homes --fetch`",
+            f"{source.location} differs from that of the installed package",
+            hint="another version of the package is installed; `pbrs-farm homes --fetch`",
         )
     raise BadHouse(source.location, "", "changed since the run began", hint="run, or submit, again")
 
@@ -300,10 +300,10 @@ def _of_folder(folder: Path) -> tuple[str, str]:
     if n:
         return (
             f"is a folder of {n} home{'s' * (n > 1)}",
-            "name one of them here; `run` and `submit` take folders",
+            "name one home; only `run` and `submit` take folders",
         )
     if (folder / "house").is_dir():
-        hint = "SUNCG's root: name ROOT/house/ID, or ROOT and --houses LIST"
+        hint = "for SUNCG, name ROOT/house/ID, or ROOT and --houses LIST"
     elif below := homes_left_below(folder):
         hint = below
     elif list(folder.glob("*.json")):
@@ -312,4 +312,4 @@ def _of_folder(folder: Path) -> tuple[str, str]:
         hint = f"`pbrs-farm objects {folder} --out DIR` renders single models"
     else:
         hint = f"supported: {summary()}"
-    return "holds no house.json and no home file", hint
+    return "has no house.json and no home file", hint

@@ -78,8 +78,8 @@ def claim_root(store: Store, recipe: Recipe, *, update: bool) -> None:
     present = recipe_from_json(store.get(keys.RECIPE), f"{store.url}: recipe.json")
     differing = differences(present, recipe)
     if differing and not update:
-        hint = "--update renders again what differs, or choose another output"
-        raise BadRecipe(f"{store.url} holds another recipe: {'; '.join(differing)}", hint=hint)
+        hint = "--update repeats the changed steps; or choose another output"
+        raise BadRecipe(f"{store.url} has another recipe: {'; '.join(differing)}", hint=hint)
     if differing:
         # From now on a marker's name alone does not say that its step is done.
         store.put(keys.RECIPE_REPLACED, json.dumps({"last": differing}).encode())

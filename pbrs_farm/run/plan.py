@@ -75,14 +75,14 @@ def check_layers(want: Wanted, recipe: Recipe) -> None:
     from pbrs_farm.truth.optional_layers import check_lens
 
     if want.tracks and source_of(recipe.cameras).is_sequence is False:
-        text = f"follows points through a film, and cameras are {recipe.cameras.source}"
+        text = f"needs a walk, but cameras are {recipe.cameras.source}"
         raise BadInput("--tracks", "", text, hint="--cameras walk")
 
     for lens in recipe.lenses.values():
         check_lens(want.layers, lens.lens)
     of_light = [name for name in want.layers if name in LIGHT_LAYERS]
     if of_light and recipe.light.integrator != "path":
-        text = f"is made of light by `path`, the recipe has {recipe.light.integrator}"
+        text = f"needs light by `path`, but the recipe has {recipe.light.integrator}"
         raise BadInput("--layers", of_light[0], text, hint="--set light.integrator=path")
 
 

@@ -123,7 +123,7 @@ def lamp_factors(rows: Sequence[Mapping[str, Any]], words: Sequence[LampFactor])
         named = [int(row["number"]) for row in rows if _is_named(row, factor_word.word)]
         if not named:
             exist = ", ".join(f"{row['number']} {row['item']} ({row['name']})" for row in rows)
-            hint = f"of {exist}" if exist else "there is none"
+            hint = f"of {exist}" if exist else "this view has no lamps"
             raise BadInput("--lamp", factor_word.word, "no such lamp", hint=hint)
         factors |= {number: np.array(factor_word.rgb, np.float32) for number in named}
     return factors
@@ -163,7 +163,7 @@ def folder_of_view(word: str, settings: StoreSettings, *, needs_light: bool) -> 
         return
     match = _VIEW.fullmatch(word)
     if match is None:
-        raise BadInput(word, "", "names no view", hint="URL/houses/HOUSE/views/VIEW")
+        raise BadInput(word, "", "is not a view", hint="URL/houses/HOUSE/views/VIEW")
     house, view = match["house"], match["view"]
     store = store_from_url(match["root"], settings)
     needed_keys = [keys.RECIPE, keys.view_key(house, view, "view.json")]

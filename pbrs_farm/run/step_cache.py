@@ -177,7 +177,7 @@ def _extra(name: str, work: Work) -> object:
         return [*marks, *layers_in_digest(labels, max_albedo(work.recipe))]
     if name == "light":
         blurred = work.recipe.blur.shutter_s > 0
-        changes = ["diffuse"] * bool(work.layers_of("light")) + ["things blur"] * blurred
+        changes = ["diffuse"] * bool(work.layers_of("light")) + ["moving objects blur"] * blurred
         return changes or None
     if name == "develop":
         extra, shot = _extra_of_develop(work), work.recipe.shot(work.view_id or "")

@@ -175,7 +175,7 @@ def marker_of_house(work: Work, step: str) -> Marker:
     """The marker of a step of the house; BadInput where it has not been done."""
     marker = read_marker(work.store, keys.marker_key(work.house_id, step))
     if marker is None:
-        raise BadInput(work.house_id, step, "has not been done yet", hint="pbrs-farm step")
+        raise BadInput(work.house_id, step, "is not done yet", hint="pbrs-farm step")
     return marker
 
 

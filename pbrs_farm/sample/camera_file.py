@@ -109,7 +109,7 @@ def cameras_from_file_text(
     is_json = text.lstrip().startswith("[")
     n_cameras = text.count("{") if is_json else text.count("\n")
     if n_cameras > MAX_CAMERAS:
-        raise BadInput(file, "", f"holds {n_cameras} cameras, at most {MAX_CAMERAS} are read")
+        raise BadInput(file, "", f"has {n_cameras} cameras; the maximum is {MAX_CAMERAS}")
     if not is_json:
         lines = cameras_from_text(text, file, width_px, height_px)
         if not lines:

@@ -62,7 +62,7 @@ def recorded_falls(
     movers = [piece for name in items for piece in home.pieces if piece.item.id == name]
     for name in items:
         if not any(p.item.id == name and p.surfaces for p in movers):
-            raise BadInput(house.id, name, "has no surface that could fall")
+            raise BadInput(house.id, name, "has no surface")
     reach = _REACH_M
     for _ in range(_TRIES):
         rows, pivots = _simulated(mujoco, home, movers, reach, (seconds, push, spin))
@@ -185,8 +185,8 @@ def _check_begin(
         who = [movers[b - 1].item.id for b in bodies if b > 0]
         # Static parts come first, in order.
         other_name = who[1] if len(who) > 1 else names[min(int(contact.geom1), int(contact.geom2))]
-        text = f"begins {-1000 * contact.dist:.0f} mm inside of {other_name}"
-        raise BadInput(house.id, who[0], text, hint="place it where there is room for it")
+        text = f"starts {-1000 * contact.dist:.0f} mm inside {other_name}"
+        raise BadInput(house.id, who[0], text, hint="move it to a free place")
 
 
 def _check_flight(

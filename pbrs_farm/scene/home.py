@@ -219,9 +219,9 @@ class Home:
             False
         """
         if self.source.edits:
-            raise BadInput(self.id, "dress", "a home is dressed before it is edited")
+            raise BadInput(self.id, "dress", "dress a home before editing it")
         if self.source.dress_seed:
-            raise BadInput(self.id, "dress", f"is dressed by seed {self.source.dress_seed} already")
+            raise BadInput(self.id, "dress", f"is dressed already, seed {self.source.dress_seed}")
         (source,) = variants(self.source, [seed])
         return replace(self, source=source).set(**{f"dress.{k}": v for k, v in fields.items()})
 
@@ -342,7 +342,7 @@ class Home:
         from pbrs_farm.scene.placing import free_pose, upright_at
 
         if sum(argument is not None for argument in (on, pose, at)) != 1:
-            raise BadInput(self.id, model.id, "place it by one of on=, pose= and at=")
+            raise BadInput(self.id, model.id, "give one of on=, pose= and at=")
         if pose is not None:
             matrix = rigid_motion(pose, "place", "pose")
         elif at is not None:
@@ -386,7 +386,7 @@ class Home:
             raise BadInput("scatter", "floating", text, hint='in_="Kitchen" chooses a room')
         if floating and physics:
             raise BadInput(
-                "scatter", "floating", "what hangs in the air does not fall", hint="one of the two"
+                "scatter", "floating", "floating objects do not fall", hint="omit physics"
             )
         if floating:
             from pbrs_farm.scene.placing import floating_poses as poses
@@ -473,7 +473,7 @@ class Home:
             openable = sorted(
                 {joint.part for i in self.house.items if i.id in ids for joint in i.joints}
             )
-            text = f"no {part!r} of it opens" if openable else "nothing of it opens"
+            text = f"has no {part!r} that opens" if openable else "has no part that opens"
             raise BadInput(self.id, shown(sorted(ids)[0]), text, hint=", ".join(openable[:5]))
         return joints
 
@@ -595,7 +595,7 @@ class Home:
         """
         aim = None if towards is None else np.asarray(towards, np.float64) - np.asarray(at)
         if aim is not None and not np.linalg.norm(aim) > 0:
-            raise BadInput("add_light", "towards", "is where the light itself is")
+            raise BadInput("add_light", "towards", "is the position of the light")
         rgb = _rgb_of_light("add_light", kelvin, colour) or _rgb_of_kelvin(_WARM_WHITE_K)
         edit = AddLight(
             item=name or self._free_name("light", ()),
@@ -766,7 +766,7 @@ class Home:
             if (item.pose is not None if ids is None else item.id in ids)
         ]
         if not viewpoints:
-            raise BadInput(self.id, "cameras", "no model was placed", hint="name items to look at")
+            raise BadInput(self.id, "cameras", "no model was placed", hint="give items to look at")
         if not distance_m[0] > 0:
             raise BadInput("cameras_around", "distance_m", "expected metres above 0")
         image = self.recipe.image
@@ -998,10 +998,10 @@ def _rgb_of_light(
     if colour is None:
         return None if kelvin is None else _rgb_of_kelvin(kelvin)
     if kelvin is not None:
-        raise BadInput(call, "colour", "give it or kelvin, not both")
+        raise BadInput(call, "colour", "give either this or kelvin")
     rgb = linear_from_srgb(np.array(_rgb(colour)))
     if not rgb.max() > 0:
-        raise BadInput(call, "colour", "is black", hint="lm=0 puts the light out")
+        raise BadInput(call, "colour", "is black", hint="lm=0 turns the light off")
     return triple(rgb / rgb.max())
 
 

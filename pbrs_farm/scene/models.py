@@ -120,7 +120,7 @@ def model(
     """
     path = Path(path)
     if path.suffix.lower() not in SUFFIXES:
-        raise BadInput(path, "", "no mesh that is read", hint=f"of {', '.join(SUFFIXES)}")
+        raise BadInput(path, "", "is not a supported mesh format", hint=f"of {', '.join(SUFFIXES)}")
     if unit not in UNITS:
         raise BadInput("unit", unit, "no such unit", hint=hint_of_choice(unit, tuple(UNITS)))
     up = up or ("y" if path.suffix.lower() in (".glb", ".gltf", ".obj") else "z")

@@ -76,7 +76,7 @@ def settled_poses(
             break
     if moving:
         names = ", ".join(f"{things[k].model.id} ({k + 1} of {n})" for k in moving[:5])
-        raise BadInput(house.id, "scatter", f"after {_LONGEST_S:g} s these still move: {names}")
+        raise BadInput(house.id, "scatter", f"still moving after {_LONGEST_S:g} s: {names}")
     return [(t.model, t.pose) for t in things]
 
 
@@ -175,8 +175,8 @@ def _lift(
         spot = _spot_above_any(thing.onto, surfaces, radius, balls, rng)
         if spot is None:
             names = ", ".join(surface.target.name or surface.target.id for surface in surfaces[:3])
-            text = f"has no room above it for {thing.model.id}"
-            raise BadInput(house.id, names, text, hint="fewer or smaller things, more supports")
+            text = f"has no space above it for {thing.model.id}"
+            raise BadInput(house.id, names, text, hint="fewer or smaller objects, more supports")
         thing.onto, centre = spot
         thing.pose = np.eye(4)
         thing.pose[:3, :3] = turn

@@ -210,9 +210,7 @@ def _recipe_of_view(
     """The home's recipe with the size of the pictures and the source of their cameras."""
     fields = {id(viewpoint.chosen_by): viewpoint.chosen_by for viewpoint in viewpoints}
     if len({f.model_dump_json() if f else "" for f in fields.values()}) > 1:
-        raise BadInput(
-            home.id, "cameras", "were chosen in different ways", hint="render them apart"
-        )
+        raise BadInput(home.id, "cameras", "come from different sources", hint="render separately")
     chosen_by = viewpoints[0].chosen_by
     sizes = {
         (viewpoint.camera.intrinsics.width_px, viewpoint.camera.intrinsics.height_px)
@@ -221,7 +219,7 @@ def _recipe_of_view(
     settings: dict[str, object] = {}
     if chosen_by is None:
         if len(sizes) > 1 and size is None:
-            raise BadInput(home.id, "cameras", "are of different sizes", hint="render them apart")
+            raise BadInput(home.id, "cameras", "are of different sizes", hint="render separately")
         size = size or next(iter(sizes))
         settings["cameras"] = home.recipe.cameras.model_copy(update={"source": "given"})
     else:
@@ -268,7 +266,7 @@ def render_homes(
     made_with = [_recipe_of_home(home, recipe) for home in all_homes]
     for home, home_recipe in zip(all_homes, made_with, strict=True):
         if home_recipe.digest() != made_with[0].digest():
-            text = "another recipe than the first home's: one place holds one recipe"
+            text = "differs from the first home's recipe: an output has one recipe"
             raise BadInput(home.id, "recipe", text)
     run = Run(
         homes=(),
@@ -310,9 +308,9 @@ def _recipe_of_home(home: Home, recipe: str | Path | Recipe | None) -> Recipe:
 
 def _warn_of(summary: Summary) -> None:
     for subject, message, command in summary.failures:
-        again = f"; again by: {command}" if command else ""
+        again = f"; to repeat: {command}" if command else ""
         warn_caller(f"{subject}: {message}{again}")
     for step, why in summary.lacking.items():
-        warn_caller(f"{step} left out: {why}")
+        warn_caller(f"{step} skipped: {why}")
     for house, why in summary.without_views:
         warn_caller(f"{house}: no view: {why}")

@@ -40,7 +40,7 @@ _EYE_LEVEL_M: Final = 1.4  # preferred maximum height of a top above the floor, 
 _GIVEN_UP: Final = 40  # maximum consecutive failures to place a model in the air
 _HEIGHT_M: Final = 3.0  # height of the space above furniture outside all rooms, metres
 _NAMED: Final = 3  # maximum number of targets in a message
-_NO_LEVEL: Final = "name furniture with a level top, or a room for its floor"
+_NO_LEVEL: Final = "name furniture with a level top, or a room"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,7 +68,7 @@ def free_pose(house: House, model: Model, targets: Sequence[Target], seed: int) 
         pose = _stand_on_tops(model, surfaces[int(k)].tops, rng)
         if pose is not None:
             return pose
-    text, hint = f"has no free place for {model.id}", "a smaller thing, or another place"
+    text, hint = f"has no free place for {model.id}", "a smaller object, or another place"
     if not any(surface.tops for surface in surfaces):
         text, hint = f"has no level top, so no free place for {model.id}", _NO_LEVEL
     raise BadInput(house.id, _names_of(targets), text, hint=hint)
@@ -103,8 +103,8 @@ def scattered_poses(
         if not choices:
             del untried[which]
     if len(placed) < n:
-        text = f"takes {len(placed)} of {n} things"
-        raise BadInput(house.id, "scatter", text, hint="fewer or smaller things, more supports")
+        text = f"has space for {len(placed)} of {n} objects"
+        raise BadInput(house.id, "scatter", text, hint="fewer or smaller objects, more supports")
     return placed
 
 
@@ -133,8 +133,8 @@ def floating_poses(
         if pose is not None:
             placed.append((model, pose))
     if len(placed) < n:
-        text = f"the air takes {len(placed)} of {n} things"
-        raise BadInput(house.id, "scatter", text, hint="fewer or smaller things, larger rooms")
+        text = f"found space for {len(placed)} of {n} floating objects"
+        raise BadInput(house.id, "scatter", text, hint="fewer or smaller objects, larger rooms")
     return placed
 
 
@@ -162,7 +162,7 @@ def level_tops_of(
     """
     with_tops = [target for target in tops_of(house, targets, border_m) if target.tops]
     if not with_tops:
-        text = f"no support has a level surface: {_names_of(targets)}"
+        text = f"no level surface: {_names_of(targets)}"
         raise BadInput(house.id, "scatter", text, hint=_NO_LEVEL)
     return with_tops
 

@@ -130,8 +130,8 @@ class Renderer:
         since the renderers' state does not survive a fork.
         """
         if os.getpid() != self._pid:
-            hint = 'multiprocessing.set_start_method("spawn"), or render in the children alone'
-            raise MachineFailed("this process was forked from one that renders", hint=hint)
+            hint = 'multiprocessing.set_start_method("spawn"), or render only in child processes'
+            raise MachineFailed("this process was forked from a rendering process", hint=hint)
         # Plugins that make homes, and callbacks, already run on the thread.
         if threading.get_ident() == self._ident:
             return task()

@@ -99,7 +99,7 @@ def _own_name(name: str) -> str:
     kind = kind if kind in families() or kind in THINGS else called.get(kind, kind)
     if kind not in families() and kind not in THINGS:
         names = {*families(), *THINGS, *_WORDS, *called}
-        raise BadInput("thing", name, "no such thing is generated", hint=did_you_mean(name, names))
+        raise BadInput("thing", name, "no such object to generate", hint=did_you_mean(name, names))
     return kind
 
 

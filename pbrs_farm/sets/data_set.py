@@ -112,5 +112,5 @@ def shard_from_text(text: str | None) -> tuple[int, int]:
     first, slash, last = text.partition("/")
     k, n = range_of(f"{first}..{last}") or (0, 0)
     if not slash or not 1 <= k <= n:
-        raise BadInput("--shard", text, "expected one of so many shards", hint="e.g. 3/16")
+        raise BadInput("--shard", text, "expected K/N", hint="e.g. 3/16")
     return k, n

@@ -98,7 +98,7 @@ class SetEstimate(Record):
         amounts: tuple[tuple[str, float, PriceName, int], ...] = (
             ("CPU hours", self.cpu_hours, "cpu_hour", 1),
             ("CPU hours, spot", self.cpu_hours, "cpu_hour_spot", 1),
-            ("GPU hours of light in their place", self.gpu_hours, "gpu_hour", 1),
+            ("GPU hours of light instead", self.gpu_hours, "gpu_hour", 1),
             ("GPU hours of light, spot", self.gpu_hours, "gpu_hour_spot", 1),
             ("CPU hours beside the GPU", self.cpu_hours_beside_gpu, "cpu_hour", 1),
             ("GB stored for a month", self.gigabytes, "gb_month", 1),

@@ -75,8 +75,8 @@ def claim_folder(out: Path, data_set: DataSet) -> None:
     file = out / data_set.file
     if file.is_file():
         if read_regular(file) != data_set.data:
-            hint = f"name a new folder; OUT/{_PARTS} may be moved there, and is not rendered again"
-            raise BadInput(out, data_set.file, "holds another set: the file differs", hint=hint)
+            hint = f"name a new folder; move OUT/{_PARTS} there to avoid rendering again"
+            raise BadInput(out, data_set.file, "has another set: the file differs", hint=hint)
         return
     if out.exists() and not out.is_dir():
         raise BadInput(out, "", "is not a folder")
@@ -85,7 +85,7 @@ def claim_folder(out: Path, data_set: DataSet) -> None:
     files = [name for name in files if name not in ours and not name.startswith(".")]
     sets = [name for name in files if name.endswith(".toml")]
     if sets:
-        raise BadInput(out, sets[0], "is another set's file", hint="name a new folder")
+        raise BadInput(out, sets[0], "belongs to another set", hint="name a new folder")
     if files:
         raise BadInput(out, files[0], "is not a part of this set", hint="name a new folder")
     FolderStore(out).put(data_set.file, data_set.data)
@@ -220,12 +220,12 @@ def _check_nothing_else(root: Path, planned: Planned) -> None:
     for house in sorted(folder.iterdir()) if folder.is_dir() else ():
         hint = "name a new folder, or remove it"
         if house.name not in planned:
-            raise BadInput(root, house.name, "is none of the set's homes", hint=hint)
+            raise BadInput(root, house.name, "is not a home of the set", hint=hint)
         views = house / "views"
         for view in sorted(views.iterdir()) if views.is_dir() else ():
             if view.name not in planned[house.name]:
                 place = f"{house.name}/{view.name}"
-                raise BadInput(root, place, "is none of the set's views", hint=hint)
+                raise BadInput(root, place, "is not a view of the set", hint=hint)
 
 
 def _manifest_digest(root: Path) -> str:

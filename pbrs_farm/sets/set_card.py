@@ -16,8 +16,8 @@ MadeViews = tuple[SetPart, Path, Sequence[RuleVerdict], Mapping[str, int]]
 """A part, its root, the views of its forms, and reason -> number of views left out."""
 
 _COMMAND = """```sh
-pbrs-farm make {file} --out {name}   # the same files again: nothing is needed but this one
-sha256sum --check --quiet SHA256SUMS # nothing is printed where all files are as they were made
+pbrs-farm make {file} --out {name}   # makes the same files again
+sha256sum --check --quiet SHA256SUMS # prints nothing if no file has changed
 ```"""
 
 
@@ -36,7 +36,7 @@ def card_text(data_set: DataSet, made_views: Sequence[MadeViews]) -> str:
         *(_part_text(*of) for of in made_views),
         "## Forms",
         _forms_text(data_set),
-        "## Made again, and checked",
+        "## Reproduce and check",
         _COMMAND.format(file=data_set.file, name=data_set.name),
         f"The file has the digest `{keys.sha256(data_set.data)}` (SHA-256). Files are equal to the last bit by one version of "
         f"pbrs_farm (here {pbrs_farm.__version__}) on processors of one kind; another kind may round a last digit otherwise.",
@@ -84,10 +84,10 @@ def _part_text(
         f"Pictures: {', '.join(map(str, want.modes)) or 'none'}, {recipe.image.width_px}x{recipe.image.height_px}.",
         f"Layers beside those of every view: {', '.join(want.layers) or 'none'}.",
         f"Cameras: {recipe.cameras.source}, preset {recipe.cameras.preset}, lens {recipe.lens.model};"
-        f" pictures by the camera {recipe.tone.camera}, {recipe.tone.variants} more by one that is drawn.",
+        f" pictures by the camera {recipe.tone.camera}, {recipe.tone.variants} more by random cameras.",
         f"Light: {recipe.light.integrator}, {recipe.light.spp} samples a pixel; sky {recipe.sky.kind}, {recipe.sky.time}.",
         f"Recipe: {recipe.name}, digest {recipe.digest()}, seed {recipe.seed}.",
-        f"Homes: {len(part.homes)}, {'dressed by ' + _shortened(seeds) if seeds else 'as they were drawn'}.",
+        f"Homes: {len(part.homes)}, {'dressed by ' + _shortened(seeds) if seeds else 'not dressed'}.",
         f"Views left out of the forms: {', '.join(left_out) or 'none'}.",
     ]
     return "\n".join(
@@ -105,7 +105,7 @@ def _shortened(seeds: Sequence[int]) -> str:
 
 
 def _forms_text(data_set: DataSet) -> str:
-    rows = ["- `parts/<part>`: everything that was rendered (docs/formats.md of pbrs_farm)"]
+    rows = ["- `parts/<part>`: all rendered files (docs/formats.md of pbrs_farm)"]
     rows += [f"- `forms/{f.name}/<part>`: {f.to}, of {', '.join(f.parts)}" for f in data_set.forms]
     return "\n".join([*rows, "- `index.csv`: each view, its split, and why it is left out"])
 

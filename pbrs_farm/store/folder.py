@@ -183,7 +183,7 @@ class FolderStore:
         # Classify by the caller's remedy: wait, ask for permission, give up.
         reason = error.strerror or str(error)
         if code in _FULL:
-            return StoreUnavailable(key, f"{self.root} is full: {reason}", hint="free some space")
+            return StoreUnavailable(key, f"{self.root} is full: {reason}", hint="free disk space")
         if code in _FORBIDDEN:
             return StoreRefused(key, f"{self.root} cannot be written: {reason}")
         if code in _UNAVAILABLE:

@@ -238,7 +238,7 @@ class LaidOutStore:
 
     def _refuse_view(self, key: str) -> None:
         if self._of_view(key) is not None:
-            raise StoreFailed(key, "a packed root takes a view's files with their marker")
+            raise StoreFailed(key, "in a packed root, a view's files are stored with their marker")
 
     def _of_view(self, key: str) -> keys.HouseKey | None:
         """The parts of the key of a view's file or marker in a packed root, else None."""
@@ -320,7 +320,7 @@ class LaidOutStore:
         except ObjectMissing:
             return None
         if pack is None:
-            raise StoreFailed(place, "is not a pack of a view", hint="remove it: it is made again")
+            raise StoreFailed(place, "is not a pack of a view", hint="remove it to make it again")
         return pack
 
     def _remember(self, place: str, pack: Pack | None) -> None:
@@ -500,7 +500,7 @@ def _others(group: str, step: str) -> Iterable[str]:
 def _house_key(key: str) -> keys.HouseKey:
     parts = keys.parse_house_key(key)
     if parts is None or parts.view is None:
-        raise StoreFailed(key, "no file of a view")
+        raise StoreFailed(key, "not a file of a view")
     return parts
 
 

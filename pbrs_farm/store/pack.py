@@ -93,7 +93,7 @@ def pack_from_head(data: bytes, key: str) -> Pack | None:
         }
     except (tarfile.HeaderError, ValueError, KeyError, TypeError):
         raise StoreFailed(
-            key, "is not a pack of a view", hint="remove it: it is made again"
+            key, "is not a pack of a view", hint="remove it to make it again"
         ) from None
     return Pack(rows, data)
 

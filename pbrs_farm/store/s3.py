@@ -53,12 +53,12 @@ class ForkGuard:
     def enter(self, key: str) -> None:
         pid = os.getpid()
         if pid == self.forbidden_pid:
-            raise StoreFailed(key, "storage is not to be used in this process: it forks workers")
+            raise StoreFailed(key, "this process forks workers, so it must not use storage")
         if self.first_pid and pid != self.first_pid:
             raise StoreFailed(
                 key,
                 f"process {self.first_pid} used S3 before it forked {pid}; obstore would hang here",
-                hint="start the process by spawn, or use storage only in the children",
+                hint="start the process with spawn, or use storage only in child processes",
             )
         self.first_pid = pid
 

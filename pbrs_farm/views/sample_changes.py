@@ -39,7 +39,7 @@ def crop(sample: Sample, left: int, top: int, width: int, height: int) -> Sample
     full_width, full_height = sample.size
     fits = 0 <= left <= full_width - width and 0 <= top <= full_height - height
     if not fits or width < 1 or height < 1:
-        text = f"{width}x{height} at ({left}, {top}) lies not inside {full_width}x{full_height}"
+        text = f"{width}x{height} at ({left}, {top}) is not inside {full_width}x{full_height}"
         raise BadInput("crop", sample.id, text)
     part = (slice(top, top + height), slice(left, left + width))
     k = sample.K.copy()

@@ -84,7 +84,7 @@ def facts_from_json(row: Any, place: str) -> ViewFacts:
         room = row.get("room") or ""
         return ViewFacts(str(row["house"]), str(row["view"]), str(room), size, k, pose)
     except (KeyError, TypeError, ValueError, AttributeError):
-        hint = "does a run still write it? `pbrs-farm verify` says what is damaged"
+        hint = "is a run still writing it? `pbrs-farm verify` finds damaged files"
         raise BadInput(place, "", "not a view's camera", hint=hint) from None
 
 

@@ -551,4 +551,4 @@ def _nothing_left(split: str | None, n_found: int, left_out: dict[str, str]) -> 
     if not left_out:
         return f"no view{where}"
     view, why = next(iter(left_out.items()))
-    return f"none of {n_found} views{where} has what was asked for: {view}: {why}"
+    return f"none of {n_found} views{where} has the requested layers: {view}: {why}"

@@ -131,4 +131,4 @@ def test_a_process_over_the_memory_that_was_asked_for_is_killed(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["run", "builtin", "--out", str(tmp_path), "--memory", "1"]) == 1
-    assert "MB resident, 1 allowed; killed" in "".join(capsys.readouterr())
+    assert "MB resident, limit 1; killed" in "".join(capsys.readouterr())

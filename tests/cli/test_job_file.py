@@ -113,11 +113,11 @@ def test_an_option_there_is_not_is_named(tmp_path: Path) -> None:
         ("views = 0", "render.toml: views: expected 1 or more"),
         ('views = "six"', "views: expected a whole number"),
         ("views = [1, 2]", "views: expected one value, not a list"),
-        ("priority = 10", "priority: 10 is none of them"),
+        ("priority = 10", "priority: 10 is not a choice"),
         ("budget = -1", "budget: expected slot-hours, 0 or more"),
         ("max_slots = -1", "max_slots: expected 0 or more"),
         ("gpu = 1", "gpu: expected true or false"),
-        ('groups = "three"', "groups: three is none of them.*two, lamps"),
+        ('groups = "three"', "groups: three is not a choice.*two, lamps"),
         ("views = {of = 3}", "views: expected a value, not a table"),
     ],
 )

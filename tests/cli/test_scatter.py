@@ -56,7 +56,7 @@ def test_models_hang_in_the_air_and_are_labelled_so(
     assert any("floating" in row for row in frame.instances)
     assert verify(tmp_path / "out").is_clean
     assert main([*words, "--physics"]) == 1
-    assert "what hangs in the air does not fall" in capsys.readouterr().err
+    assert "floating objects do not fall" in capsys.readouterr().err
 
 
 def test_what_a_model_lacks_is_a_line_and_a_note_of_the_home(

@@ -99,5 +99,5 @@ def test_coco_has_the_same_poses(bop: Path, tmp_path: Path) -> None:
 def test_views_without_placed_models_are_told(tmp_path: Path) -> None:
     home = small_home()
     pf.render(home, home.cameras(n=1), modes=[]).save(tmp_path / "root")
-    with pytest.raises(BadInput, match="no home of these views holds a placed model"):
+    with pytest.raises(BadInput, match="no home of these views has a placed model"):
         export(tmp_path / "root", tmp_path / "bop", "bop")

@@ -163,7 +163,7 @@ def test_data_yaml_works_from_any_directory_and_says_what_stands_for_val(root, t
         assert {f"train: {folder}", f"val: {folder}"} <= set(lines)
         assert (tmp_path / name / folder).is_dir()
         assert any("val" in remark for remark in remarks_of(tmp_path / name))
-    assert "the split left val empty, so train stands in for it" in remarks_of(tmp_path / "one")
+    assert "the split left val empty: it is a copy of train" in remarks_of(tmp_path / "one")
 
 
 def test_yolo_polygons_cover_the_visible_masks(root, tmp_path):

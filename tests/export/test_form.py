@@ -61,7 +61,7 @@ def test_an_unknown_form_is_answered_with_those_there_are(root: Path, tmp_path: 
     with pytest.raises(BadInput, match="exports homes"):
         export(root, tmp_path / "x", "gltf")
     with pytest.raises(
-        BadInput, match=r"no such form of a home.*gltf, habitat, mjcf, sdf, urdf, usd, usdz\)"
+        BadInput, match=r"no such format of homes.*gltf, habitat, mjcf, sdf, urdf, usd, usdz\)"
     ):
         export_homes(root, tmp_path / "x", "coco")
 

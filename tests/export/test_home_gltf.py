@@ -105,7 +105,7 @@ def test_things_have_parts_to_collide_with_and_the_floor_between_them_is_walkabl
 def test_a_folder_without_a_home_and_options_of_views_are_one_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    with pytest.raises(BadInput, match=r"holds no house\.glb"):
+    with pytest.raises(BadInput, match=r"has no house.glb"):
         export_homes(tmp_path, tmp_path / "out", "gltf")
     assert main(["export", str(tmp_path), "--to", "gltf", "--split"]) == 1
     assert "--to gltf exports homes" in capsys.readouterr().err

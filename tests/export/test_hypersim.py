@@ -273,5 +273,5 @@ def test_the_preset_is_the_camera_that_readers_assume():
 
 
 def test_what_the_layout_cannot_hold_is_refused(root, tmp_path):
-    with pytest.raises(BadInput, match="hypersim holds light"):
+    with pytest.raises(BadInput, match="hypersim contains radiance"):
         export(root, tmp_path / "a", "hypersim", choice=Choice(size=(64, 48)))

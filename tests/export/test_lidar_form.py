@@ -107,5 +107,5 @@ def test_a_ring_of_a_flat_scanner_is_one_and_an_unknown_one_is_told(root, tmp_pa
     cloud = loaders.ply_cloud(next((tmp_path / "a").glob("*/v0.ply")))
     assert len(cloud) <= 360
     assert (cloud.z == 0).all()
-    with pytest.raises(BadInput, match=r"^scanner: vlp61 is none of them.*vlp16"):
+    with pytest.raises(BadInput, match=r"^scanner: vlp61 is not a choice.*vlp16"):
         export(root, tmp_path / "b", "lidar", scanner="vlp61")

@@ -65,6 +65,6 @@ def test_a_home_without_tracks_is_told(root: Path, tmp_path: Path) -> None:
 
 def test_tracks_of_what_is_no_film_are_refused_before_anything_is_made() -> None:
     want = Wanted(tracks=True)
-    with pytest.raises(pf.BadInput, match="follows points through a film"):
+    with pytest.raises(pf.BadInput, match="needs a walk"):
         check_layers(want, recipe_from_name("preview"))
     check_layers(want, recipe_from_name("preview", {"cameras.source": "walk"}))

@@ -199,7 +199,7 @@ def test_a_folder_whose_homes_lie_one_folder_deeper_names_the_command_that_takes
     with pytest.raises(BadHouse, match="no home file") as error:
         resolve(str(tmp_path))
     command = shlex.join(["pbrs-farm", "run", str(tmp_path / "one"), str(tmp_path / "two words")])
-    expected = f"homes lie one folder deeper, in one and two words: `{command}` takes them"
+    expected = f"the homes are one folder deeper, in one and two words: `{command}`"
     assert expected in str(error.value)
     # The error of the folder says it; no warning before it.
     assert home_arguments([str(tmp_path)], None) == [str(tmp_path)]
@@ -213,7 +213,7 @@ def test_a_folder_whose_homes_lie_one_folder_deeper_names_the_command_that_takes
         (tmp_path / name).mkdir()
         (tmp_path / name / "home.sh3d").write_bytes(b"")
     home_arguments([str(tmp_path)], None)
-    assert f"`pbrs-farm run {tmp_path}/*/` takes them" in capsys.readouterr().err
+    assert f"`pbrs-farm run {tmp_path}/*/`" in capsys.readouterr().err
 
 
 def test_a_file_that_is_not_there_is_missing_in_its_own_format(tmp_path: Path) -> None:
@@ -244,7 +244,7 @@ def test_a_plugin_that_brings_no_format_is_the_machines_fault(
     entry = EntryPoint("old", "json:dumps", "pbrs_farm.readers")
     old = Plugin("readers", "old", "package", "1.0", entry)
     monkeypatch.setattr(table, "plugin", lambda _group, _name: old)
-    with pytest.raises(MachineFailed, match=r"plugin old of package .* brings no Format"):
+    with pytest.raises(MachineFailed, match=r"plugin old of package .* has no Format"):
         format_of_plugin("old")
 
 

@@ -73,10 +73,10 @@ def test_a_walk_through_it_from_the_command_line_shows_what_moves(
 def test_what_is_wrong_with_the_file_is_one_line(saved: Path, tmp_path: Path) -> None:
     held = json.loads(saved.read_text())
     for change, text in (
-        ({"house_id": "builtin-0"}, "another home now"),
+        ({"house_id": "builtin-0"}, "has changed since"),
         ({"format": "pbrs_farm home 9"}, "format"),
         ({"edits": [{"do": "fly"}]}, r"edits"),
-        ({"home": str(saved)}, "names another file"),
+        ({"home": str(saved)}, "refers to another file"),
     ):
         file = tmp_path / "bad.home.json"
         file.write_text(json.dumps(held | change))
@@ -85,5 +85,5 @@ def test_what_is_wrong_with_the_file_is_one_line(saved: Path, tmp_path: Path) ->
         assert "\n" not in str(caught.value)
     with pytest.raises(BadHouse, match="no such file"):
         resolve(str(tmp_path / "none.home.json"))
-    with pytest.raises(BadHouse, match="dressed before it is edited"):
+    with pytest.raises(BadHouse, match="dress a home before editing it"):
         variants(resolve(str(saved)), [3])

@@ -77,5 +77,5 @@ def test_cameras_json_is_read_again_when_it_was_written_again(work: Work) -> Non
 def test_light_names_the_step_it_lacks(work: Work) -> None:
     view = run_step("cameras", work).marker.facts["views"][0][0]
     assert work.store.head(keys.marker_key(work.house_id, "illuminance")) is None
-    with pytest.raises(BadInput, match="illuminance: has not been done yet"):
+    with pytest.raises(BadInput, match="illuminance: is not done yet"):
         run_step("light", view_work(work, view))

@@ -41,7 +41,7 @@ def test_what_is_made_of_light_is_refused_where_there_is_none(tmp_path, capsys):
     words = ["run", "builtin", "--recipe", "preview", "--out", str(tmp_path / "out")]
     assert main([*words, "--layers", "residual", "--set", "light.integrator=metropolis"]) != 0
     error = capsys.readouterr().err
-    assert "shading: is made of light by `path`, the recipe has metropolis" in error
+    assert "shading: needs light by `path`, but the recipe has metropolis" in error
     assert not (tmp_path / "out").exists()
 
 

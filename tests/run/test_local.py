@@ -199,7 +199,7 @@ def test_a_step_that_is_silent_is_killed(tmp_path: Path) -> None:
 
 def test_a_process_over_its_memory_is_killed(tmp_path: Path) -> None:
     summary = run(tmp_path, "hang:cameras", memory_mb=1.0)
-    assert any("MB resident, 1 allowed; killed" in why for _what, why, _again in summary.failures)
+    assert any("MB resident, limit 1; killed" in why for _what, why, _again in summary.failures)
 
 
 def test_a_home_that_is_missing_does_not_stop_the_others(tmp_path: Path) -> None:

@@ -27,5 +27,5 @@ def test_dropped_things_lie_on_their_support(on: str, tmp_path: Path) -> None:
 
 
 def test_what_cannot_be_dropped_is_told(tmp_path: Path) -> None:
-    with pytest.raises(BadInput, match=r"no room above it|no support"):
+    with pytest.raises(BadInput, match=r"no space above it|no level surface"):
         small_home().scatter([can(tmp_path)], 1, on="ceiling_0_0", physics=True)

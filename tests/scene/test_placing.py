@@ -88,7 +88,7 @@ def test_every_model_that_fits_somewhere_is_placed_there(
     fits = {(m, t) for m in names for t in on if sizes.index(m) < LARGEST[t]}
     asked = [models[m] for m in names], n, [known[t] for t in on], seed
     if not fits:
-        says = "takes 0 of" if any(LARGEST[t] for t in on) else "no support has a level surface"
+        says = "has space for 0 of" if any(LARGEST[t] for t in on) else "no level surface"
         with pytest.raises(BadInput, match=says):
             scattered_poses(home, *asked)
         return
@@ -145,7 +145,7 @@ def test_targets_without_a_level_top_are_told_with_what_to_do(
 ) -> None:
     home, known = _home()
     for place in (scattered_poses, settled_poses):
-        with pytest.raises(BadInput, match="no support has a level surface: roof") as caught:
+        with pytest.raises(BadInput, match="no level surface: roof") as caught:
             place(home, [models["small"]], 1, [known[t] for t in on], 0)
         assert "level top" in caught.value.hint
 

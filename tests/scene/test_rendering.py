@@ -152,7 +152,7 @@ def test_a_forked_child_is_told(tmp_path: Path) -> None:
     done = subprocess.run(
         [sys.executable, "-c", _FORK], capture_output=True, text=True, timeout=120, cwd=Path.cwd()
     )
-    assert "was forked from one that renders" in done.stdout, done.stderr
+    assert "was forked from a rendering process" in done.stdout, done.stderr
 
 
 def test_a_camera_in_no_room_is_a_warning(home: pf.Home) -> None:

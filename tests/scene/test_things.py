@@ -56,7 +56,7 @@ def test_a_thing_stands_in_a_home() -> None:
 @pytest.mark.parametrize(
     ("call", "error"),
     [
-        ({"name": "bedd"}, "bedd: no such thing is generated .did you mean bed"),
+        ({"name": "bedd"}, "bedd: no such object to generate .did you mean bed"),
         ({"name": "bed", "slat": True}, "bed: has no parameter 'slat' .did you mean slats"),
         ({"name": "bed", "width_m": 9}, r"bed, width_m: 9 does not fit, expected a number in 0\."),
         ({"name": "bed", "slats": 2}, "bed, slats: 2 does not fit, expected True or False"),

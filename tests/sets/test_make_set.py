@@ -145,17 +145,17 @@ def test_another_folder_is_refused_in_one_line(
     other = tmp_path / "small.toml"
     other.write_text(file.read_text() + "# more\n")
     assert main(["make", str(other), "--out", str(made)]) == 1
-    assert "small.toml: holds another set: the file differs" in capsys.readouterr().err
+    assert "small.toml: has another set: the file differs" in capsys.readouterr().err
     renamed = tmp_path / "renamed.toml"
     renamed.write_text(file.read_text())
     assert main(["make", str(renamed), "--out", str(made)]) == 1
-    assert "small.toml: is another set's file" in capsys.readouterr().err
+    assert "small.toml: belongs to another set" in capsys.readouterr().err
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "thesis.tex").write_text("")
     assert main(["make", str(file), "--out", str(tmp_path / "mine")]) == 1
     assert "thesis.tex: is not a part of this set" in capsys.readouterr().err
     assert main(["make", str(file), "--out", str(made), "--shard", "3/2"]) == 1
-    assert "--shard: 3/2: expected one of so many shards (e.g. 3/16)" in capsys.readouterr().err
+    assert "--shard: 3/2: expected K/N (e.g. 3/16)" in capsys.readouterr().err
 
 
 def test_a_view_that_is_none_of_the_set_s_is_named(
@@ -166,7 +166,7 @@ def test_a_view_that_is_none_of_the_set_s_is_named(
     house = next(out.glob("parts/views/houses/*"))
     (house / "views/9_9_9").mkdir()
     assert main(["make", str(file), "--out", str(out)]) == 1
-    assert f"{house.name}/9_9_9: is none of the set's views" in capsys.readouterr().err
+    assert f"{house.name}/9_9_9: is not a view of the set" in capsys.readouterr().err
 
 
 @pytest.mark.long

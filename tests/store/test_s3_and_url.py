@@ -51,7 +51,7 @@ def test_an_unreachable_gateway_is_one_line_without_the_secret() -> None:
 
 def test_a_process_that_may_fork_is_refused() -> None:
     guard = ForkGuard(forbidden_pid=os.getpid())
-    with pytest.raises(StoreFailed, match="not to be used in this process"):
+    with pytest.raises(StoreFailed, match="must not use storage"):
         guard.enter("k")
 
 

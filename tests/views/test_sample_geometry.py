@@ -105,7 +105,7 @@ def test_stored_normals_decode_to_vectors_that_round_to_the_same_bits(axes):
 
 
 def test_a_crop_outside_the_picture_is_told():
-    with pytest.raises(BadInput, match="lies not inside"):
+    with pytest.raises(BadInput, match="is not inside"):
         crop(plane_sample(), 30, 0, 20, 20)
 
 

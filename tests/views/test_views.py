@@ -122,7 +122,9 @@ def test_views_that_a_run_has_not_finished_are_left_out_and_named(root):
     asked = views.only(request=SampleRequest(("colour",), "mlt_il_ol"))
     assert len(asked) == 3
     assert asked.left_out == {"one-00000001/0_0_2": "no mlt_il_ol.png"}
-    with pytest.raises(BadInput, match=r"none of 4 views has what was asked for: .* no mlt_ol.png"):
+    with pytest.raises(
+        BadInput, match=r"none of 4 views has the requested layers: .* no mlt_ol.png"
+    ):
         views.only(request=SampleRequest(("colour",), "mlt_ol"))
 
 

@@ -84,7 +84,7 @@ store_from_url("s3://bucket/prefix").put("k", b"")
 """
     words = [sys.executable, "-c", code]
     done = subprocess.run(words, capture_output=True, text=True, check=False, timeout=60)
-    assert "not to be used in this process" in done.stderr
+    assert "must not use storage" in done.stderr
 
 
 def test_no_secret_stands_on_a_command_line_or_in_a_log() -> None:

@@ -66,7 +66,7 @@ def write_bop(views: list[ChosenView], out: Path, _choice: Choice) -> None:
                 meshes[item.pose.model] = _mesh_of(item, house)
     if not meshes:
         hint = "place or scatter models first: docs/python.md"
-        raise BadInput("--to bop", "", "no home of these views holds a placed model", hint=hint)
+        raise BadInput("--to bop", "", "no home of these views has a placed model", hint=hint)
     numbers = _object_numbers(sorted(meshes))
     _write_models(out / "models", meshes, numbers)
     scenes: dict[str, list[ChosenView]] = {}

@@ -61,7 +61,7 @@ def write_hypersim(views: list[ChosenView], out: Path, choice: Choice) -> None:
     without a surface. Raises BadInput for a lens other than a pinhole, and for a size other than the views'.
     """
     if choice.size is not None:
-        raise BadInput("--size", "", "hypersim holds light, which is not resized")
+        raise BadInput("--size", "", "hypersim contains radiance, which cannot be resized")
     tables: dict[str, list[dict[str, Any]]] = {
         name: [] for name in (hypersim.SPLIT_CSV, hypersim.CAMERAS_CSV, _INDEX)
     }
@@ -340,7 +340,7 @@ def _card(out: Path) -> str:
         light = (
             "`color` is radiance; there is no `diffuse_illumination` and no `residual`"
             if has_light
-            else "there is no `color`: the views have no light of their own"
+            else "there is no `color`: the views have no traced light"
         )
     return f"""# Views of pbrs_farm in the layout of Hypersim
 

@@ -48,7 +48,7 @@ def write_mjcf(home: ExportedHome, folder: Path) -> None:
     path.write_bytes(xml_bytes(model.root))
     if fixed:
         (folder / REMARKS).write_text(
-            f"{home.house.id}: {len(fixed)} things found no rest and stand fixed: {', '.join(fixed[:5])}\n"
+            f"{home.house.id}: {len(fixed)} items did not come to rest and are fixed: {', '.join(fixed[:5])}\n"
         )
 
 

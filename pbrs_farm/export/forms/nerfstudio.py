@@ -40,7 +40,7 @@ def write_nerfstudio(views: list[ChosenView], out: Path, _choice: Choice) -> Non
         house_views = [view for view in views if view.house.id == house]
         models = {intrinsics_of(view.facts).lens.model for view in house_views}
         if len(models) > 1:
-            text = f"has one lens model a house, these views have {' and '.join(sorted(models))}"
+            text = f"needs one lens model per house, got {' and '.join(sorted(models))}"
             raise BadInput("--to", "nerfstudio", text)
         transforms = {
             "camera_model": _MODELS[intrinsics_of(house_views[0].facts).lens.model],

@@ -41,7 +41,7 @@ def write_tum(views: list[ChosenView], out: Path, _choice: Choice) -> None:
         hint = "pbrs-farm run HOME --cameras walk"
         raise BadInput("--to", "tum", "no view is a frame of a sequence", hint=hint)
     left_out = [view for view in views if (view.house.id, view.id) not in written]
-    name_left_out(out, left_out, "has no frame of a sequence that is exported")
+    name_left_out(out, left_out, "has no frame of an exported sequence")
 
 
 def _write_trajectory(folder: Path, side: str, timed: Sequence[tuple[ChosenView, float]]) -> None:

@@ -108,7 +108,7 @@ def write_yaml(out: Path, splits: tuple[str, ...], fields: list[str]) -> None:
         if name not in folders:
             substitute = substitute if substitute in folders else next(iter(folders))
             folders[name] = folders[substitute]
-            remarks.append(f"# the split left {name} empty, so {substitute} stands in for it")
+            remarks.append(f"# the split left {name} empty: it is a copy of {substitute}")
     lines = [*remarks, *(f"{name}: {folders[name]}" for name in SPLITS if name in folders)]
     lines += fields
     (out / "data.yaml").write_text("\n".join(lines) + "\n", "utf-8")

@@ -186,7 +186,7 @@ class RenderProcess:
             self._log_size, self._sign_at = size, now
         used_mb = child.resident_mb()
         if used_mb > limits.memory_mb:
-            return "resource", f"{used_mb:.0f} MB resident, {limits.memory_mb:.0f} allowed; killed"
+            return "resource", f"{used_mb:.0f} MB resident, limit {limits.memory_mb:.0f}; killed"
         # Starting: its task and its step have not begun.
         if not self._is_ready:
             if now - self._begun_at > limits.start_s:

@@ -27,5 +27,5 @@ def _views(request: CameraRequest) -> Sampling:
 
 
 SOURCE = CameraSource(
-    name="file", views=_views, help="cameras of your own", use="`--camera-file FILE`", parse=_parse
+    name="file", views=_views, help="cameras from a file", use="`--camera-file FILE`", parse=_parse
 )

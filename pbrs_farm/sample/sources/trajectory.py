@@ -30,7 +30,7 @@ def _views(request: CameraRequest) -> Sampling:
 SOURCE = CameraSource(
     name="trajectory",
     views=_views,
-    help="frames at the poses of your own file",
+    help="frames at the poses of a file",
     use="`--trajectory FILE`",
     parse=_parse,
     is_sequence=True,

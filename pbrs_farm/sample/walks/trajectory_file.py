@@ -86,7 +86,7 @@ def _in_seconds(poses: list[Pose], stamps: list[str], file: str) -> list[Pose]:
     gap = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
     if gap > _MOST_GAP_S:
         text = f"rows are {gap:g} apart: times are seconds, or a smaller unit counted from 1970"
-        raise BadInput(file, f"line {poses[1].line}", text, hint="divide the first column")
+        raise BadInput(file, f"line {poses[1].line}", text, hint="convert times to seconds")
     return poses
 
 
@@ -95,7 +95,7 @@ def _pose_of_line(words: list[str], line: int, file: str) -> Pose:
     if len(words) != 8:
         hint = "t x y z qx qy qz qw"
         if len(words) == 12:
-            hint = f"KITTI's rows of 12 are poses without times; wanted is {hint}"
+            hint = f"rows of 12 numbers are KITTI's poses without times; expected {hint}"
         raise BadInput(file, place, f"expected 8 numbers, got {len(words)}", hint=hint)
     try:
         numbers = np.array([float(word) for word in words])
@@ -137,7 +137,7 @@ def trajectory_views(
     if len(inside):
         pose = poses[int(inside[0])]
         place = ", ".join(f"{v:.2f}" for v in pose.world_from_camera[:3, 3])
-        raise BadInput(file, f"line {pose.line}", f"the camera at {place} stands inside a wall")
+        raise BadInput(file, f"line {pose.line}", f"the camera at {place} is inside a wall")
     intrinsics = Intrinsics.from_hfov(
         fields.score_width_px, fields.score_height_px, fields.hfov_rad
     )

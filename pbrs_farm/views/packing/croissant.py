@@ -44,7 +44,7 @@ def croissant_json(files: Sequence[Path], columns: Mapping[str, str], facts: Roo
         "conformsTo": "http://mlcommons.org/croissant/1.0",
         "name": "rendered-rooms",
         "description": f"{TITLE}: {sum(h.n_views for h in facts.homes)} views of"
-        f" {len(facts.homes)} homes, rendered by pbrs_farm. README.md says what is in it.",
+        f" {len(facts.homes)} homes, rendered by pbrs_farm. README.md describes it.",
         "version": "1.0.0",
         **({"license": licences} if licences else {}),
         **({"creditText": "\n".join(facts.credits)} if facts.credits else {}),

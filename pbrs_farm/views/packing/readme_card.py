@@ -30,7 +30,7 @@ def card(views: Views, packing: Packing, facts: RootFacts, *, form: str) -> str:
         _table(("split", "views", "homes"), _split_rows(views, packing, form)),
         f"Split {SPLIT_RULE}." if packing.shares else "Not split.",
         "\n".join(["| array | type | unit |", "|---|---|---|", *arrays]),
-        f"Axes of normals as stored: {AXES}. Classes are the NYU40's; 0 is none.",
+        f"Axes of normals as stored: {AXES}. Classes are the NYU40's; 0 is no class.",
         _loading(form, next(shard_plans(views.refs, packing, form)).split),
         "## Homes and licences",
         _homes(facts),

@@ -67,7 +67,7 @@ def test_a_worker_that_does_not_see_a_suncg_folder_is_itself_at_fault(tmp_path: 
 
 
 def test_a_folder_that_is_no_house_says_what_would_be_one(tmp_path: Path) -> None:
-    with pytest.raises(BadInput, match=r"holds no house\.json"):
+    with pytest.raises(BadInput, match=r"has no house.json"):
         entries_from_arguments([str(tmp_path)])
     (tmp_path / "house").mkdir()
     with pytest.raises(BadInput, match="--houses LIST"):
