@@ -108,7 +108,7 @@ class Guard:
         address = (scope.get("client") or ("", 0))[0]
         # Health checks have no rate limit.
         if path != HEALTH and not self._rates.takes(address):
-            return _text_response(429, "too many requests: wait a little", {"Retry-After": "2"})
+            return _text_response(429, "too many requests: try again in a moment", {"Retry-After": "2"})
         if len(scope["raw_path"]) + len(scope["query_string"]) > self._options.limits.target_bytes:
             return _text_response(414, "the address is too long")
         if not self._is_our_host(headers.get("host", "")):
@@ -155,7 +155,7 @@ class Guard:
             with anyio.fail_after(limits.receive_s):
                 body = await _body(receive, limits.body_bytes)
         except TimeoutError:
-            return _text_response(408, "the form did not come in time", {"Connection": "close"})
+            return _text_response(408, "the form arrived too late", {"Connection": "close"})
         if body is None:
             return _text_response(413, "the form is too large")
         scope["board_body"] = body
@@ -166,10 +166,10 @@ class Guard:
         if is_script:
             return None
         if not session:
-            return _text_response(401, "show the board's token first: /login")
+            return _text_response(401, "log in first: /login")
         word = form_values(body).get("form_word", "") or headers.get("x-form-word", "")
         if not self._sessions.is_form_word(session, word):
-            return _text_response(403, "the form is not of this session: load the page again")
+            return _text_response(403, "the form belongs to another session: reload the page")
         return None
 
     def _is_our_host(self, host: str) -> bool:
@@ -242,7 +242,7 @@ def _with_headers(send: Send) -> Send:
 
 
 def _too_many_tries() -> Response:
-    return _text_response(429, "too many tries: wait a minute", {"Retry-After": "60"})
+    return _text_response(429, "too many attempts: wait a minute", {"Retry-After": "60"})
 
 
 def _text_response(status: int, text: str, headers: dict[str, str] | None = None) -> Response:

@@ -89,7 +89,7 @@ class LiveFarm:
                     self._finished |= self.farm.finished_houses(job, besides=self._finished)
                     self._n_finished[job] = n
         except PbrsError as error:
-            _LOG.warning("the farm does not say which houses are done: %s", error)
+            _LOG.warning("cannot read the finished houses of the farm: %s", error)
         return self._finished
 
     def user_with(self, token: str) -> str:
@@ -97,7 +97,7 @@ class LiveFarm:
         try:
             user = self.farm.users.named_by(token)
         except PbrsError as error:
-            _LOG.warning("the farm does not say whose token it is: %s", error)
+            _LOG.warning("cannot check the token: %s", error)
             return ""
         return user.name if user is not None else ""
 

@@ -59,7 +59,7 @@ class PictureCache:
             part.write_bytes(data)
             part.replace(path)
         except OSError as error:
-            _LOG.warning("cannot keep %s: %s", path, error)
+            _LOG.warning("cannot cache %s: %s", path, error)
             part.unlink(missing_ok=True)
         self._n_made += 1
         if self._n_made % _SWEEP_EVERY == 0:

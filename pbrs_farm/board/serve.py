@@ -147,7 +147,7 @@ def bound_socket(host: str, port: int) -> socket.socket:
         listening.close()
         reason = getattr(error, "strerror", "") or "a port is a number in 0..65535"
         text = f"cannot listen there: {reason}"
-        raise BadInput(f"{host}:{port}", "", text, hint="--port another") from None
+        raise BadInput(f"{host}:{port}", "", text, hint="use another --port") from None
     listening.listen(_BACKLOG)
     return listening
 

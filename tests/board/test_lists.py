@@ -337,7 +337,7 @@ def test_a_page_says_that_the_root_is_being_read(tmp_path: Path) -> None:
     text, page = told(board.refresher.progress)
     assert "Looking for homes" in text
     assert text in page
-    assert "no home in this root yet" not in page
+    assert "root has no homes yet" not in page
     assert "reading.js" in page
     text, page = told(Progress(1200, 7))
     assert text.startswith("Reading homes: 7 of 1,200.")
@@ -345,7 +345,7 @@ def test_a_page_says_that_the_root_is_being_read(tmp_path: Path) -> None:
     board.refresher.refresh()
     text, page = told(board.refresher.progress)
     assert text == ""
-    assert "no home in this root yet" in page
+    assert "root has no homes yet" in page
     assert "reading.js" not in page
 
 

@@ -36,8 +36,8 @@ _OF_JOBS: Final = {
     "priority": "Change the priority of this job: 0 is first, 9 last.",
 }
 _OF_WORKERS: Final = {
-    "drain": "Let this worker finish its tasks and take no more.",
-    "undrain": "Let this worker take tasks again.",
+    "drain": "Let this worker finish its tasks and stop.",
+    "undrain": "Let this worker accept tasks again.",
 }
 
 
@@ -45,7 +45,7 @@ def live_farm(request: Request) -> LiveFarm:
     """The board's farm; 404 without one."""
     farm = board_of(request).farm
     if farm is None:
-        raise HTTPException(404, "This board shows no farm: start it with PBRS_REDIS_URL.")
+        raise HTTPException(404, "This board has no farm: start it with PBRS_REDIS_URL.")
     return farm
 
 
@@ -175,7 +175,7 @@ def _do(farm: Farm, what: str, of: str, to: str) -> str:
         farm.set_priority(of, number)
         return f"{before} -> {number}"
     if what == "retry":
-        return f"{len(farm.retry(of))} tasks get fresh attempts"
+        return f"{len(farm.retry(of))} tasks will be retried"
     if what in _OF_JOBS:
         act: dict[str, Callable[[str], str]] = {
             "pause": farm.pause,

@@ -26,7 +26,7 @@ def house_glb(request: Request) -> Response:
     key = keys.house_key(home.id, "house.glb")
     data = board_of(request).reader.get_or_none(key, _MAX_GLB_BYTES)
     if data is None:
-        raise HTTPException(404, "This home has no house.glb, or one too large to be shown.")
+        raise HTTPException(404, "This home has no house.glb, or a too large one.")
     return Response(data, media_type="model/gltf-binary", headers={"Cache-Control": FOREVER})
 
 

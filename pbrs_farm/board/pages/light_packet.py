@@ -122,7 +122,7 @@ def _tone_of(view_json: bytes, recipe: bytes) -> ToneFields:
         row = json.loads(view_json)
         house, view = str(row["house"]), str(row["view"])
     except (ValueError, KeyError, TypeError, RecursionError):
-        raise BadInput("view.json", "", "names no house and view") from None
+        raise BadInput("view.json", "", "is not the folder of a view") from None
     return recipe_from_json(recipe, "recipe.json").camera_of(house, view).tone
 
 

@@ -22,7 +22,7 @@ from pbrs_farm.board.pages.words import OF_A_CANDIDATE, OF_A_SELECTION, listed
 from pbrs_farm.core.lighting import ALL_MODES
 from pbrs_farm.core.shown_text import shown
 
-_GONE: Final = "It was moved or removed, or the address is of another root."
+_GONE: Final = "It was moved or removed, or the address belongs to another root."
 _MAX_VIEWS: Final = 120  # maximum number of views on the page of a home
 
 

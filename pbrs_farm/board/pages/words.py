@@ -18,12 +18,12 @@ OF_A_VIEW: Final = {
     "noise": "estimated relative error of the light",
 }
 OF_A_CANDIDATE: Final = {
-    "outside room": "outside of the room's outline",
+    "outside room": "outside the room's outline",
     "near obstacle": "closer to a surface than the camera's clearance",
     "not above floor": "no floor straight below",
     "enclosed": "inside a piece of furniture or a wall",
     "filled by one": "one object or wall fills too much of the picture",
-    "few objects": "too few objects, or each too small",
+    "few objects": "too few objects, or only small ones",
     "below min score": "the score is below the minimum of the recipe",
     "near duplicate": "a better camera has almost the same view",
     "lower score": "valid, but another camera of its sector is better",

@@ -10,12 +10,12 @@ function listen() {
   source.addEventListener("message", (event) => {
     for (const [id, html] of Object.entries(JSON.parse(event.data))) {
       const element = document.getElementById(id);
-      // A part that is being read keeps its selection.
+      // Keep the selection of a part that the user reads.
       if (element && !isBeingSelected(element)) element.innerHTML = html;
     }
     live.dataset.events_seen = Number(live.dataset.events_seen ?? 0) + 1;
   });
-  // A page that is left or hidden asks nothing of the farm.
+  // A hidden page sends no requests to the farm.
   addEventListener("pagehide", () => source.close());
 }
 

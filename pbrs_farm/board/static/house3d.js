@@ -80,7 +80,7 @@ class HousePage {
       return made;
     });
     for (const item of house.items) {
-      if (item.kind === "ground" && item.item?.startsWith("outside_")) continue; // what lies before the windows
+      if (item.kind === "ground" && item.item?.startsWith("outside_")) continue; // outdoors
       const group = this.group(item.room ?? null);
       for (const surface of item.surfaces) {
         const geometry = new THREE.BufferGeometry();

@@ -73,7 +73,7 @@ vec4 toned(vec3 light) {
 const PICTURE = `${LAYERS}${TONE}
 void main() { colour = toned(summed()); }`;
 
-// A sum of layers that is kept while one control moves; a half float holds 65504.
+// Sum of the layers that no moving control changes; a half float holds 65504.
 const SUM = `${LAYERS}
 void main() { colour = vec4(min(summed(), 60000.0), 1.0); }`;
 

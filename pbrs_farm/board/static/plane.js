@@ -1,4 +1,4 @@
-// A picture that is zoomed to the pixel and dragged: its layers lie on one plane inside a stage.
+// A picture with zoom and drag: its layers share one plane inside a stage.
 
 const MOST = 64; // CSS pixels per pixel of the picture
 
@@ -58,7 +58,7 @@ export class Plane {
   }
 
   zoomBy(factor, at = { x: this.stage.clientWidth / 2, y: this.stage.clientHeight / 2 }) {
-    // Keep what is under the pointer where it is.
+    // Keep the point under the pointer in place.
     const most = (MOST * this.width) / Math.max(1, this.stage.clientWidth);
     const scale = Math.min(Math.max(1, most), Math.max(1, this.scale * factor));
     const ratio = scale / this.scale;
@@ -68,7 +68,7 @@ export class Plane {
     this.#draw();
   }
 
-  // The share of the picture's width that lies left of a share of the stage's width.
+  // Converts a share of the stage's width to a share of the picture's width.
   shareAt(share) {
     const width = this.stage.clientWidth || 1;
     return Math.min(1, Math.max(0, (share * width - this.x) / (width * this.scale)));
@@ -83,7 +83,7 @@ export class Plane {
     return isIn ? { x: column, y: row } : null;
   }
 
-  // Marks a pixel, null for none; the plane moves where it lies beside the stage.
+  // Marks a pixel (null: no pixel), and scrolls it into the stage.
   setMark(point) {
     this.marked = point;
     if (point) {

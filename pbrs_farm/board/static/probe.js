@@ -1,4 +1,4 @@
-// What lies under the pointer: class, instance, metres, normal and colour of a pixel.
+// The pixel under the pointer: class, instance, depth, normal and colour.
 
 const BITS = { instance: 1, depth: 2, normal: 4, semantic: 8 };
 

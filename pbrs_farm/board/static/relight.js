@@ -33,7 +33,7 @@ async function start() {
   }
 }
 
-// tell: is told what is being done, once a second and at every piece that comes.
+// tell: called with the progress, once a second and after each piece.
 async function load(denoise, tell) {
   const { base, version } = stage.dataset;
   const began = Date.now();
@@ -267,7 +267,7 @@ const linearOf = (hex) =>
   [1, 3, 5].map((k) => parseInt(hex.slice(k, k + 2), 16) / 255).map((v) => (v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4));
 
 // Three factors of each layer, in the layers' order: a lamp's own times that of all lamps.
-// others: name of a control -> factors that stand for its own.
+// others: name of a control -> factors that replace its own.
 function factorsOf(controls, names, others = new Map()) {
   const found = new Map(controls.map((c) => [c.name, others.get(c.name) ?? c.factor()]));
   return names.flatMap((name) => {

@@ -136,7 +136,7 @@ function asLampOrSky(light) {
   return [others + warmth / 2, mean + (2 * tint) / 3, others - warmth / 2].map(Math.exp);
 }
 
-// The value below which a share of the numbers lies, between neighbours as numpy does. Reorders them.
+// A quantile of the numbers, interpolated as numpy does. Reorders them.
 export function percentile(values, share) {
   const at = share * (values.length - 1);
   const below = Math.floor(at);

@@ -103,7 +103,7 @@ function start() {
 
   function show() {
     const isTwo = Boolean(state.right);
-    // The wipe is a place on the stage: turn it into a share of the picture as it lies now.
+    // Convert the wipe's position on the stage to a share of the picture.
     const share = plane.shareAt(state.wipe);
     right.style.clipPath = `inset(0 0 0 ${(100 * share).toFixed(3)}%)`;
     seam.hidden = !isTwo;
