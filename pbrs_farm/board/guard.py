@@ -108,7 +108,7 @@ class Guard:
         address = (scope.get("client") or ("", 0))[0]
         # Health checks have no rate limit.
         if path != HEALTH and not self._rates.takes(address):
-            return _text_response(429, "too many requests: try again in a moment", {"Retry-After": "2"})
+            return _text_response(429, "too many requests: wait a little", {"Retry-After": "2"})
         if len(scope["raw_path"]) + len(scope["query_string"]) > self._options.limits.target_bytes:
             return _text_response(414, "the address is too long")
         if not self._is_our_host(headers.get("host", "")):
@@ -169,7 +169,7 @@ class Guard:
             return _text_response(401, "log in first: /login")
         word = form_values(body).get("form_word", "") or headers.get("x-form-word", "")
         if not self._sessions.is_form_word(session, word):
-            return _text_response(403, "the form belongs to another session: reload the page")
+            return _text_response(403, "the form is of another session: reload the page")
         return None
 
     def _is_our_host(self, host: str) -> bool:

@@ -35,14 +35,14 @@ def check_choice(case: HouseCase) -> None:
         return
     report = house.cameras.get("report", {})
     ids = [row["id"] for row in rows]
-    expect(len(set(ids)) == len(ids), "a view stands twice in cameras.json")
+    expect(len(set(ids)) == len(ids), "a view is listed twice in cameras.json")
     n_views = report.get("n_views")
     n_firsts = sum(not _eye(row) for row in rows)
     expect(n_views in (len(rows), n_firsts), f"reports {n_views} views of {len(rows)}")
     in_marker = house.marker_facts("cameras").get("views")
     if in_marker:
         same = in_marker == [[row["id"], row["room"], row["score"]] for row in rows]
-        expect(same, "the step's marker tells of other views")
+        expect(same, "the step's marker lists other views")
     _check_report(case, report)
     for row in rows:
         _check_view(case, row)
@@ -108,12 +108,12 @@ def _check_view(case: HouseCase, row: Mapping[str, Any]) -> None:
         same = floor < y < max(ceiling + _HEADROOM_M, floor + _EYE_M)
         is_free = row["origin"] == "walk" or "rig" in row
         same &= is_free or is_within(room["polygon"], np.array([x, z]))
-        expect(same, f"does not stand in room {row['room']}")
+        expect(same, f"is not in room {row['room']}")
     first = house.camera_rows.get(row["rig"]["instant"]) if _eye(row) else None
     if first is not None:
         # A rig is judged once an instant.
         same = (row["objects"], row["score"]) == (first["objects"], first["score"])
-        expect(same, "is judged otherwise than the rig's first camera")
+        expect(same, "has another score than the rig's first camera")
     if not row["objects"] or "lens" in row["intrinsics"] or first is not None:
         return
     if "rig" in row:
@@ -204,7 +204,7 @@ def _check_rig(case: HouseCase, row: Mapping[str, Any], place: str) -> None:
     """
     house, expect = case.house, case.tally.at("sequence", place)
     rig = row.get("rig")
-    if not expect(rig is not None, "tells of no rig, the recipe does"):
+    if not expect(rig is not None, "has no rig, but the recipe does"):
         return
     assert rig is not None
     instant, camera = str(rig["instant"]), str(rig["camera"])
@@ -216,7 +216,7 @@ def _check_rig(case: HouseCase, row: Mapping[str, Any], place: str) -> None:
     if house.recipe:
         cameras = rig_of_recipe(house.recipe)
         same = camera in cameras and (row["id"] == instant) == (camera == next(iter(cameras)))
-        fault = f"is told to be of camera {camera}, the recipe's has another place"
+        fault = f"names the camera {camera}, which has another place in the recipe"
         if expect(same, fault):
             pose = _rig_from_camera(cameras[camera])
             judge("rig camera", place, case.tally, rig=rig, pose=pose)

@@ -32,7 +32,7 @@ def check_darkness(case: ViewCase) -> None:
     room = str(case.view.table.get("room", ""))
     lux = _lux_of_rooms(case.house.illuminance).get(room)
     if lux is not None and lux < _DARK_LX:
-        note = f"stands in room {room}, which has {lux:.2g} lx by all light"
+        note = f"is in room {room}, which has {lux:.2g} lx by all light"
         case.tally.note(f"{case.place} {note}")
 
 

@@ -44,7 +44,7 @@ def denoised_light(view: StoredView, planes: Planes, tally: Tally) -> Planes | N
     try:
         pyoidn = _pyoidn()
     except ImportError:
-        tally.note(f"{view.place}: light was denoised, and pyoidn is not installed to do it again")
+        tally.note(f"{view.place}: light was denoised, but pyoidn is not installed to repeat it")
         return None
     # A panorama is denoised across its edge.
     n = min(64, planes["albedo"].shape[1]) if view.recipe.lens.model == "equirect" else 0

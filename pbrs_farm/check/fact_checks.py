@@ -167,10 +167,10 @@ def _check_layout(case: ViewCase) -> None:
             same = bool(np.abs(np.array(row["pixel"]) - pixel).max() <= slack)
         else:
             same = True
-        expect(same, f"lies at {row['pixel']}, here {pixel.tolist()}")
+        expect(same, f"is at {row['pixel']}, recomputed {pixel.tolist()}")
         depth = case.arrays["depth"]
         answers = _corner_visibility(pixel, float(z), depth) if is_in_front else {False}
-        fault = f"is told to be {'seen' if row['visible'] else 'hidden'}"
+        fault = f"is marked {'visible' if row['visible'] else 'hidden'}"
         expect(bool(row["visible"]) in answers, fault)
 
 
@@ -199,9 +199,9 @@ def _check_markers(case: ViewCase) -> None:
         # A marker without facts repeats nothing.
         for key in sorted(facts.keys() | modes.get(step, {}).keys()) if facts else ():
             same = modes.get(step, {}).get(key) == facts.get(key)
-            expect(same, f"modes.{step}.{key} is not what the step's marker tells")
+            expect(same, f"modes.{step}.{key} differs from the step's marker")
     for key, value in case.house.marker_facts("truth", name).get("table", {}).items():
-        expect(case.view.table.get(key) == value, f"{key} is not what the marker of truth tells")
+        expect(case.view.table.get(key) == value, f"{key} differs from the marker of truth")
 
 
 def _check_light_facts(case: ViewCase) -> None:

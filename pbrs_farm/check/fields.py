@@ -14,7 +14,7 @@ from typing import Any
 from pbrs_farm.check.stored_files import BadFile, object_from_json, stored_bytes
 from pbrs_farm.core.record import Record, read_csv
 
-UNOWNED = "no check knows it"
+UNOWNED = "no check covers it"
 
 
 class FieldRow(Record):

@@ -125,7 +125,7 @@ def check_credits(case: RootCase) -> None:
     for house in houses:
         for credit in _credits(house):
             by = f", by {credit['creator']}" if credit.get("creator") else ""
-            lines[f"- {credit['name']}{by}"] = credit.get("licence") or "no licence named"
+            lines[f"- {credit['name']}{by}"] = credit.get("licence") or "without licence"
     file = case.root / keys.ATTRIBUTION
     if not any(_requires_credit(licence) for licence in lines.values()):
         return
@@ -134,7 +134,7 @@ def check_credits(case: RootCase) -> None:
     except OSError:
         text = ""
     expect = case.tally.at("credits", keys.ATTRIBUTION)
-    if not expect(bool(text), "is missing, and works must be credited"):
+    if not expect(bool(text), "is missing, but works must be credited"):
         return
     stored = text.splitlines()
     for begin, licence in lines.items():
@@ -143,7 +143,7 @@ def check_credits(case: RootCase) -> None:
     for house in houses:
         line = house.house.get("source", {}).get("attribution", "")
         if line:
-            expect(line in text, f"does not carry: {line}")
+            expect(line in text, f"lacks: {line}")
 
 
 def _requires_credit(licence: str) -> bool:

@@ -69,8 +69,8 @@ def _check_items(house: StoredHouse, document: Mapping[str, Any], tally: Tally) 
         name = NYU40_NAMES[row["nyu40"]]
         judge("item", place, tally, node=node, extras=extras, row=row, moves=moves, none=[], name=name)  # fmt: skip
         is_room = row["room_id"] is None or row["room_id"] in house.rooms
-        expect(is_room, f"stands in {row['room_id']}, which is not a room")
-        expect(row["level_id"] in levels, "stands on no level")
+        expect(is_room, f"is in {row['room_id']}, which is not a room")
+        expect(row["level_id"] in levels, "is on no level")
         surfaces = [
             (s["n_vertices"], s["n_faces"], s["material"])
             for s in row["surfaces"]
@@ -79,7 +79,7 @@ def _check_items(house: StoredHouse, document: Mapping[str, Any], tally: Tally) 
         expect(_primitives(node, document) == surfaces, "has other surfaces in house.glb")
         # Outdoor items have a source class to themselves.
         is_outside = ("outside" in row["tags"]) == (row["source_class"] == "outside")
-        expect(is_outside, "is outside by its tags or its class alone")
+        expect(is_outside, "is outside by only one of its tags and its class")
 
 
 def _primitives(node: Mapping[str, Any], document: Mapping[str, Any]) -> list[tuple[int, ...]]:
@@ -99,7 +99,7 @@ def _check_materials(house: StoredHouse, document: Mapping[str, Any], tally: Tal
     """Names, kinds, colours and pictures of materials are those of house.glb."""
     rows, stored = house.house["materials"], document.get("materials", [])
     expect = tally.at("materials", house.id)
-    if not expect(len(rows) == len(stored), "are not as many"):
+    if not expect(len(rows) == len(stored), "differ in number"):
         return
     textures = house.house["textures"]
     texture_keys = {t["key"] for t in textures}
@@ -145,7 +145,7 @@ def _check_finish(
     alpha, mode = pbr["baseColorFactor"][3], material["alphaMode"]
     is_clear = row["kind"] in ("glass", "pane") or row["opacity"] < 1
     same = row["opacity"] >= 1 or abs(alpha - row["opacity"]) < 1e-6
-    expect((mode == "BLEND") == is_clear and same, "lets through what another does")
+    expect((mode == "BLEND") == is_clear and same, "has the cutout of another")
     cutoff = material.get("alphaCutoff", material["extras"].get("alphaCutoff", 0.5))
     same = (mode == "MASK" or "alphaCutoff" in material["extras"]) == bool(row["alpha_cutout"])
     same &= not row["alpha_cutout"] or abs(cutoff - row.get("alpha_cutoff", 0.5)) < 1e-6
@@ -221,7 +221,7 @@ def _check_source(house: StoredHouse, document: Mapping[str, Any], tally: Tally)
     # Ids of homes hold a digest of their source, apart from SUNCG's.
     if not keys.is_object(house.id) and source["kind"] != "suncg":
         same = source["sha256"][:8] in house.id.split("-") or _is_derived(house)
-        tally.expect("credits", house.id, same, "its id is not of that source")
+        tally.expect("credits", house.id, same, "its id does not match its source")
 
 
 CHECKS = (Check("house", "house", check_house, 1, ("house.json",)),)

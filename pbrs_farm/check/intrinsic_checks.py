@@ -53,10 +53,10 @@ def check_intrinsic(case: ViewCase) -> None:
     expect = case.expect("intrinsic layers")
     stated = sorted(modes.get("develop", {}).get("layers", []))
     layers = sorted(name for name in LAYERS if name in arrays)
-    expect(stated == layers, f"view.json tells of {stated}, there are {layers}")
+    expect(stated == layers, f"view.json lists {stated}, there are {layers}")
     split = sorted(modes.get("light", {}).get("layers", []))
     is_split = any(name.startswith("diffuse_") for name in channels)
-    expect(bool(split) == is_split, f"its light is told to be split for {split}")
+    expect(bool(split) == is_split, f"its light is marked as split for {split}")
     needed = "diffuse_outdoor diffuse_indoor diffuse_albedo"
     if not layers or not has_channels(channels, view.size, needed, "normal"):
         expect(not layers, "radiance.exr has no diffuse light")
@@ -140,7 +140,7 @@ def _check_sum(judge: _Judge, ending: str, raw: Mapping[str, F64]) -> None:
     """Albedo x shading + residual is radiance: to half a step if developed again, else by tiles."""
     arrays = judge.case.arrays
     if not {"albedo", f"shading{ending}"} <= arrays.keys():
-        judge.expect("intrinsic sum")(False, "has no albedo or no shading beside it")
+        judge.expect("intrinsic sum")(False, "lacks its albedo or shading")
         return
     shading = arrays[f"shading{ending}"].astype(np.float64)
     diffuse = linear_from_srgb(arrays["albedo"] / 255) * shading

@@ -35,11 +35,11 @@ def check_joints(case: HouseCase) -> None:
         expect(named == in_glb, "its surfaces are of other parts in house.glb")
         for joint in item.get("joints", []):
             expect = case.expect("joints", f"{place}/{joint['part']}")
-            expect(_is_sound(joint), "its axis, limits or mass are none")
+            expect(_is_sound(joint), "its axis, limits or mass are invalid")
             points = triangles.points_of(faces & triangles.is_part(joint["part"]))
             if joint["kind"] == "revolute" and len(points):
                 far = _off_axis(joint, points)
-                expect(far <= _NEAR_M, f"its axis passes it by {far:.2f} m")
+                expect(far <= _NEAR_M, f"its axis is off by {far:.2f} m")
 
 
 def _is_sound(joint: Mapping[str, Any]) -> bool:
@@ -87,7 +87,7 @@ def check_articulation(case: ViewCase) -> None:
             picture={"pixels": int(counts[number]), "box2d": box},
         )  # fmt: skip
     unknown = (rows.keys() & visible) - joints.keys()
-    expect(not unknown, f"parts {sorted(unknown)[:5]} are none of house.json")
+    expect(not unknown, f"parts {sorted(unknown)[:5]} are not in house.json")
 
 
 CHECKS = (

@@ -93,7 +93,7 @@ def _check_variants(case: ViewCase, recipe: Recipe, rows: Any, light: Planes) ->
     by_recipe = [f"mlt_il_ol.{n}.png" for n in range(1, recipe.tone.variants + 1)]
     stated = [row.get("file") if isinstance(row, dict) else None for row in rows]
     files = sorted(path.name for path in case.view.folder.glob("mlt_il_ol.*.png"))
-    fault = f"view.json tells of the variants {stated}, the recipe asks for {by_recipe}, there are {files}"  # fmt: skip
+    fault = f"view.json lists the variants {stated}, the recipe {by_recipe}, there are {files}"  # fmt: skip
     if not case.expect("light developed")(stated == by_recipe == files, fault):
         return
     for n, row in enumerate(rows, 1):
@@ -111,7 +111,7 @@ def _check_errors(case: ViewCase, stated: Mapping[str, Any], camera: PictureCame
     drawn: dict[str, Any] = {"camera": None, "tone": None}
     if camera.name != "neutral":
         drawn = {"camera": camera.name, "tone": {n: getattr(camera.tone, n) for n in names}}
-    fault = f"view.json tells of its camera {in_table}, the recipe draws {drawn}"
+    fault = f"view.json has the camera {in_table}, the recipe draws {drawn}"
     case.expect("light developed")(in_table == drawn, fault)
 
 
@@ -157,7 +157,7 @@ class _Shot:
             gains = min(either, key=lambda g: float(np.abs(stated_gains - g).max()))
         exposure = exposure_of(finite_light(total * gains), tone)
         expect = self.case.expect("light developed", self.file)
-        if not expect(is_stated, "view.json does not tell three gains and an exposure"):
+        if not expect(is_stated, "view.json lacks three gains and an exposure"):
             return gains, exposure
         stated_exposure = float(stated["exposure"])
         off_exposure = (
@@ -166,7 +166,7 @@ class _Shot:
             else abs(stated_exposure / exposure - 1)
         )
         off = float(np.max([np.abs(stated_gains - gains).max(), off_exposure]))
-        is_near = expect(off <= slack, f"view.json tells other factors, by {off:.4f}")
+        is_near = expect(off <= slack, f"view.json has other factors, by {off:.4f}")
         return (stated_gains, stated_exposure) if is_near else (gains, exposure)
 
     def _off_sensor(self, exposure: float) -> float:

@@ -330,7 +330,7 @@ def _check_level(case: ViewCase, places: _Places) -> None:
         if max(stored, level) >= _LEAST_FLOOR_LX:
             most = level * _LEVEL + (sun_lx if group == "outdoor" else 0.0)
             same = level / _LEVEL <= stored <= most
-            fault = f"{group} light brings {level:.3g} lx to the floor that it shows, told {stored:.3g}"  # fmt: skip
+            fault = f"{group} light brings {level:.3g} lx to the visible floor, stored {stored:.3g}"  # fmt: skip
             case.expect("levels", "radiance.exr")(same, fault)
 
 

@@ -34,7 +34,7 @@ def _methods(of: str) -> dict[str, str]:
 
 # Facts that no file of a root holds.
 _NEVER = (
-    "levels of light, but for bulbs that are seen and what sun and bulbs bring at least: no light is traced",
+    "levels of light, except visible bulbs and the minimum from sun and bulbs: no light is traced",
     "house.glb and house.json against their source, which is not stored",
 )
 
@@ -82,7 +82,7 @@ def not_looked_at(
     if n_halved:
         lines.append(
             f"light of {n_halved} views was denoised again at half its size: compared by tiles of 32 px; "
-            "--all denoises it as it stands"
+            "--all repeats it at full size"
         )
     return (*lines, *_NEVER)
 

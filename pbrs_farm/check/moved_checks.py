@@ -25,19 +25,19 @@ def check_motions(case: HouseCase) -> None:
         exists = bool(row) and (joint is not None or not part)
         is_first = name not in names
         names.add(name)
-        if not expect(exists and is_first, "moves nothing of its own"):
+        if not expect(exists and is_first, "has no moving part"):
             continue
         times, values = np.array(motion["times_s"]), np.array(motion["values"], np.float64)
         shaped = values.shape == (len(times), 1 if part else 7) and len(times) > 0
         ascends = shaped and (np.diff(times) > 0).all() and np.isfinite(values).all()
-        if not expect(ascends, "has times or values that are none"):
+        if not expect(ascends, "has invalid times or values"):
             continue
         if joint is not None:
             low, high = joint["lower"] - _UNIT, joint["upper"] + _UNIT
             expect(((values >= low) & (values <= high)).all(), "leaves the joint's limits")
         else:
             off = np.abs(np.linalg.norm(values[:, 3:], axis=1) - 1).max()
-            expect(off <= _UNIT, "has a turn that is none")
+            expect(off <= _UNIT, "has an invalid rotation")
             off = np.abs(np.array(motion["pivot"], np.float64)).max()
             expect(off < _FARTHEST_M, "turns about a place far away")
 
@@ -47,7 +47,7 @@ def check_motion_table(case: ViewCase) -> None:
     motions = case.house.house.get("motions", [])
     table, time_s = case.view.table.get("motion"), case.view.table.get("time_s")
     moves = bool(motions) and time_s is not None
-    fault = "tells nothing of what moves" if moves else "tells of motions where nothing moves"
+    fault = "lacks its motions" if moves else "has motions, but nothing moves"
     expect = case.expect("motions")
     if not expect((table is not None) == moves, fault) or table is None or time_s is None:
         return
@@ -58,7 +58,7 @@ def check_motion_table(case: ViewCase) -> None:
     items = [(r["instance"], r["item"]) for r in table["bodies"]]
     same = parts == [(instances[m["item"]], m["item"], m["part"]) for m in joints]
     same &= items == [(instances[m["item"]], m["item"]) for m in bodies]
-    if not expect(same, "names other things than house.json"):
+    if not expect(same, "names other items than house.json"):
         return
     for row, motion in zip(table["joints"], joints, strict=True):
         value = joint_value(motion, time_s)

@@ -47,7 +47,7 @@ def check_pairs(case: HouseCase) -> None:
         expect(False, f"cannot be read: {error}")
         return
     names = {row[key] for row in rows for key in ("view_a", "view_b")}
-    if not expect(names <= views.keys(), "names views that are none"):
+    if not expect(names <= views.keys(), "names unknown views"):
         return
     rng = np.random.default_rng(zlib.crc32(case.house.id.encode()))
     chosen = rng.permutation(len(rows))[:_MOST_PAIRS]

@@ -46,7 +46,7 @@ def check_edges(case: ViewCase) -> None:
         as_stored = _fit(outline, edges)
         for name, copy in copies.items():
             fit = _fit(outline, copy)
-            fault = f"fits the instances better {name} ({fit:.3f}) than as it is ({as_stored:.3f})"
+            fault = f"fits the instances better {name} ({fit:.3f}) than as stored ({as_stored:.3f})"
             case.expect("opengl edges", f"{mode}.png")(fit <= as_stored + _FIT, fault)
 
 

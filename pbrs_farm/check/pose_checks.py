@@ -34,7 +34,7 @@ def check_pose(case: ViewCase) -> None:
     shaped = opencv.shape == opengl.shape == (4, 4) and k.shape == (3, 3)
     if not expect(shaped, "not (4, 4) poses and a (3, 3) K"):
         return
-    expect(is_rotation(opencv[:3, :3]), "the rotation is none")
+    expect(is_rotation(opencv[:3, :3]), "the rotation is invalid")
     agree = np.abs(opencv_pose(opengl) - opencv).max() < 1e-9
     expect(agree, "the OpenGL and OpenCV poses differ")
     height, width = view.size
@@ -64,7 +64,7 @@ def check_reprojection(case: HouseCase) -> None:
         for b in partners:
             n, wrong = _count_in_front(points[a], views[b].view, nearest[b])
             place = f"{first.view.place} in {views[b].view.place}"
-            fault = f"{wrong} of {n} points lie before what is seen there"
+            fault = f"{wrong} of {n} points are in front of the visible surface"
             case.tally.tolerate("reprojection", place, n, wrong, max(2, _MAX_WRONG * n), fault)
 
 

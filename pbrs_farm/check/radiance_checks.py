@@ -210,7 +210,7 @@ def check_fit(case: ViewCase) -> None:
         slack = (_TIE_SIGMAS if name == "all light" else _GROUP_SIGMAS) * error
         expect = case.expect("light edges", "radiance.exr")
         for word, moved_slope in slopes.items():
-            fault = f"{name} fits the albedo better {word} ({moved_slope:.2f}) than as it is ({slope:.2f})"  # fmt: skip
+            fault = f"{name} fits the albedo better {word} ({moved_slope:.2f}) than in place ({slope:.2f})"  # fmt: skip
             expect(moved_slope <= slope + slack, fault)
         if name == "all light":
             fault = f"{name} does not follow the albedo: {slope:.2f} +- {error:.2f}"

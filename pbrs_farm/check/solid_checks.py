@@ -42,7 +42,7 @@ def check_solids(case: HouseCase) -> None:
     for name, room in house.rooms.items():
         if room["has_floor"]:
             share = _share_of_floor(room, case.rest.rays)
-            fault = f"its floor lies elsewhere below {1 - share:.0%} of it"
+            fault = f"its floor is at another height below {1 - share:.0%} of it"
             case.expect("rooms", f"room {name}")(share >= _FLOOR_SHARE, fault)
 
 
@@ -64,7 +64,7 @@ def check_floating(case: HouseCase) -> None:
     touching |= set(triangles.instance[face[face >= 0]].tolist())
     for instance in hung:
         expect = case.expect("floating", f"item {house.items[instance]['id']}")
-        expect(instance not in touching, "is said to hang, and touches")
+        expect(instance not in touching, "is marked as hanging, but touches")
 
 
 def _edges(triangles: Triangles, chosen: Bools) -> tuple[F64, F64]:
@@ -98,17 +98,17 @@ def _check_lights(case: HouseCase, instance: int) -> None:
     judge("lights of an item", place, case.tally, total=total)
     for k, light in enumerate(row["lights"]):
         exist = all(0 <= n < len(row["surfaces"]) for n in light["emitting"])
-        if not expect(exist, "shines by a surface that it has not"):
+        if not expect(exist, "emits from a missing surface"):
             continue
         materials = {row["surfaces"][n]["material"] for n in light["emitting"]}
         kinds = {house.house["materials"][m]["kind"] for m in materials}
-        expect(kinds <= {"bulb"}, f"shines by what is {sorted(kinds)}")
+        expect(kinds <= {"bulb"}, f"emits from {sorted(kinds)}")
         points = case.rest.triangles.points_of_surfaces(instance, light["emitting"])
         if len(points):
             low, high = points.min(0), points.max(0)
             outside = np.maximum(np.maximum(low - light["position"], light["position"] - high), 0)
             off = float(np.linalg.norm(outside))
-            fault = f"light {k} stands {off:.2f} m beside what shines"
+            fault = f"light {k} is {off:.2f} m from its emitter"
             expect(off <= _LIGHT_M + light["radius_m"], fault)
         source = measured.get((row["id"], k))
         if source is not None:

@@ -83,12 +83,12 @@ def check_tracks(case: HouseCase) -> None:
         if "frame" in row and not Shot.of_row(row["id"], row).eye
     ]
     film = [str(row["id"]) for row in sorted(rows, key=lambda row: int(row["frame"]))]
-    if not expect(shaped, "its arrays do not fit each other"):
+    if not expect(shaped, "its arrays have inconsistent shapes"):
         return
     if not expect(tracks["frames"].tolist() == film, "is of other frames"):
         return
     query = tracks["query_frame"]
-    if not expect(((query >= 0) & (query < t)).all(), "begins nowhere"):
+    if not expect(((query >= 0) & (query < t)).all(), "has no start"):
         return
     stored = {v.view.folder.name: v.view for v in case.views}
     views = {k: stored[name] for k, name in enumerate(film) if name in stored}
@@ -126,7 +126,7 @@ def _check_group(film: _Film, frame: int, index: I64) -> None:
     n_other = int((~same).sum())
     film.tally.add("tracks", len(index), ties=n_other)
     if n_other > max(2, 0.005 * len(index)):
-        fault = f"{n_other} of {len(index)} points of {name} lie on nothing that is there"
+        fault = f"{n_other} of {len(index)} points of {name} are on no surface"
         film.tally.fail("tracks", film.place, fault)
     index, face, z, directions = index[same], face[same], z[same], directions[same]
     points = origin + z[:, None] * directions

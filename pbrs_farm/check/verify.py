@@ -51,7 +51,7 @@ def verify(
     folders = [p for name in keys.FOLDERS for p in (folder / name).glob("*") if p.is_dir()]
     houses = sorted(folders, key=lambda p: p.name)
     if not houses:
-        raise BadInput(folder, "houses/", "no houses here", hint="give the folder of --out")
+        raise BadInput(folder, "houses/", "no houses here", hint="give an output folder")
     tally, views, n_halved = Tally(), list[StoredView](), 0
     # None is every pixel.
     n_pixels = None if all_pixels else (SAMPLE if sample is None else sample)
@@ -160,5 +160,5 @@ def _is_halved(view: StoredView, n_pixels: int | None) -> bool:
 def _judge_ties(tally: Tally) -> None:
     checked, ties = tally.totals("ray: instance")
     if checked and ties > max(2, MAX_TIES * checked):
-        fault = f"{ties} of {checked} pixels have another right answer"
+        fault = f"{ties} of {checked} pixels have a second correct answer"
         tally.expect("ties", "all views", False, fault)

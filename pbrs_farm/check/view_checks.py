@@ -134,7 +134,7 @@ def check_planes(case: ViewCase) -> None:
         predicted = near * first / second
         slack = _ROUNDING_M * (1 + np.abs(predicted / near)) + _NORMAL_ERROR * far / np.abs(second)
         off = int((~(np.abs(predicted - far) <= slack)).sum())
-    fault = f"{off} of {len(near)} neighbours do not lie on the plane of their normal"
+    fault = f"{off} of {len(near)} neighbours are not on the plane of their normal"
     most = max(10, _MAX_OFF * len(near))
     case.tally.tolerate("depth on planes", case.place, len(near), off, most, fault)
 

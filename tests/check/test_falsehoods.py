@@ -199,8 +199,8 @@ def test_a_new_field_and_a_new_layer_are_told_of_as_not_looked_at(
     for name in ("LAYERS", "OWN_LAYERS"):
         monkeypatch.setattr(methods, name, (*getattr(layers, name), new))
     lines = verify(root, sample=10).not_looked_at
-    assert "view.json instances[].weight_kg, modes.light.sky.moon_lx: no check knows it" in lines
-    assert "house.json rooms[].wallpaper: no check knows it" in lines
-    assert "cameras.json views[].focus_m: no check knows it" in lines
+    assert "view.json instances[].weight_kg, modes.light.sky.moon_lx: no check covers it" in lines
+    assert "house.json rooms[].wallpaper: no check covers it" in lines
+    assert "cameras.json views[].focus_m: no check covers it" in lines
     assert "incidence.png (1): hash, size and type alone" in lines
     assert methods.unowned_layers() == [new.file]

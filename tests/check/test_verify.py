@@ -146,4 +146,4 @@ def test_a_picture_that_all_light_leaves_black_fails_and_a_dark_room_is_noted(ro
     count = certificate.counts["black pictures"]
     assert (count.checked, count.failed) == (2, 1)
     assert any(f"black pictures: {house.name}/v0: all light" in f for f in certificate.failures)
-    assert any("v1 stands in room 0_0, which has 0.4 lx" in n for n in certificate.notes)
+    assert any("v1 is in room 0_0, which has 0.4 lx" in n for n in certificate.notes)
