@@ -306,10 +306,10 @@ def _demo(args: argparse.Namespace) -> int:
 
 
 _NEXT = """
-Open {out}/index.html in a browser. What to do next:
-  pbrs-farm board {out}                  every layer, sliders for daylight and lamps, the home in 3D
-  pbrs-farm verify {out}                 a certificate for the labels
-  pbrs-farm run MY-HOME.sh3d --dress 1   a home of your own; `pbrs-farm homes` lists nine"""
+Open {out}/index.html in a browser. Next:
+  pbrs-farm board {out}                  show every layer, relight views, the home in 3D
+  pbrs-farm verify {out}                 check all labels
+  pbrs-farm run MY-HOME.sh3d --dress 1   render your home; `pbrs-farm homes` lists nine"""
 
 
 def _demo_dressing(args: argparse.Namespace) -> str | None:

@@ -116,7 +116,7 @@ def class_map(table: str | Path | ClassMap) -> ClassMap:
     for line, cells in _cells(path):
         row = _table_row(path, line, cells)
         if row.word in rows:
-            text = f"{_quoted(row.word)} stands in line {line_of[row.word]} already"
+            text = f"{_quoted(row.word)} is already in line {line_of[row.word]}"
             raise BadInput(path, f"line {line}", text, hint="the first row that fits wins")
         if row.id and name_of.setdefault(row.id, row.name) != row.name:
             text = f"class {row.id} is {_quoted(row.name)}, but {_quoted(name_of[row.id])} above"

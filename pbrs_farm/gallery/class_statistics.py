@@ -53,10 +53,10 @@ class ClassStatistics(Record):
             share, images = f"{100 * r.pixel_share:.2f} %", f"{r.n_images} of {self.n_views}"
             lines.append(f"| {r.name} | {r.nyu40} | {share} | {images} | {per_image:.1f} |")
         if self.unmapped:
-            lines += ["", "Without a class of their own (otherprop):"]
+            lines += ["", "Without a class (otherprop):"]
             lines += [f"- {line}" for line in self.unmapped]
         if self.decisions:
-            lines += ["", "What decided the classes, the least sure first:", ""]
+            lines += ["", "Rules that assigned the classes, least certain first:", ""]
             lines.append(decisions_text(self.decisions))
         return "\n".join(lines)
 

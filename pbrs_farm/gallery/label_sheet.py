@@ -70,7 +70,7 @@ def _best_picture(view: ViewEntry) -> Srgb8Image:
     for mode in PICTURES:
         if view.file(f"{mode}.png"):
             return np.asarray(_read_label(view, f"{mode}.png")[..., :3], np.uint8)
-    raise BadInput(view.folder, "", "has no picture to lay labels over")
+    raise BadInput(view.folder, "", "has no picture under the labels")
 
 
 def _read_label(view: ViewEntry, file: str) -> NDArray[Any]:

@@ -120,4 +120,4 @@ def _mat_numbers(path: Path, name: str) -> NDArray[np.int64]:
     try:
         return np.asarray(loadmat(path)[name], np.int64).ravel()
     except Exception:  # noqa: BLE001  scipy raises many kinds of errors for another file
-        raise BadInput(path, name, "not the MATLAB 5 file that was expected") from None
+        raise BadInput(path, name, "not the expected MATLAB 5 file") from None

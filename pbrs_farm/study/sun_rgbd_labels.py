@@ -66,12 +66,12 @@ def _rows_of_scenes(path: Path) -> Mapping[str, int]:
     from scipy.io import loadmat
 
     if not path.is_file():
-        raise BadInput(path, "", "needed beside SUNRGBD2Dseg.mat: it tells which row is whose")
+        raise BadInput(path, "", "needed with SUNRGBD2Dseg.mat: it maps its rows to scenes")
     try:
         scenes = loadmat(path, squeeze_me=True, struct_as_record=False)["SUNRGBDMeta"]
         paths = [str(scene.rgbpath) for scene in np.atleast_1d(scenes)]
     except Exception:  # noqa: BLE001  scipy raises many kinds of errors for another file
-        raise BadInput(path, "SUNRGBDMeta", "not the MATLAB 5 file that was expected") from None
+        raise BadInput(path, "SUNRGBDMeta", "not the expected MATLAB 5 file") from None
     # Each is /n/fs/sun3d/data/SUNRGBD/<scene>/image/NAME.jpg.
     parts = [[part for part in path.split("/") if part] for path in paths]
     return {

@@ -145,13 +145,13 @@ class LightScene:
 
     def _check_moving(self, house: House) -> None:
         if self.variant.startswith("scalar"):
-            text = f"light of things that move needs LLVM or CUDA, this is {self.variant}"
+            text = f"moving items need LLVM or CUDA, this is {self.variant}"
             raise MachineFailed(text, hint="sudo apt-get install -y libllvm19")
         moving = {motion.item for motion in house.motions}
         for item in house.items:
             if item.lights and item.id in moving:
                 text = "is a lamp that moves: its light would not follow"
-                raise BadHouse(house.source.file, item.id, text, hint="let it stand still")
+                raise BadHouse(house.source.file, item.id, text, hint="make it static")
 
     @property
     def n_lamps(self) -> int:

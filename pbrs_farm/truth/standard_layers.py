@@ -86,7 +86,7 @@ def check_instances(house: House) -> None:
             house.source.file,
             "items",
             f"{len(house.items)} items, but a 16-bit instance layer holds {MAX_INSTANCES}",
-            hint="split the house, or merge parts that need no label of their own",
+            hint="split the house, or merge parts that need no separate label",
         )
 
 

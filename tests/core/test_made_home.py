@@ -30,7 +30,7 @@ def test_a_word_says_all_of_its_home() -> None:
         ("made:9..3", "downwards"),
         ("made:99999999999", "above 2147483647"),
         ("made:1,rooms=5", "above 4"),
-        ("made:1,walls=3", "no option"),
+        ("made:1,walls=3", "not an option"),
         ("made:1,storeys=3", "one storey or two"),
         ("made:1,plans=castle", "no such family of plans.*alpine"),
         ("made:1,storeys=2,rooms=1", "2 to 4 bedrooms"),

@@ -72,7 +72,7 @@ def test_a_class_of_parts_of_the_building_alone_is_structure(tmp_path):
         (["chair,-1,a"], "line 2: id '-1'"),
         (["chair,1,"], "line 2: class 1 has no name"),
         (["chair,1,a\x1bb"], "line 2: name .* cannot be printed"),
-        (["", "# x", "chair,1,a", "Chair,1,a"], "line 5: 'chair' stands in line 4 already"),
+        (["", "# x", "chair,1,a", "Chair,1,a"], "line 5: 'chair' is already in line 4"),
         (["chair,1,a", "sofa,1,b"], "line 3: class 1 is 'b', but 'a' above"),
         (["chair,1,a", "sofa,2,a"], "line 3: 'a' is class 2, but 1 above"),
         (['chair,1,"a'], "line 2: is not valid CSV"),

@@ -110,7 +110,7 @@ def test_what_training_on_it_needs_is_said(mat: Path) -> None:
     with pytest.raises(BadInput, match="NYUv2 trains alone"):
         training_views(TrainingSource((str(mat), "root")), plan)
     (mat.parent / "splits.mat").write_bytes(b"no matrix")
-    with pytest.raises(BadInput, match="not the MATLAB 5 file"):
+    with pytest.raises(BadInput, match="not the expected MATLAB 5 file"):
         training_views(TrainingSource((str(mat),)), plan)
     (mat.parent / "splits.mat").unlink()
     with pytest.raises(BadInput, match=r"splits.mat.*needed beside"):

@@ -391,6 +391,6 @@ def described_in(modules: Iterable[ModuleType], kind: type[D]) -> dict[str, D]:
             if not isinstance(value, kind) or value.build.__module__ != module.__name__:
                 continue
             if value.name in result:
-                raise BadInput(module.__name__, value.name, "is the name of another thing already")
+                raise BadInput(module.__name__, value.name, "is already the name of another object")
             result[value.name] = value
     return result

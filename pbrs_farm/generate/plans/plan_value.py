@@ -216,7 +216,7 @@ def _apart(drawn: list[DrawnRoom], left_out: LeftOut) -> list[DrawnRoom]:
         if room.shape.intersection(taken).area > 1e-4:
             shape = largest_part(room.shape.difference(taken))
             if shape is None or shape.area < _LEAST_M2:
-                left_out.add("a room lies within others", room.place)
+                left_out.add("a room is inside others", room.place)
                 continue
             if room.shape.area - shape.area > 0.05:
                 left_out.add("a room overlaps another, which keeps what they share", room.place)
@@ -227,7 +227,7 @@ def _apart(drawn: list[DrawnRoom], left_out: LeftOut) -> list[DrawnRoom]:
                 ]
                 for j in inner:
                     del rest[j]
-                    left_out.add("a room lies inside another", drawn[j].place)
+                    left_out.add("a room is inside another", drawn[j].place)
             room = room._replace(shape=Polygon(corners(Polygon(shape.exterior).simplify(1e-3))))
         rest[k] = room
         taken = unary_union([taken, room.shape])
@@ -321,7 +321,7 @@ class _Openings:
         if self.is_of_machine and kind is OpeningKind.DOOR and is_outer:
             kind = OpeningKind.ENTRANCE
         if self.is_of_machine and wall.height is not None and sill + tall > wall.height:
-            raise BadInput(self.path, place, "stands in a parapet")
+            raise BadInput(self.path, place, "is in a parapet")
         self.found.append(
             PlanOpening(
                 kind,

@@ -116,7 +116,7 @@ def _opening_of_hole(
     a, b = sorted(wall.polygon, key=lambda p: p.y)[:2]
     length = math.hypot(b.x - a.x, b.z - a.z)
     if length < 1e-6:
-        left_out.add(f"a {kind} stands in a wall without length", str(hole.id)[:60])
+        left_out.add(f"a {kind} is in a wall without length", str(hole.id)[:60])
         return None
     low, high = min(p.x for p in points), max(p.x for p in points)
     bottom, top = min(p.y for p in points) - a.y, max(p.y for p in points) - a.y

@@ -105,7 +105,7 @@ def opened_library(path: Path, catalogue: str, notes: LibraryNotes) -> OpenedLib
         notes.add("damaged-library", path.name, error.message)
         return None
     if data is None:
-        notes.add("damaged-library", path.name, f"holds no {catalogue}")
+        notes.add("damaged-library", path.name, f"has no {catalogue}")
         return None
     return OpenedLibrary(contents, sha256, parse_properties(data))
 

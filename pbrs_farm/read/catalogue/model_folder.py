@@ -103,11 +103,11 @@ def _models(path: Path, table: ModelTable) -> list[ObjectModel]:
         files = [path / file for file in table.rows]
         models = [ObjectModel(f.stem, f.stem, "", 0, f, path) for f in files]
         if not models:
-            raise BadInput(path, "", "no model found", hint="its table names none that is there")
+            raise BadInput(path, "", "no model found", hint="no model of its table exists")
     else:
         models = [m for m in find_models([path]) if not m.entry]
     if len(models) > MOST_MODELS:
-        raise BadInput(path, "", f"holds {len(models)} models, at most {MOST_MODELS} are read")
+        raise BadInput(path, "", f"has {len(models)} models, more than {MOST_MODELS}")
     return models
 
 
@@ -157,7 +157,7 @@ def _find_rule_and_size(
             smaller = (width * unit, depth * unit, height * unit)
             smaller_rule = _rule_by_words(name, row, category, smaller)
             if smaller_rule is not None and smaller_rule.fits("", smaller):
-                notes.add("other-unit", place, f"is told in {words}")
+                notes.add("other-unit", place, f"is in {words}")
                 return smaller_rule, smaller
     if rule is None:
         notes.add("unmapped-class", place, f"no group for {name!r} of {_size_text(size)}: left out")

@@ -95,9 +95,7 @@ def _read_model_table(path: Path, name: str, read: Any, notes: LibraryNotes) -> 
     if table.is_whole:
         missing = [file for file in table.rows if not (path / file).is_file()]
         if missing:
-            text = (
-                f"{len(missing)} of its {len(table.rows)} models are not there, {missing[0]} first"
-            )
+            text = f"{len(missing)} of its {len(table.rows)} models are missing, e.g. {missing[0]}"
             notes.add("missing-models", name, text)
         return ModelTable({k: v for k, v in table.rows.items() if k not in set(missing)}, True)
     return table
@@ -215,7 +213,7 @@ def _objathor(path: Path, name: str, notes: LibraryNotes) -> ModelTable:
     """objathor: id -> annotation with its category; GLB beside it or in assets/. Pickles are refused."""
     rows = bounded_json(_data(path / name), name)
     if not isinstance(rows, dict):
-        raise ValueError("holds no annotations by id")
+        raise ValueError("has no annotations by id")
     models, pickles = {}, 0
     for uid, row in rows.items():
         if not (_is_plain(uid) and isinstance(row, dict)):
@@ -232,7 +230,7 @@ def _objathor(path: Path, name: str, notes: LibraryNotes) -> ModelTable:
         label = NYU40_NAMES[label_class.nyu40] if label_class and label_class.nyu40 > 0 else ""
         models[file or ways[0]] = ModelRow(name=words, label=label or words, creator="objathor")
     if pickles:
-        text = f"{pickles} models are pickles, which may hold programs: convert them to GLB"
+        text = f"{pickles} models are pickles, which may contain programs: convert them to GLB"
         notes.add("refused-pickles", name, text)
     return ModelTable(models, is_whole=True)
 

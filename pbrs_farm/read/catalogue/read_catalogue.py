@@ -121,7 +121,7 @@ def _given(
     elif path.suffix.lower() == ".sh3f":
         library = _read_furniture_library(path, notes, FURNITURE)
     else:
-        hint = ".sh3f, .sh3t or a folder of OBJ and GLB, or of pictures, is read"
+        hint = "supported: .sh3f, .sh3t, a folder of OBJ and GLB, a folder of pictures"
         raise BadInput(path, "", "is not a catalogue", hint=hint)
     if not may_be_empty and (library is None or not (library.pieces or library.pictures)):
         why = next((n.text for n in [*notes.found][n_before:]), "")

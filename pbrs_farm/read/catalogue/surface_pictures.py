@@ -101,7 +101,7 @@ def texture_library(
         return None
     pictures = tuple(_pictures_of_library(opened, path.stem, notes))
     if not pictures:
-        notes.add("no-classes", path.name, "no picture of the library is of a known kind")
+        notes.add("no-classes", path.name, "no picture of the library has a known name")
     return opened.sha256, pictures
 
 
@@ -206,7 +206,7 @@ def picture_folder(path: Path, notes: LibraryNotes) -> tuple[str, tuple[Picture,
         digest.update(keys.sha256(data).encode())
         pictures.append(Picture(texture, PRINTS, (_WIDTH_M, _WIDTH_M / aspect)))
     if len(files) > MOST_PICTURES:
-        notes.add("many-pictures", path.name, f"{len(files)} pictures: {MOST_PICTURES} are used")
+        notes.add("many-pictures", path.name, f"{len(files)} pictures, {MOST_PICTURES} are used")
     return digest.hexdigest(), tuple(pictures)
 
 

@@ -24,6 +24,6 @@ def bounded_json(data: bytes, file: str) -> Any:
     n_groups = data.count(b"{") + data.count(b"[")
     n_values = data.count(b",")
     if n_groups > _MOST_GROUPS or n_values > _MOST_VALUES:
-        text = f"holds {n_groups} objects and lists and {n_values} values, more than any house"
+        text = f"has {n_groups} objects and lists and {n_values} values, more than any house"
         raise BadHouse(file, "", text)
     return json_from_bytes(data, file)

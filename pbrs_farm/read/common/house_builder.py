@@ -105,5 +105,5 @@ class HouseBuilder:
         for item in self.items:
             # Refuse numbers that are not finite, too: the comparison is false for them.
             if item.surfaces and not float(np.abs(item.bounds).max()) <= self.fields.max_extent_m:
-                text = f"stands farther than {self.fields.max_extent_m:g} m from the origin"
+                text = f"is farther than {self.fields.max_extent_m:g} m from the origin"
                 raise BadHouse(self.file, item.id, text, hint="limit: read.max_extent_m")

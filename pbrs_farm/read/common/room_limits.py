@@ -16,7 +16,7 @@ MAX_ROOMS: Final = 500
 MAX_OVERLAPS: Final = 500
 """Pairs of rooms of a level that share some floor; a home has a few."""
 
-HINT: Final = "remove what is drawn over itself, hide levels, or split the home into several"
+HINT: Final = "remove duplicate rooms, hide levels, or split the home"
 _MIN_SHARED_M2: Final = 0.05
 
 
@@ -37,7 +37,7 @@ def check_outlines(by_level: Mapping[str, Sequence[Points2]], file: str) -> None
     check_number(sum(map(len, by_level.values())), file)
     n_overlaps = sum(map(_count_overlaps, by_level.values()))
     if n_overlaps > MAX_OVERLAPS:
-        text = f"{n_overlaps} pairs of rooms overlap, at most {MAX_OVERLAPS} are taken apart"
+        text = f"{n_overlaps} pairs of rooms overlap; the maximum is {MAX_OVERLAPS}"
         raise BadHouse(file, "rooms", text, hint=HINT)
 
 

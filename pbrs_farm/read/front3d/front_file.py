@@ -101,7 +101,7 @@ def front_file(data: bytes, file: str, notes: Notes) -> FrontFile:
     scene = value.get("scene")
     if not value.get("mesh") or not isinstance(scene, dict) or not scene.get("room"):
         missing = next(k for k in ("mesh", "scene.room") if k != "mesh" or not value.get("mesh"))
-        raise BadHouse(file, missing, "is missing or empty: there is no house in it", hint=_HINT)
+        raise BadHouse(file, missing, "is missing or empty", hint=_HINT)
     rows = {k: _rows_of_key(value, k, file) for k in ("mesh", "furniture", "material", "lights")}
     rooms, children = _parse_front_rooms(scene, file, notes)
     room_of = {str(c["ref"]): room for room, c, _ in reversed(children)}
@@ -145,7 +145,7 @@ def _parse_front_rooms(
         place = f"scene.room[{k}]"
         name = str(row.get("instanceid") or f"room {k}")[:80]
         if name in rooms:
-            notes.add("duplicate-id", place, f"a second room is called {name!r}")
+            notes.add("duplicate-id", place, f"two rooms are named {name!r}")
             name = f"{name}.{k}"
         rooms[name] = FrontRoom(name, str(row.get("type", ""))[:60], row.get("empty") in (1, True))
         for j, child in enumerate(_rows_of_key(row, "children", file)):
@@ -168,7 +168,7 @@ def numbers(value: Any, n: int, file: str, place: str) -> F64:
     if vector.ndim != 1 or (n and len(vector) != n):
         raise BadHouse(file, place, f"expected {n or 'a flat list of'} numbers")
     if not (np.isfinite(vector) & (np.abs(vector) < 1e12)).all():
-        raise BadHouse(file, place, "holds a number that is not finite or absurdly large")
+        raise BadHouse(file, place, "has a number that is not finite, or too large")
     return vector
 
 
@@ -196,7 +196,7 @@ def _meshes(
             if np.array_equal(meshes[uid].points[meshes[uid].faces], points[faces]):
                 notes.add("duplicate-id", place, f"a copy of mesh {uid[:80]!r}; left out")
                 continue
-            notes.add("duplicate-id", place, f"a second mesh is called {uid[:80]!r}")
+            notes.add("duplicate-id", place, f"two meshes are named {uid[:80]!r}")
             key = f"{uid} ({place})"
         uvs = None
         if row.get("uv"):

@@ -92,7 +92,7 @@ def _check_extensions(gltf: Gltf) -> None:
     required = gltf.document.get("extensionsRequired", [])
     for name in required if isinstance(required, list) else []:
         if name not in UNDERSTOOD:
-            text, hint = f"{str(name)[:60]!r} is not understood", "export again without it"
+            text, hint = f"{str(name)[:60]!r} is not supported", "export again without it"
             raise BadHouse(gltf.file, "extensionsRequired", text, hint=hint)
 
 
@@ -143,9 +143,9 @@ def uri_bytes(gltf: Gltf, uri: Any, place: str, fetch: Fetch) -> bytes:
         try:
             return base64.b64decode(body, validate=True) if head.endswith(";base64") else b""
         except (binascii.Error, ValueError):
-            raise BadHouse(gltf.file, place, "holds no valid base64") from None
+            raise BadHouse(gltf.file, place, "is not valid base64") from None
     if "://" in uri:
-        raise BadHouse(gltf.file, place, f"{uri[:80]!r} is on a network; only files are read")
+        raise BadHouse(gltf.file, place, f"{uri[:80]!r} is a network address, not a file")
     data = fetch(unquote(uri))
     if data is None:
         raise MissingFile(gltf.file, place, f"{uri[:80]!r} does not exist")
@@ -367,7 +367,7 @@ def _accessor_floats(
         # Normalised integers are fractions of their type's range (glTF 2.0, section 3.6.2.2).
         values = np.maximum(values / np.iinfo(raw.dtype).max, -1.0)
     if not (np.abs(values) < 1e9).all():
-        raise BadHouse(gltf.file, place, "holds a number that is not finite")
+        raise BadHouse(gltf.file, place, "has a number that is not finite")
     return values
 
 

@@ -85,7 +85,7 @@ def items_of_scene(
         place = _place_in_file(gltf, thing)
         # Bound the extent, the triangles and the items.
         if item.surfaces and not float(np.abs(item.bounds).max()) <= fields.max_extent_m:
-            text = f"stands farther than {fields.max_extent_m:g} m from the origin"
+            text = f"is farther than {fields.max_extent_m:g} m from the origin"
             hint = "is its unit right? glTF is in metres; limit: read.max_extent_m"
             raise BadHouse(gltf.file, place, text, hint=hint)
         n_faces += item.n_faces

@@ -77,7 +77,7 @@ def read_habitat(given: GivenFile, fields: ReadFields) -> House:
     if not isinstance(template, str):
         raise BadHouse(path, "stage_instance.template_name", "expected a name")
     if _BAKED in template.lower():
-        text = "its stage has light baked into its pictures; it cannot be lit anew"
+        text = "its stage has light baked into its pictures, so it cannot be relit"
         raise BadHouse(path, f"stage_instance: {template}", text, hint="take the unbaked data set")
     _add_stage(dataset, template, built)
     rows = scene.get("object_instances", [])
@@ -143,8 +143,8 @@ class _Dataset:
         above = [path.parent, *path.parents[1:_LEVELS_UP]]
         root = next((f for f in above if next(f.glob(_CONFIG), None)), None)
         if root is None:
-            hint = "keep the scene below the folder of its data set"
-            raise BadHouse(path, "", f"no {_CONFIG} lies above it", hint=hint)
+            hint = "keep the scene in the folder of its data set"
+            raise BadHouse(path, "", f"no {_CONFIG} in a folder above it", hint=hint)
         self.folder = RootFolder(root)
         self.scene = path.relative_to(root).as_posix()
         self._parsed: dict[str, dict[str, Any]] = {}
@@ -269,7 +269,7 @@ class _Built:
         start = {key: len(self.document.setdefault(key, [])) for key in _ARRAYS}
         doc = {k: doc.get(k, []) for k in _ARRAYS} | {"scenes": doc.get("scenes", [])}
         if not all(isinstance(doc[k], list) for k in doc):
-            raise BadHouse(gltf.file, "", "has lists that are none")
+            raise BadHouse(gltf.file, "", "has invalid lists")
         copy = json.loads(json.dumps(doc))
         _shifted(copy, start)
         self._add_lights(gltf, copy["nodes"])
@@ -385,7 +385,7 @@ def _add_stage(dataset: _Dataset, template: str, built: _Built) -> None:
     row = dataset.json(config)
     name = dataset.asset(config, row.get("render_asset"))
     if _BAKED in name.lower():
-        text = "has light baked into its pictures; it cannot be lit anew"
+        text = "has light baked into its pictures, so it cannot be relit"
         raise BadHouse(config, "render_asset", text, hint="take the unbaked data set")
     added = built.asset(dataset, name)
     if added is None:

@@ -112,7 +112,7 @@ def robot_from_urdf(data: bytes, file: str) -> Robot:
         joint = _joint(row, file)
         parent, child = (_named(row, tag, rows, file) for tag in ("parent", "child"))
         if child in hung:
-            raise BadHouse(file, f"joint {joint.name[:60]}", f"{child[:60]} hangs on two links")
+            raise BadHouse(file, f"joint {joint.name[:60]}", f"{child[:60]} has two parents")
         hung[child] = (parent, joint)
     below: dict[str | None, list[str]] = {}
     for name in rows:
@@ -127,7 +127,7 @@ def robot_from_urdf(data: bytes, file: str) -> Robot:
         links.append(Link(name, visuals, parent_name, None if above is None else above[1]))
         waiting += reversed(below.get(name, []))
     if len(links) < len(rows):
-        raise BadHouse(file, "joint", "links hang on each other in a ring")
+        raise BadHouse(file, "joint", "the links form a cycle")
     moving = tuple(joint.name for _, joint in hung.values() if joint.kind is not None)
     return Robot(tuple(links), moving, n_unread)
 

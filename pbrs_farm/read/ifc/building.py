@@ -223,7 +223,7 @@ class _Building:
             if product.is_a("IfcSite") or kind is ItemKind.GROUND:
                 self._notes.add("far-away", f"#{product.id()}", "the land around is left out")
                 return None
-            text = f"stands farther than {self._fields.max_extent_m:g} m from the origin"
+            text = f"is farther than {self._fields.max_extent_m:g} m from the origin"
             hint = "limit: read.max_extent_m"
             raise BadHouse(self._path.name, f"#{product.id()} {name}", text, hint=hint)
         item = Item(

@@ -62,7 +62,7 @@ def _in_known_schema(text: str, path: Path) -> str:
     if named is None or near is None:
         hint = "export it as IFC2x3, IFC4 or IFC4x3"
         raise BadHouse(
-            path, "FILE_SCHEMA", f"is {schema or 'missing'}, which is not read", hint=hint
+            path, "FILE_SCHEMA", f"is {schema or 'missing'}, which is not supported", hint=hint
         )
     return text[: named.start(2)] + near + text[named.end(2) :]
 
@@ -73,7 +73,7 @@ def _bytes_of(path: Path) -> bytes:
     archive = ZipResources(path, path.name)
     names = [n for n in archive.names() if n.lower().endswith((".ifc", ".ifcxml"))]
     if len(names) != 1:
-        raise BadHouse(path, "", f"holds {len(names)} IFC files, expected one")
+        raise BadHouse(path, "", f"has {len(names)} IFC files, expected one")
     return archive.read(names[0]) or b""
 
 
@@ -82,9 +82,9 @@ def _check_step_file(data: bytes, path: Path) -> None:
     head = data[:2000].lstrip(b"\xef\xbb\xbf \r\n\t")
     hint = "export it as IFC (.ifc, STEP), IFC2x3 or IFC4"
     if head[:1] == b"<":
-        raise BadHouse(path, "", "is IFCXML, which is not read", hint=hint)
+        raise BadHouse(path, "", "is IFCXML, which is not supported", hint=hint)
     if head[:1] in (b"{", b"["):
-        raise BadHouse(path, "", "is JSON (IFC5), which is not read", hint=hint)
+        raise BadHouse(path, "", "is JSON (IFC5), which is not supported", hint=hint)
     if not head.startswith(b"ISO-10303-21"):
         raise BadHouse(path, "", "is not an IFC file: it does not begin with ISO-10303-21")
     if len(data) > _MOST_BYTES:
@@ -119,7 +119,7 @@ def _check_references(plain: bytes, path: Path) -> None:
         raise BadHouse(path, "DATA", f"has more than {_MOST_ROWS} rows")
     ids, counts = np.unique(numbers[begins], return_counts=True)
     if (counts > 1).any():
-        raise BadHouse(path, f"#{ids[counts > 1][0]}", "is there twice")
+        raise BadHouse(path, f"#{ids[counts > 1][0]}", "exists twice")
     # Each number belongs to the row that began before it.
     row = np.cumsum(begins) - 1
     is_use = ~begins & (row >= 0)
@@ -135,7 +135,7 @@ def _check_references(plain: bytes, path: Path) -> None:
     is_cyclic = (np.bincount(label) > 1)[label]
     is_cyclic[start[start == place]] = True
     if is_cyclic.any():
-        raise BadHouse(path, f"#{ids[is_cyclic][0]}", "is made of itself: a cycle of references")
+        raise BadHouse(path, f"#{ids[is_cyclic][0]}", "a cycle of references")
 
 
 def _mend_names(model: Any) -> None:

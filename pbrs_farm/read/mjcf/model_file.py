@@ -95,7 +95,7 @@ def _compiled(given: GivenFile) -> tuple[Any, Any, list[bool]]:
         order = [geom.id for geom in spec.geoms]
     except (ValueError, RuntimeError, mujoco.FatalError) as error:
         text = re.sub(r"^(XML )?Error: ", "", " ".join(str(error).split()))[:200]
-        raise BadHouse(given.path, "", f"MuJoCo does not load it: {text}") from None
+        raise BadHouse(given.path, "", f"MuJoCo cannot load it: {text}") from None
     data = mujoco.MjData(model)
     if model.nkey:
         mujoco.mj_resetDataKeyframe(model, data, 0)

@@ -30,7 +30,7 @@ def root_of(given: GivenFile) -> tuple[RootFolder, str]:
     try:
         name = given.path.resolve().relative_to(root.resolve()).as_posix()
     except ValueError:
-        raise BadHouse(given.path, "", f"does not lie below --models {root}") from None
+        raise BadHouse(given.path, "", f"is not below --models {root}") from None
     return RootFolder(root), name
 
 
@@ -87,7 +87,7 @@ def _below(folder: RootFolder, at: str, file: str, own: str) -> str:
     try:
         return folder.name_from(at, file)
     except BadHouse:
-        hint = "give the folder that holds both: --models FOLDER"
+        hint = "give a common parent folder: --models FOLDER"
         raise BadHouse(own, f"file={file[:80]!r}", "leads out of its folder", hint=hint) from None
 
 

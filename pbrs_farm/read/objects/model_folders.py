@@ -52,7 +52,7 @@ def find_models(paths: Sequence[Path]) -> list[ObjectModel]:
     for path in paths:
         models = _models_at(path)
         if not models:
-            raise BadInput(path, "", "no model found", hint="OBJ, GLB or .sh3f is looked for")
+            raise BadInput(path, "", "no model found", hint="supported: OBJ, GLB, .sh3f")
         for model in models:
             models_by_id[model.id] = model
     return [models_by_id[name] for name in sorted(models_by_id)]

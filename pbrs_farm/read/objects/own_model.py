@@ -88,7 +88,7 @@ def model_shape(model: ModelRef, fields: ReadFields) -> ModelShape:
     except OSError as error:
         raise BadInput(path, "", fault_of(error)) from None
     if (keys.sha256(data), companions_digest(path)) != (model.sha256, model.companions):
-        raise BadInput(path, "", "changed since the home was made", hint="make the home again")
+        raise BadInput(path, "", "changed since the home was loaded", hint="load the home again")
     notes = Notes(path.name, strict=fields.strict)
     read = _from_trimesh if _is_plain(path) else _from_reader
     with naming_kind(path):

@@ -155,7 +155,7 @@ def scene_document(data: bytes, file: str, notes: Notes) -> SceneDocument:
             continue
         name = str(raw.get("id") or f"e{i}")[:60]
         if name in taken:
-            notes.add("duplicate-id", place, f"a second element is called {name!r}")
+            notes.add("duplicate-id", place, f"two elements are named {name!r}")
             name = f"{name}.{i}"
         taken.add(name)
         elements.append(

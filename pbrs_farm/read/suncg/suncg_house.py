@@ -272,7 +272,7 @@ def _check_extent(item: Item, node: Node, fields: ReadFields, file: str) -> None
     # Refuse numbers that are not finite, too: the comparison is false for them.
     farthest = float(np.abs(item.bounds).max())
     if not farthest <= fields.max_extent_m:
-        text = f"stands {farthest:.6g} m from the origin; at most {fields.max_extent_m:g} m"
+        text = f"is {farthest:.6g} m from the origin; at most {fields.max_extent_m:g} m"
         raise BadHouse(file, node.place, text, hint="limit: read.max_extent_m")
 
 

@@ -102,7 +102,7 @@ class StageNodes:
         if _is_hidden(prim) or _is_no_place(prim):
             return
         if above.depth >= MAX_DEPTH:
-            raise BadHouse(self._file, str(prim.GetPath())[:80], f"lies deeper than {MAX_DEPTH}")
+            raise BadHouse(self._file, str(prim.GetPath())[:80], f"is deeper than {MAX_DEPTH}")
         if prim.IsA(UsdGeom.PointInstancer):
             yield from self._instances(prim, above)
             return
@@ -131,7 +131,7 @@ class StageNodes:
         node: _Row = {"name": name[:200], "children": [], "extras": {"item": _item_id(path)}}
         if matrix is not None and not np.array_equal(matrix, np.eye(4)):
             if not np.isfinite(matrix).all():
-                raise BadHouse(self._file, str(prim.GetPath())[:80], "its place is not finite")
+                raise BadHouse(self._file, str(prim.GetPath())[:80], "its transform is not finite")
             # Rows of USD are columns of glTF, in the same order of numbers.
             node["matrix"] = matrix.ravel().tolist()
         mesh = self._mesh(prim)
@@ -367,7 +367,7 @@ class StageNodes:
         )
         mask = instancer.ComputeMaskAtTime(self._time)
         if len(places) != len(numbers):
-            raise BadHouse(self._file, str(prim.GetPath()), "has not one place for each instance")
+            raise BadHouse(self._file, str(prim.GetPath()), "needs one transform per instance")
         for k, (number, place) in enumerate(zip(numbers, places, strict=True)):
             prototype = self._stage.GetPrimAtPath(paths[int(number)])
             if not prototype or (len(mask) and not mask[k]):

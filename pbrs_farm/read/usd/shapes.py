@@ -76,7 +76,7 @@ def mesh_shape(prim: Any, time: Any, file: str, uv_name: str = "") -> Shape | No
 
 def _check_mesh(points: F64, sizes: I64, indices: I64, file: str, place: str) -> None:
     if not (np.abs(points) < 1e9).all():
-        raise BadHouse(file, place, "holds a number that is not finite")
+        raise BadHouse(file, place, "has a number that is not finite")
     if sizes.min() < 0 or int(sizes.sum()) != len(indices):
         text = (
             f"faceVertexCounts add up to {int(sizes.sum())}, faceVertexIndices are {len(indices)}"

@@ -32,7 +32,7 @@ _MISSING_SHARE: Final = (
 _SAID: Final = re.compile(r": '(.*?)'\s*$", re.DOTALL | re.MULTILINE)
 _UNOPENED: Final = re.compile(r"In <([^>]*)>: Could not open asset @(.*?)@")
 _PICTURE_BYTES: Final = 256 * 2**20
-_HINT: Final = "`--models DIR` names the folder that holds all of its files"
+_HINT: Final = "`--models DIR` names a parent folder of all its files"
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,7 +163,7 @@ def opened_stage(folder: StageFolder, notes: Notes) -> Any:
     missing = _note_missing(diagnostics, notes)
     if missing > _MISSING_SHARE * max(n_references, missing):
         text = f"{missing} of {max(n_references, missing)} references do not resolve"
-        hint = "they name another machine's files: get them, too; " + _HINT
+        hint = "they refer to files of another machine: get them; " + _HINT
         raise BadHouse(path, "", text, hint=hint)
     return stage
 
@@ -212,8 +212,8 @@ def _fault_of(path: str, _size: int, _changed: int, n_bytes: int) -> str:
             stdin=subprocess.DEVNULL,
         )
     except subprocess.TimeoutExpired:
-        return f"damaged: the library does not open it within {limit_s:.0f} s"
-    return "damaged: the library dies of it" if has_crashed(done.returncode) else ""
+        return f"damaged: the library cannot open it within {limit_s:.0f} s"
+    return "damaged: it crashes the library" if has_crashed(done.returncode) else ""
 
 
 FAULTS: Final = (Tf.ErrorException, UnicodeDecodeError)
@@ -243,7 +243,7 @@ def _note_missing(diagnostics: Any, notes: Notes) -> int:
             notes.add("missing-model", match[1], f"{match[2]} does not exist; left out")
         elif "Cycle detected" in text:
             notes.add(
-                "reference-cycle", text.partition(">")[0].removeprefix("In <"), "names itself"
+                "reference-cycle", text.partition(">")[0].removeprefix("In <"), "refers to itself"
             )
     return n
 

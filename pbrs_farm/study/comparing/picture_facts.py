@@ -30,12 +30,12 @@ NUMBERS: Final = (
     ("colourful", "mean distance of channels from grey", "greyer", "more colourful"),
     ("warmth", "red minus blue", "bluer", "redder"),
     ("detail", "mean step of luma from pixel to pixel", "smoother", "with more fine detail"),
-    ("burnt", "share of pixels with a full channel", "with less that is burnt", "with more that is burnt"),
+    ("burnt", "share of pixels with a full channel", "with fewer overexposed pixels", "with more overexposed pixels"),
     ("depth_m", "median depth, m", "nearer", "farther"),
     ("up", "share of surfaces that face up", "with less floor and table top", "with more floor and table top"),
     ("frontal", "share of walls seen straight", "with less wall seen straight", "with more wall seen straight"),
     ("oblique", "share of walls seen from the side", "with less wall seen from the side", "with more wall seen from the side"),
-    ("slanted", "share of slanted surfaces", "with less that is slanted", "with more that is slanted"),
+    ("slanted", "share of slanted surfaces", "with fewer slanted surfaces", "with more slanted surfaces"),
     ("down", "share of surfaces that face down", "with less ceiling", "with more ceiling"),
 )
 # fmt: on

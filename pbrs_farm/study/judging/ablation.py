@@ -200,7 +200,7 @@ def training_sets(
         places, _, mode = rest.partition("@")
         if places.endswith(".mat"):
             hint = "`train TASK nyu.mat --init RUN` tunes a run on it"
-            raise BadInput("ablation", word, "photographs have none of the four lights", hint=hint)
+            raise BadInput("ablation", word, "photographs have no lighting modes", hint=hint)
         for light in (mode,) if mode else tuple(modes):
             name = "_".join(part for part in (label, "" if mode and label else light) if part)
             if name in sets:

@@ -93,7 +93,7 @@ def model_card(run: Trained, record: Mapping[str, Any], evaluations: list[dict[s
         f"Says {_SAYS[task.name].format(n_classes=plan.n_classes)}, from one colour picture of a room{_TOLD_RAYS * plan.rays}. Network `{plan.network}`,"
         f" {record['weights']:,} weights in half floats, trained at {size}.",
         "```\npbrs-farm predict FOLDER PHOTO... --out seen\n```",
-        "FOLDER is where this card lies; the package's own weights go by `--task`, too.",
+        "FOLDER is the folder of this card; for weights of the package, `--task` also works.",
         "## What it was trained on",
         _seen(record, homes),
         f"First weights: {record['init_origin']['source']}. Weights of {chosen}; seed {record['seed']};"

@@ -42,7 +42,7 @@ class Confusion:
         for kind, ids in (("label", rows), ("prediction", columns)):
             if ids.size and (ids.min() < 0 or ids.max() >= n):
                 wrong = next(i for i in (int(ids.max()), int(ids.min())) if not 0 <= i < n)
-                raise ValueError(f"the {kind} {wrong + 1} is none of the classes 1 to {n}")
+                raise ValueError(f"the {kind} {wrong + 1} is not a class of 1 to {n}")
         self.counts += np.bincount(rows * n + columns, minlength=n * n).reshape(n, n)
         return float((rows == columns).mean()) if rows.size else float("nan")
 

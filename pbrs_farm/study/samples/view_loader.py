@@ -73,7 +73,7 @@ class ViewLoader:
         for name, value in {**self._made, "n_views": self._n_views}.items():
             if state[name] != value:
                 text = f"was {state[name]} when the run stopped, is {value}"
-                raise BadInput("resume", name, text, hint="go on with what it began with")
+                raise BadInput("resume", name, text, hint="resume with the options of its start")
         self._epoch, self._n_batches = state["epoch"], state["n_batches"]
 
     def __iter__(self) -> Iterator[Tensors]:

@@ -64,7 +64,7 @@ def predict(
     cameras: (N, 4) fx, fy, cx, cy at colour's size, required by plans with `rays`.
     """
     if plan.rays and cameras is None:
-        text = "the network is told each pixel's ray, and these pictures have no camera"
+        text = "the network needs each pixel's ray, but these pictures have no camera"
         raise BadInput("predict", plan.task, text)
     was_training = network.training
     network.eval()

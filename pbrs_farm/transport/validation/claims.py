@@ -296,7 +296,7 @@ def _nonfinite(variant: str) -> LightClaim:
     finite = bool(np.isfinite(path.outdoor).all() and np.isfinite(path.indoor).all())
     n_paths = 16 * path.outdoor.shape[0] * path.outdoor.shape[1]
     return LightClaim(
-        "what is not finite is left out and counted",
+        "non-finite samples are dropped and counted",
         f"{path.n_nonfinite} of {n_paths} paths, picture {'finite' if finite else 'not finite'}",
         "> 0, finite",
         finite and 0 < path.n_nonfinite <= n_paths,

@@ -135,7 +135,7 @@ def test_a_file_is_all_that_a_new_piece_of_furniture_takes(
 
 @pytest.mark.parametrize(
     ("name", "body", "error"),
-    [("sofa", _BODY, "broken: sofa: is the name of another thing already"),
+    [("sofa", _BODY, "broken: sofa: is already the name of another object"),
      ("nothing", "pass", "broken: nothing: has nothing in it")],
 )  # fmt: skip
 def test_what_is_wrong_with_a_plugins_furniture_is_named(

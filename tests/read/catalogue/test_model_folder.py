@@ -114,7 +114,7 @@ def test_3d_future_is_known_by_its_table_and_by_its_raw_models(tmp_path: Path) -
         (f"{tmp_path.name}#a1/raw_model", "sofa")
     ]
     assert sorted(n.kind for n in catalogue.notes) == ["missing-models", "wrong-size"]
-    assert "1 of its 3 models are not there" in next(
+    assert "1 of its 3 models are missing" in next(
         n.text for n in catalogue.notes if n.kind == "missing-models"
     )
 
@@ -174,7 +174,7 @@ def test_a_model_of_another_unit_is_scaled_and_one_of_no_size_is_refused(
     shape = catalogue.shape(piece)
     assert shape is not None
     np.testing.assert_allclose(shape.bounds, [[-0.4, 0, -0.4], [0.4, 0.9, 0.4]], atol=1e-6)
-    assert [n.text for n in catalogue.notes] == [f"is told in {found}"]
+    assert [n.text for n in catalogue.notes] == [f"is in {found}"]
 
 
 def test_a_folder_is_indexed_once_and_anew_where_a_file_changes(

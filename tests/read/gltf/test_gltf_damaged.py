@@ -90,7 +90,7 @@ def test_names_that_lead_out_of_the_folder_are_refused(tmp_path: Path) -> None:
     for uri in ("../secret.bin", "/etc/passwd", "%2e%2e/secret.bin", "http://x.org/a.bin"):
         document = {"asset": {"version": "2.0"}, "buffers": [{"uri": uri, "byteLength": 4}]}
         (inner / "a.gltf").write_text(json.dumps(document))
-        with pytest.raises(BadHouse, match=r"leads out|on a network"):
+        with pytest.raises(BadHouse, match=r"leads out|a network address"):
             read_gltf_file(inner / "a.gltf", ReadFields())
     (inner / "link.bin").symlink_to(tmp_path / "secret.bin")
     document = {"asset": {"version": "2.0"}, "buffers": [{"uri": "link.bin", "byteLength": 4}]}

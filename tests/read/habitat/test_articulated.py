@@ -146,7 +146,7 @@ def test_a_change_of_the_urdf_or_its_models_is_seen(tmp_path: Path) -> None:
     [
         ("<robot", "<sdf", "not valid XML"),
         ('child link="door"', 'child link="dor"', "its child is not a link"),
-        ('child link="drawer"', 'child link="door"', "hangs on two links"),
+        ('child link="drawer"', 'child link="door"', "has two parents"),
         (
             'parent link="root"/><child link="body"',
             'parent link="door"/><child link="body"',

@@ -84,7 +84,7 @@ def test_damaged_lights_are_one_line(tmp_path: Path, lights: object) -> None:
 @pytest.mark.parametrize(
     ("scene", "said"),
     [
-        ({"stage_instance": {"template_name": "Baked_sc0"}}, "cannot be lit anew"),
+        ({"stage_instance": {"template_name": "Baked_sc0"}}, "cannot be relit"),
         ({"stage_instance": {"template_name": "gone"}}, "no stage_config"),
         ({"stage_instance": {"template_name": "../../flat"}}, "leads out"),
         ({"object_instances": [{"template_name": "gone"}]}, "have no model"),

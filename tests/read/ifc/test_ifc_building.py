@@ -237,9 +237,9 @@ DAMAGED = {
     "cut": (lambda t: t[: len(t) // 2], "a string is not closed|cut short"),
     "string": (lambda t: t.replace("'Erdgeschoss'", "'Erdgeschoss", 1), r"line \d+: a string"),
     "comment": (lambda t: t.replace("DATA;", "DATA; /* ", 1), "a comment is not closed"),
-    "cycle": (_cyclic, r"#\d+: is made of itself"),
+    "cycle": (_cyclic, r"#\d+: a cycle of references"),
     "missing": (lambda t: t.replace("(#", "(#9999", 1), "which does not exist"),
-    "twice": (lambda t: t.replace("\n#2=", "\n#1=", 1), "#1: is there twice"),
+    "twice": (lambda t: t.replace("\n#2=", "\n#1=", 1), "#1: exists twice"),
     "no project": (lambda t: t.replace("IFCPROJECT(", "IFCNOTHING("), "IfcProject|damaged"),
     "no rooms": (lambda t: IfcHouse().text(), "has no space"),
 }

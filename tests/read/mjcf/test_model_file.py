@@ -210,9 +210,9 @@ def test_shapes_that_are_not_read_are_a_note(tmp_path: Path) -> None:
     ("text", "what"),
     [
         ("<mujoco", "not valid XML"),
-        ("<mujoco><worldbody><geom type='ball'/></worldbody></mujoco>", "MuJoCo does not load it"),
+        ("<mujoco><worldbody><geom type='ball'/></worldbody></mujoco>", "MuJoCo cannot load it"),
         ("<mujoco><worldbody><body name='a'/></worldbody></mujoco>", "no floor"),
-        ("<mujoco><include file='b.xml'/><worldbody/></mujoco>", "MuJoCo does not load it"),
+        ("<mujoco><include file='b.xml'/><worldbody/></mujoco>", "MuJoCo cannot load it"),
         ("<mujoco><worldbody><geom type='box' size='nan 1 1'/></worldbody></mujoco>", "MuJoCo"),
     ],
 )

@@ -39,7 +39,7 @@ def spokes(n: int) -> str:
         ),
         (spokes(40), ROOM, f"walls cross 780 times, at most {MAX_CROSSINGS}"),
         ("", "".join(square(9 * k, 0, 5) for k in range(501)), "501 rooms, at most"),
-        ("", square(0, 0, 100) * 40, f"780 pairs of rooms overlap, at most {MAX_OVERLAPS}"),
+        ("", square(0, 0, 100) * 40, f"780 pairs of rooms overlap; the maximum is {MAX_OVERLAPS}"),
     ],
 )
 def test_a_plan_beyond_any_home_is_refused_by_a_line(body: str, room: str, said: str) -> None:

@@ -316,7 +316,7 @@ def test_sun_rgbds_classes_are_those_of_its_toolbox(tmp_path: Path) -> None:
     for name in ("SUNRGBD", "SUNRGBDtoolbox"):
         (tmp_path / name).rename(tmp_path / "moved" / name)
     place = str(tmp_path / "moved/SUNRGBD")
-    with pytest.raises(BadInput, match=r"SUNRGBDMeta\.mat: needed beside SUNRGBD2Dseg\.mat"):
+    with pytest.raises(BadInput, match=r"SUNRGBDMeta\.mat: needed with SUNRGBD2Dseg\.mat"):
         open_judged_place(place, plan, mode="mlt_il_ol")
 
 

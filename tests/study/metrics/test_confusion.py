@@ -40,5 +40,5 @@ def test_a_perfect_prediction_scores_one() -> None:
 
 @pytest.mark.parametrize(("predicted", "truth"), [(1, 41), (0, 3), (41, 3)])
 def test_a_class_that_the_net_lacks_is_named(predicted: int, truth: int) -> None:
-    with pytest.raises(ValueError, match=r"is none of the classes 1 to 40"):
+    with pytest.raises(ValueError, match=r"is not a class of 1 to 40"):
         Confusion(40).add(np.array([[predicted]]), np.array([[truth]]))

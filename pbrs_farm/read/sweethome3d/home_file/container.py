@@ -44,7 +44,7 @@ def open_container(data: bytes, file: str, resources: Resources | None) -> Conta
             # Old versions, and homes saved without XML, hold the program's serialised objects alone.
             java = archive.read("Home")
             if java is None:
-                raise BadHouse(file, "", "holds no Home.xml and no Home", hint=RESAVE)
+                raise BadHouse(file, "", "has no Home.xml and no Home", hint=RESAVE)
             return Container(root_from_java(java, file), Layered(archive, resources))
         return Container(_parse_xml(xml, file, "Home.xml"), Layered(archive, resources))
     if data.lstrip(b"\xef\xbb\xbf \t\r\n")[:1] == b"<" or data[:2] in (b"\xff\xfe", b"\xfe\xff"):
@@ -71,7 +71,7 @@ def _parse_xml(xml: bytes, file: str, entry: str) -> Element:
         root: Element = fromstring(xml, forbid_dtd=False, forbid_entities=True)
     except DefusedXmlException as error:
         kind = type(error).__name__
-        raise BadHouse(file, entry, f"XML with entity definitions is refused ({kind})") from None
+        raise BadHouse(file, entry, f"entity definitions are not allowed ({kind})") from None
     except ParseError as error:
         raise BadHouse(file, entry, f"XML is not well-formed: {error}", hint=RESAVE) from None
     except (ValueError, LookupError, RecursionError):

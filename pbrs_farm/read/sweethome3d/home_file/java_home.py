@@ -21,7 +21,7 @@ from pbrs_farm.read.sweethome3d.home_file.java_stream import (
 )
 
 RESAVE: Final = "open it in Sweet Home 3D 5.3 or later and save it again"
-_ALONE: Final = "holds no Home.xml, only the binary form of older versions,"
+_ALONE: Final = "has no Home.xml, only the binary format of older versions,"
 _MODEL: Final = "com.eteks.sweethome3d.model."
 _MAX_GROUP_DEPTH: Final = 100
 _UPRIGHT: Final = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
@@ -53,12 +53,10 @@ def root_from_java(data: bytes, file: str) -> Element:
     try:
         objects = java_objects(data)
     except JavaStreamError as error:
-        raise BadHouse(
-            file, "Home", f"{_ALONE} and that is damaged: {error}", hint=RESAVE
-        ) from None
+        raise BadHouse(file, "Home", f"{_ALONE} which is damaged: {error}", hint=RESAVE) from None
     home = next((o for o in objects if _is(o, "Home")), None)
     if home is None:
-        raise BadHouse(file, "Home", f"{_ALONE} and that holds no home", hint=RESAVE)
+        raise BadHouse(file, "Home", f"{_ALONE} which has no home", hint=RESAVE)
     return _Converter(home).root()
 
 

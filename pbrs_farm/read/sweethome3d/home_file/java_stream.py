@@ -121,7 +121,7 @@ class _Reader:
 
     def _bytes(self, count: int) -> bytes:
         if not 0 <= count <= len(self._data) - self.at:
-            raise self._fail(f"{count} bytes are claimed, {len(self._data) - self.at} are left")
+            raise self._fail(f"{count} bytes are expected, {len(self._data) - self.at} are left")
         self.at += count
         return self._data[self.at - count : self.at]
 
@@ -228,12 +228,12 @@ class _Reader:
         up: _ClassDesc | None = desc
         while up is not None:
             if len(chain) >= _MAX_FIELDS:
-                raise self._fail("a class of endless ancestry")
+                raise self._fail("a class with too many ancestors")
             chain.append(up)
             up = up.parent
         for part in reversed(chain):
             if part.flags & _IS_EXTERNALIZABLE and not part.flags & _HAS_BLOCKS:
-                raise self._fail(f"{part.name[:80]} writes a form of its own")
+                raise self._fail(f"{part.name[:80]} has a custom format")
             for letter, name in part.fields if part.flags & _IS_SERIALIZABLE else ():
                 instance.fields[name] = yield self._value(letter)
             if part.flags & (_HAS_WRITE_METHOD | _IS_EXTERNALIZABLE):

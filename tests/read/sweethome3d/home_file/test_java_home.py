@@ -66,7 +66,7 @@ def test_a_home_without_xml_becomes_a_house() -> None:
 def test_a_stream_cut_anywhere_is_refused_with_what_to_do() -> None:
     for end in range(4, len(STREAM), 97):
         with pytest.raises(
-            BadHouse, match=r"only the binary form of older versions.*save it again"
+            BadHouse, match=r"only the binary format of older versions.*save it again"
         ):
             plan_of(old_home(STREAM[:end]))
 
@@ -86,8 +86,8 @@ def test_whatever_the_bytes_the_outcome_is_a_plan_or_a_bad_house() -> None:
     [
         (b"", None),
         (b"\x71\x00\x7e\x00\x07", "was not written"),
-        (b"\x74\xff\xff", "are claimed"),
-        (b"\x7c\x7f" + b"\xff" * 7, "are claimed"),
+        (b"\x74\xff\xff", "are expected"),
+        (b"\x7c\x7f" + b"\xff" * 7, "are expected"),
         (b"\x75\x72\x00\x02[F" + bytes(8) + b"\x02\x00\x00\x78\x70\x7f\xff\xff\xff", "elements"),
         (b"\x7d" + bytes(40), "unexpected code 0x7d"),
         (b"\x73\x70", "without a class"),
@@ -113,7 +113,7 @@ def test_deep_nesting_takes_no_stack_and_ends() -> None:
 
 
 def test_what_is_no_home_is_refused() -> None:
-    with pytest.raises(BadHouse, match="holds no home"):
+    with pytest.raises(BadHouse, match="has no home"):
         plan_of(old_home(HEAD + b"\x74\x00\x01a"))
     with pytest.raises(BadHouse, match="no Java serialisation"):
         plan_of(old_home(b"what"))
