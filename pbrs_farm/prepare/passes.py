@@ -331,7 +331,7 @@ PASSES: Final = (
     Pass("float", 1, _float, _has_floating_things, _float_depends),
     Pass(
         "surroundings",
-        2,
+        3,
         _surround,
         lambda source, recipe: _is_home(source, recipe) and recipe.surroundings.kind != "none",
     ),

@@ -12,6 +12,7 @@ from pbrs_farm.furnishings.surroundings.scenery import (
     Rgb,
     Scenery,
     SceneryMaterial,
+    grass,
     lit,
     mottled,
     paved,
@@ -383,8 +384,7 @@ def railing(scenery: Scenery, thing: str, front: Front, length: float) -> None:
 
 def ground_looks(rng: np.random.Generator) -> dict[str, SceneryMaterial]:
     """Materials of the ground."""
-    return {"lawn": SceneryMaterial("lawn", picture=mottled(rng, (0.030, 0.052, 0.014),
-        (0.115, 0.155, 0.042), size=256, slope=1.0), size_m=(3.7, 3.7)),
+    return {"lawn": SceneryMaterial("lawn", picture=grass(rng), size_m=(9.0, 9.0)),
         "asphalt": SceneryMaterial("asphalt", picture=mottled(rng, (0.045, 0.045, 0.048),
         (0.10, 0.10, 0.10), slope=0.6), size_m=(3.1, 3.1)), "slabs": SceneryMaterial("slabs",
         picture=paved(rng, (0.33, 0.31, 0.28), 4), size_m=(2.0, 2.0)),

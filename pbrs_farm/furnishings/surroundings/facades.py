@@ -89,7 +89,7 @@ class Facade(NamedTuple):
 def facade(rng: np.random.Generator, number: int, styles: tuple[Style, ...]) -> Facade:
     """A facade of one of the styles."""
     style = styles[number % len(styles)]
-    wall, frame = _one(rng, style.colours), _one(rng, style.frames)
+    wall, frame = _weathered(rng, _one(rng, style.colours)), _one(rng, style.frames)
     bay = float(rng.uniform(*style.bay_m))
     wide, high = (float(v * rng.uniform(0.92, 1.1)) for v in style.window_m)
     low = 2.45 - high if high < 1.8 else 0.35
@@ -119,6 +119,13 @@ def facade(rng: np.random.Generator, number: int, styles: tuple[Style, ...]) -> 
 
 def _one(rng: np.random.Generator, rows: tuple[Rgb, ...]) -> Rgb:
     return rows[int(rng.integers(0, len(rows)))]
+
+
+def _weathered(rng: np.random.Generator, rgb: Rgb) -> Rgb:
+    """A paint after years of weather: darker and greyer, by more or less."""
+    grey, value = sum(rgb) / 3, float(rng.uniform(0.58, 0.95))
+    r, g, b = (value * (c + float(rng.uniform(0.05, 0.45)) * (grey - c)) for c in rgb)
+    return r, g, b
 
 
 def _encoded(rgb: Rgb) -> Rgb:
@@ -152,7 +159,8 @@ def _wall(rng: np.random.Generator, kind: str, rgb: Rgb) -> tuple[F32, tuple[flo
             return np.asarray(np.clip(picture, 0, 0.85), np.float32), (2.4, 2.4)
         case _:
             stains = np.clip(noise(rng, (_PX, _PX), slope=2.6, stretch=(6.0, 1.0)), -2, 2)
-            picture *= (1 + 0.035 * stains)[..., None]
+            clouds = np.clip(noise(rng, (_PX, _PX), slope=2.2), -2, 2)
+            picture *= (1 + 0.05 * stains + 0.05 * clouds)[..., None]
             return np.asarray(np.clip(picture, 0, 0.85), np.float32), (3.0, 3.0)
 
 

@@ -12,7 +12,7 @@ from pbrs_farm.furnishings.surroundings.scenery import Rgb, Scenery, SceneryMate
 from pbrs_farm.geometry.solids import box_quads
 
 _PX: Final = 128  # of the picture of a spray of leaves
-_SHADE: Final = 0.5  # of the light that leaves inside a crown have, encoded
+_SHADE: Final = 0.66  # of the light that leaves inside a crown have, encoded
 
 
 class Species(NamedTuple):
@@ -28,74 +28,116 @@ class Species(NamedTuple):
     bark: tuple[Rgb, Rgb]
 
 
-_BROWN_BARK: Final = ((0.03, 0.022, 0.015), (0.12, 0.09, 0.065))
+_BROWN_BARK: Final = ((0.03, 0.024, 0.018), (0.13, 0.105, 0.08))
+# Leaves reflect .03 to .17 of light; chroma as of the foliage patch of colour charts, (.095, .15, .056).
 # fmt: off
 SPECIES: Final[tuple[Species, ...]] = (
-    Species("lime", (0.022, 0.05, 0.010), (0.11, 0.19, 0.035), (21, 15), 62, 0.32, 0.30, _BROWN_BARK),
-    Species("oak", (0.016, 0.036, 0.010), (0.065, 0.12, 0.030), (20, 10), 78, 0.38, 0.26, _BROWN_BARK),
-    Species("birch", (0.03, 0.05, 0.010), (0.15, 0.20, 0.05), (14, 9), 95, 0.22, 0.24, ((0.10, 0.09, 0.08), (0.55, 0.53, 0.49))),
-    Species("fir", (0.008, 0.022, 0.012), (0.035, 0.075, 0.038), (30, 2.6), 150, 0.2, 0.10, _BROWN_BARK),
-    Species("copper beech", (0.03, 0.010, 0.008), (0.12, 0.045, 0.03), (18, 11), 74, 0.34, 0.24, _BROWN_BARK),
-    Species("plane", (0.03, 0.055, 0.018), (0.13, 0.19, 0.06), (24, 20), 42, 0.36, 0.34, ((0.10, 0.09, 0.06), (0.30, 0.28, 0.21))),
+    Species("lime", (0.026, 0.040, 0.016), (0.115, 0.160, 0.058), (17, 11), 80, 0.32, 0.30, _BROWN_BARK),
+    Species("oak", (0.022, 0.034, 0.014), (0.082, 0.115, 0.046), (19, 8), 88, 0.38, 0.26, _BROWN_BARK),
+    Species("birch", (0.034, 0.046, 0.018), (0.145, 0.180, 0.075), (13, 7.5), 105, 0.22, 0.24, ((0.10, 0.09, 0.08), (0.55, 0.53, 0.49))),
+    Species("fir", (0.012, 0.022, 0.015), (0.045, 0.070, 0.044), (30, 2.6), 150, 0.2, 0.10, _BROWN_BARK),
+    Species("copper beech", (0.030, 0.014, 0.012), (0.105, 0.055, 0.044), (18, 9), 80, 0.34, 0.24, _BROWN_BARK),
+    Species("plane", (0.034, 0.048, 0.022), (0.135, 0.175, 0.080), (21, 15), 52, 0.36, 0.34, ((0.10, 0.09, 0.06), (0.30, 0.28, 0.21))),
+    Species("privet", (0.018, 0.030, 0.013), (0.080, 0.115, 0.042), (10, 4.6), 210, 0.3, 0.1, _BROWN_BARK),
+    Species("yew", (0.012, 0.022, 0.012), (0.048, 0.070, 0.034), (12, 2.2), 330, 0.3, 0.1, _BROWN_BARK),
 )
 # fmt: on
 FIR: Final = 3
+TREES: Final = 6  # of SPECIES: the others are shrubs
+_N_TINTS: Final = 5
+_HAZE: Final = np.array([0.34, 0.39, 0.45])  # colour of air, linear
 
 
 class Leaves(NamedTuple):
-    """The looks of a species."""
+    """The looks of a species, and of one plant of it."""
 
     species: Species
-    outer: SceneryMaterial
-    inner: SceneryMaterial  # the same in the shade of the others
+    spray: F32
+    tints: tuple[Rgb, ...]  # of single plants, sRGB-encoded
     solid: SceneryMaterial  # without holes, for the dark behind leaves
     bark: SceneryMaterial
+    tint: int = 0
+
+    def of_plant(self, rng: np.random.Generator) -> Leaves:
+        """The leaves of one plant: no two of a kind have quite the same green."""
+        return self._replace(tint=int(rng.integers(len(self.tints))))
+
+    @property
+    def outer(self) -> SceneryMaterial:
+        """Leaves in the light."""
+        name = f"{self.species.name} leaves {self.tint}"
+        return SceneryMaterial(name, self.tints[self.tint], self.spray)
+
+    @property
+    def inner(self) -> SceneryMaterial:
+        """Leaves in the shade of others."""
+        r, g, b = self.tints[self.tint]
+        rgb = (_SHADE * r, _SHADE * g, _SHADE * b)
+        return SceneryMaterial(f"{self.species.name} leaves in shade {self.tint}", rgb, self.spray)
 
 
 def leaves_of(rng: np.random.Generator, number: int) -> Leaves:
     """The looks of one of SPECIES."""
     tree = SPECIES[number]
-    spray = _spray(rng, tree)
-    r, g, b = tree.dark
-    dark = (0.3 * r, 0.3 * g, 0.3 * b)
+    spray, carpet = _spray(rng, tree), _spray(rng, tree, is_carpet=True)
+    # From bluish to yellowish, from dark to light.
+    warm, value = rng.normal(0, 0.06, _N_TINTS), rng.uniform(0.84, 0.99, _N_TINTS)
+    tints = tuple(
+        (min(float(v * (1 + w)), 1.0), float(v), min(float(v * (1 - w)), 1.0))
+        for w, v in zip(np.clip(warm, -0.06, 0.06), value, strict=True)
+    )
+    solid = SceneryMaterial(f"{tree.name} dark", (0.86,) * 3, carpet, (0.6, 0.6))
+    bark = mottled(rng, *tree.bark, size=64)
     return Leaves(
         tree,
-        SceneryMaterial(f"{tree.name} leaves", picture=spray),
-        SceneryMaterial(f"{tree.name} leaves in shade", rgb=(_SHADE,) * 3, picture=spray),
-        SceneryMaterial(
-            f"{tree.name} dark", picture=mottled(rng, dark, tree.dark, size=64), size_m=(0.7, 0.7)
-        ),
-        SceneryMaterial(
-            f"{tree.name} bark", picture=mottled(rng, *tree.bark, size=64), size_m=(0.5, 0.5)
-        ),
+        spray,
+        tints,
+        solid,
+        SceneryMaterial(f"{tree.name} bark", (1.0,) * 3, bark, (0.5, 0.5)),
     )
 
 
-def _spray(rng: np.random.Generator, species: Species) -> F32:
-    """(_PX, _PX, 4) linear and alpha: leaves about twigs, the later ones over the earlier."""
+def _spray(rng: np.random.Generator, species: Species, *, is_carpet: bool = False) -> F32:
+    """(_PX, _PX, 4) linear and alpha: leaves about twigs, the later ones over the earlier.
+
+    is_carpet: (_PX, _PX, 3), periodic and without holes, of twice as many leaves.
+    """
     picture = np.zeros((_PX, _PX, 4), np.float32)
-    picture[..., :3] = species.dark
+    picture[..., :3] = np.array(species.dark) * (0.35 if is_carpet else 1.0)
     long_, wide = species.leaf_px
-    for _ in range(species.n_leaves):
+    for _ in range(species.n_leaves * (2 if is_carpet else 1)):
         # Leaves fill a round spray and hang outwards from its middle.
         turn, away = rng.uniform(0, 2 * np.pi), 0.42 * _PX * np.sqrt(rng.random())
         tip = _PX / 2 + away * np.array([np.cos(turn), np.sin(turn)])
+        tip = rng.uniform(0, _PX, 2) if is_carpet else tip
         angle = turn + rng.normal(0, 0.6)
         size = rng.uniform(0.75, 1.2)
-        low = np.maximum((tip - 0.6 * long_ * size).astype(int), 0)
-        high = np.minimum((tip + 0.6 * long_ * size).astype(int) + 2, _PX)
+        low = (tip - 0.6 * long_ * size).astype(int)
+        high = (tip + 0.6 * long_ * size).astype(int) + 2
+        if not is_carpet:
+            low, high = np.maximum(low, 0), np.minimum(high, _PX)
         x, y = np.arange(low[0], high[0]) + 0.5, np.arange(low[1], high[1])[:, None] + 0.5
         u = ((x - tip[0]) * np.cos(angle) + (y - tip[1]) * np.sin(angle)) / (0.5 * long_ * size)
         v = (-(x - tip[0]) * np.sin(angle) + (y - tip[1]) * np.cos(angle)) / (0.5 * wide * size)
         # Pointed at both ends, a light vein along the middle, one half in shade.
         inside = np.abs(v) < 1 - u * u
-        share = rng.uniform(0.15, 1.0)
+        share = rng.uniform(0.1, 1.0)
         rgb = np.array(species.dark) * (1 - share) + np.array(species.light) * share
-        shade = np.where(v > 0, 1.0, 0.78) * np.where(np.abs(v) < 0.13, 1.25, 1.0) * (1 - 0.15 * u)
-        patch = picture[low[1] : high[1], low[0] : high[0]]
+        rgb = rgb * (1 + rng.normal(0, 0.09) * np.array([1.0, 0.0, -0.8]))
+        shade = np.where(v > 0, 1.0, 0.78) * np.where(np.abs(v) < 0.13, 1.2, 1.0) * (1 - 0.15 * u)
+        columns, rows = np.arange(low[0], high[0]) % _PX, np.arange(low[1], high[1]) % _PX
+        patch = picture[np.ix_(rows, columns)]
         patch[inside, :3] = shade[inside][:, None] * rgb
         patch[inside, 3] = 1.0
-    return picture
+        picture[np.ix_(rows, columns)] = patch
+    return picture[..., :3] if is_carpet else picture
+
+
+def hazy(picture: F32, share: float) -> F32:
+    """A linear picture with a share of its colour lost to the air before it."""
+    veiled = picture.copy()
+    veiled[..., :3] = (1 - share) * picture[..., :3] + share * _HAZE
+    return veiled
 
 
 def tree_line(rng: np.random.Generator) -> F32:
@@ -106,7 +148,7 @@ def tree_line(rng: np.random.Generator) -> F32:
     edge = 0.12 * noise(rng, (1, wide), slope=1.0)[0]
     # Far ones first; lower ones cover them.
     for top in np.sort(rng.uniform(2, 55, 110)):
-        species = SPECIES[int(rng.choice(len(SPECIES) - 2))]
+        species = SPECIES[int(rng.choice(TREES - 2))]
         half, column = int(rng.uniform(14, 34)), int(rng.integers(0, wide))
         columns = np.arange(column - half, column + half + 1)
         u = (columns - column) / half
@@ -116,6 +158,7 @@ def tree_line(rng: np.random.Generator) -> F32:
         light = np.clip(1.0 - 0.9 * v - 0.3 * u, 0.15, 1.2) * grain[int(top) :, columns]
         tone = np.clip(0.25 + 0.5 * light, 0, 1)[..., None]
         rgb = np.array(species.dark) * (1 - tone) + np.array(species.light) * tone
+        rgb = rgb * rng.uniform(0.75, 1.15) * (1 + rng.normal(0, 0.07) * np.array([1.0, 0.0, -1.0]))
         patch = picture[int(top) :, columns]
         patch[inside, :3], patch[inside, 3] = rgb[inside], 1.0
         picture[int(top) :, columns] = patch
@@ -135,7 +178,7 @@ def tree(
     n: int = 340,
 ) -> None:
     """A tree on foot (3,): a trunk, branches, and n sprays of leaves about them, of a fir in a cone."""
-    species = leaves.species
+    leaves, species = leaves.of_plant(rng), leaves.species
     crown_low = species.crown_from * height * rng.uniform(0.9, 1.1)
     radius = species.radius * rng.uniform(0.88, 1.12) * height
     if species.name == "fir":
@@ -158,28 +201,48 @@ def tree(
             depth > 0.72,
         )
         return
-    # Round clumps make a crown, each at the end of a branch; leaves sit near their surfaces.
-    n_clumps = int(rng.integers(9, 14))
+    # Limbs leave a bent trunk and fork; clumps of leaves sit at the ends of their twigs.
     middle = np.array([0, crown_low + 0.52 * (height - crown_low), 0])
-    spread = np.array([0.66 * radius, 0.36 * (height - crown_low), 0.66 * radius])
-    clumps = middle + spread * _directions(rng, n_clumps) * rng.uniform(0.75, 1.05, (n_clumps, 1))
-    size = rng.uniform(0.38, 0.56, n_clumps) * radius
-    fork = foot + _up(crown_low + 0.12 * (height - crown_low))
-    _limb(scenery, thing, leaves.bark, foot, fork, 0.021 * height)
-    _limb(scenery, thing, leaves.bark, fork, foot + _up(0.82 * height), 0.013 * height)
-    for end in clumps:
-        start = fork + _up(rng.uniform(0, 0.35) * (height - crown_low))
-        _limb(scenery, thing, leaves.bark, start, foot + end, 0.007 * height, n=4)
+    lean = rng.normal(0, 0.02 * height, (3, 3)) * [1, 0, 1]
+    trunk = np.cumsum([[0, 0, 0], *lean], 0) + np.outer(
+        [0, crown_low, 0.55 * height, 0.85 * height], [0, 1, 0]
+    )
+    for k, r in enumerate((0.024, 0.019, 0.012)):
+        _limb(
+            scenery, thing, leaves.bark, foot + trunk[k], foot + trunk[k + 1], r * height, end=0.75
+        )
+    n_limbs = int(rng.integers(6, 9))
+    ends, starts = [], rng.uniform(0.05, 0.75, n_limbs)
+    turns = 2 * np.pi * (np.arange(n_limbs) * 0.382 + rng.normal(0, 0.05, n_limbs))
+    for start, turn in zip(starts, turns, strict=True):
+        y = crown_low + start * (height - crown_low)
+        root = np.array([np.interp(y, trunk[:, 1], trunk[:, k]) for k in range(3)])
+        reach = radius * rng.uniform(0.45, 0.62) * (1 - 0.45 * start)
+        way = np.array([np.cos(turn), rng.uniform(0.35, 0.8), np.sin(turn)])
+        elbow = root + reach * way
+        _limb(scenery, thing, leaves.bark, foot + root, foot + elbow, 0.009 * height, n=5)
+        for _ in range(2):
+            twig = elbow + 0.75 * reach * (way + 0.75 * _directions(rng, 1)[0]) * [1, 0.8, 1]
+            _limb(scenery, thing, leaves.bark, foot + elbow, foot + twig, 0.0045 * height, n=4)
+            ends.append(twig)
+        ends.append(elbow + _up(0.15 * reach))
+    clumps = np.array([*ends, trunk[3]])
+    n_clumps = len(clumps)
+    size = rng.uniform(0.3, 0.48, n_clumps) * radius
     which = rng.choice(n_clumps, n, p=size**2 / (size**2).sum())
     outward = _directions(rng, n)
-    places = clumps[which] + outward * (size[which] * rng.uniform(0.55, 1.05, n))[:, None]
+    places = clumps[which] + outward * (size[which] * rng.uniform(0.3, 1.1, n))[:, None] * [
+        1,
+        0.7,
+        1,
+    ]
     places[:, 1] = np.maximum(places[:, 1], 0.85 * crown_low)
     # Leaves deep in the crown or below others are in shade.
     from_middle = (places - middle) / np.array([radius, 0.55 * (height - crown_low), radius])
     is_outer = np.linalg.norm(from_middle, axis=1) + 0.35 * from_middle[:, 1] > 0.62
     looks = outward + 0.6 * from_middle
     _add_sprays(
-        scenery, thing, rng, leaves, foot + places, looks, 1.85 * height / np.sqrt(n), is_outer
+        scenery, thing, rng, leaves, foot + places, looks, 1.9 * height / np.sqrt(n), is_outer
     )
 
 
@@ -187,12 +250,12 @@ def bush(
     scenery: Scenery, thing: str, rng: np.random.Generator, foot: F64, size: float, leaves: Leaves
 ) -> None:
     """A bush with equal width and height."""
-    n = 90
+    n, leaves = 130, leaves.of_plant(rng)
     outward = _directions(rng, n)
     outward[:, 1] = np.abs(outward[:, 1])
     deep = rng.uniform(0.45, 1, n)
     places = outward * size * np.array([0.55, 0.85, 0.55]) * deep[:, None]
-    _add_sprays(scenery, thing, rng, leaves, foot + places, outward, 0.36 * size, deep > 0.72)
+    _add_sprays(scenery, thing, rng, leaves, foot + places, outward, 0.3 * size, deep > 0.72)
 
 
 def hedge(
@@ -200,19 +263,19 @@ def hedge(
 ) -> None:
     """A clipped hedge along the line ends (2, 3) on the ground."""
     along = ends[1] - ends[0]
-    length = float(np.linalg.norm(along))
+    length, leaves = float(np.linalg.norm(along)), leaves.of_plant(rng)
     if length < 1.0:
         return
     along = along / length
     across = np.array([along[2], 0, -along[0]])
-    half = 0.35
+    half = 0.35 * rng.uniform(0.8, 1.3)
     axes = np.stack([along, [0, 1, 0], across], 1)
     low, high = np.array([0, 0, -half + 0.1]), np.array([length, height - 0.12, half - 0.1])
     scenery.add(
         thing, leaves.solid, box_quads((low + high) / 2, (high - low) / 2) @ axes.T + ends[0]
     )
     # Sprays on both sides and on top hide it.
-    n = int(40 * length)
+    n = int(60 * length)
     s, v = rng.uniform(0, length, n), rng.uniform(-half, height + half, n)
     over = v > height
     y = np.where(over, height, np.maximum(v, 0))
@@ -220,7 +283,7 @@ def hedge(
     places = ends[0] + s[:, None] * along + off[:, None] * across
     places[:, 1] += y
     outward = np.where(over[:, None], [0.0, 1.0, 0.0], np.sign(off)[:, None] * across)
-    _add_sprays(scenery, thing, rng, leaves, places, outward, 0.3, rng.random(n) < 0.75)
+    _add_sprays(scenery, thing, rng, leaves, places, outward, 0.22, rng.random(n) < 0.75)
 
 
 def _limb(
@@ -228,13 +291,14 @@ def _limb(
     thing: str,
     look: SceneryMaterial,
     start: F64,
-    end: F64,
+    tip: F64,
     radius: float,
     *,
     n: int = 7,
+    end: float = 0.45,
 ) -> None:
-    """A trunk or branch that tapers to its end."""
-    axis = end - start
+    """A trunk or branch that tapers to a share of its radius."""
+    axis = tip - start
     length = float(np.linalg.norm(axis))
     if length < 1e-3:
         return
@@ -244,7 +308,7 @@ def _limb(
     v = np.cross(axis, u)
     turn = np.linspace(0, 2 * np.pi, n + 1)[:, None]
     ring = np.cos(turn) * u + np.sin(turn) * v
-    low, high = start + radius * ring, end + 0.45 * radius * ring
+    low, high = start + radius * ring, tip + end * radius * ring
     scenery.add(thing, look, np.stack([low[:-1], low[1:], high[1:], high[:-1]], 1))
 
 

@@ -116,11 +116,13 @@ class Scenery:
         materials: list[Material] = []
         textures: dict[str, Texture] = {}
         index: dict[str, int] = {}
+        pictures: dict[int, Texture] = {}
         for look in self._looks.values():
             texture = None
             if look.picture is not None:
-                texture = _texture(look.name, look.picture)
-                textures[texture.id] = texture
+                # Plants of a kind share a picture.
+                texture = pictures.get(id(look.picture)) or _texture(look.name, look.picture)
+                textures[texture.id] = pictures[id(look.picture)] = texture
             index[look.name] = first_material + len(materials)
             gloss = {"specular": (0.5, 0.5, 0.5), "shininess": 2000.0} if look.is_glossy else {}
             materials.append(
@@ -198,6 +200,29 @@ def mottled(
     )
     tone = np.clip(tone, 0, 1)[..., None]
     return np.asarray(np.array(dark) * (1 - tone) + np.array(light) * tone, np.float32)
+
+
+def grass(rng: np.random.Generator) -> F32:
+    """(384, 384, 3) linear: a lawn, fresh in patches and dry in others, with blades and tufts.
+
+    Real lawns reflect .05 to .25 of light, green a quarter more than red and twice as much as blue.
+    """
+    shape = (384, 384)
+    patches = noise(rng, shape, slope=2.6, band=(2.0, 1e9))
+    dry = np.clip(rng.uniform(0.05, 0.4) + 0.28 * patches, 0, 1)[..., None]
+    fresh = np.clip(0.55 + 0.3 * noise(rng, shape, slope=1.6), 0, 1)[..., None]
+    green = np.array([0.062, 0.084, 0.036]) * (1 - fresh) + np.array([0.120, 0.145, 0.066]) * fresh
+    picture = green * (1 - dry) + np.array([0.190, 0.172, 0.108]) * dry
+    tone = (
+        1
+        + 0.22 * noise(rng, shape, slope=0.3)
+        + 0.14 * noise(rng, shape, slope=1.0, band=(30, 1e9))
+    )
+    stripes = 0.05 * np.sign(np.sin(2 * np.pi * 8 * np.arange(384) / 384)) * (rng.random() < 0.4)
+    tone += stripes[:, None]
+    return np.asarray(
+        rng.uniform(0.85, 1.15) * picture * np.clip(tone, 0.3, 1.9)[..., None], np.float32
+    )
 
 
 def paved(rng: np.random.Generator, rgb: Rgb, n: int) -> F32:

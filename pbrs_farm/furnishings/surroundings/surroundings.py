@@ -35,6 +35,7 @@ from pbrs_farm.furnishings.surroundings.plants import (
     SPECIES,
     Leaves,
     bush,
+    hazy,
     hedge,
     leaves_of,
     tree,
@@ -62,7 +63,8 @@ _ROAD: Final = (5.0, 11.5)  # away from the home's side
 _PAVEMENT_M: Final = 2.0
 _TOWN_TREES: Final = (0, 2, 5)  # of plants.SPECIES
 _GARDEN_TREES, _SHARES = (0, 1, 2, FIR, 4), (0.26, 0.24, 0.22, 0.18, 0.10)
-_BUSHES: Final = (0, 1, 2, 4)
+_BUSHES: Final = (2, 4, 6, 6, 7)
+_HEDGES: Final = (6, 6, 7, FIR)
 _PATH_M: Final = 1.2  # width of the paving around a house
 
 
@@ -280,7 +282,7 @@ def _garden(place: _Place, side: _Side, number: int) -> None:
     half = side.half + depth * 0.8
     ends = np.stack([side.at(-half, depth), side.at(half, depth)])
     if rng.random() < 0.55:
-        leaves = place.leaves[int(rng.choice([0, 1, FIR]))]
+        leaves = place.leaves[int(rng.choice(_HEDGES))]
         hedge(scenery, f"hedge_{number}", rng, ends, rng.uniform(1.3, 2.1), leaves)
     else:
         front = Front(ends[0], side.along, -side.out)
@@ -355,9 +357,9 @@ def _far_ring(place: _Place, footprint: BaseGeometry, ground_y: float, kinds: li
     turn = np.linspace(0, 2 * np.pi, _N_RING + 1)
     waves = sum(rng.uniform(0.4, 1) / k * np.sin(k * turn + rng.uniform(0, 7)) for k in range(1, 8))
     far = "hills" in kinds
-    trees = SceneryMaterial("far trees", picture=tree_line(rng))
-    hills = SceneryMaterial("far hills", picture=mottled(rng, (0.09, 0.12, 0.10),
-        (0.14, 0.18, 0.13), slope=2.4), size_m=(90.0, 90.0))
+    trees = SceneryMaterial("far trees", picture=hazy(tree_line(rng), 0.22))
+    hills = SceneryMaterial("far hills", picture=hazy(mottled(rng, (0.05, 0.062, 0.045),
+        (0.12, 0.13, 0.085), slope=2.0), 0.6), size_m=(90.0, 90.0))
     for look, away, share, wave_m in (
         (trees, radius, 0.15, 1.5),
         (hills, radius + 8.0, 0.30 if far else 0.22, 5.0 if far else 2.0),

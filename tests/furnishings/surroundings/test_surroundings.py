@@ -9,9 +9,12 @@ import pytest
 import shapely
 
 from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.frames import LUMINANCE
 from pbrs_farm.core.house import House, Item, ItemKind, corners_of_surfaces
 from pbrs_farm.core.recipe import Recipe, RepairFields, recipe_from_name
 from pbrs_farm.furnishings.surroundings import surroundings, with_surroundings
+from pbrs_farm.furnishings.surroundings.plants import SPECIES, leaves_of
+from pbrs_farm.furnishings.surroundings.scenery import grass
 from pbrs_farm.repair import repair
 from tests.inputs.windowed_room import RECT, with_window
 
@@ -79,6 +82,26 @@ def test_upper_storeys_look_down_and_houses_see_the_ground(home: House) -> None:
     assert max(below) > 8  # a flat lies on the ground or up to four storeys above it
     garage = replace(home.rooms[0], id="0_9", name="Garage")
     assert len(depths(replace(home, rooms=(*home.rooms, garage)))) == 1
+
+
+def test_lawns_and_leaves_have_measured_albedo_in_many_greens() -> None:
+    for seed in range(6):
+        lawn = grass(np.random.default_rng(seed))
+        red, green, blue = lawn.reshape(-1, 3).mean(0)
+        assert 0.05 < LUMINANCE @ (red, green, blue) < 0.25
+        # A lawn of a saturated green would tint ceilings.
+        assert green / red < 1.3
+        assert green / blue < 2.4
+        # Square metres differ in value and in hue.
+        patches = lawn[:378, :378].reshape(9, 42, 9, 42, 3).mean((1, 3)).reshape(-1, 3)
+        assert np.std(patches @ LUMINANCE) / np.mean(patches @ LUMINANCE) > 0.03
+        assert np.std(patches[:, 1] / patches[:, 0]) > 0.02
+    for number, species in enumerate(SPECIES):
+        leaves = leaves_of(np.random.default_rng(number), number)
+        colour = leaves.spray[leaves.spray[..., 3] > 0, :3].mean(0)
+        assert 0.015 < LUMINANCE @ colour < 0.17, species.name
+        assert colour.max() / colour.min() < 3.2, species.name
+        assert len({leaves.of_plant(np.random.default_rng(k)).outer.rgb for k in range(30)}) > 3
 
 
 def test_a_home_without_windows_stays_as_it_is(home: House) -> None:
