@@ -45,7 +45,8 @@ class Content:
 
     maps_of: the painted pixels of a pattern; pattern_size: one repeat, metres; paint_files: the
     code that paints, for the digest of stored paintings. panels_m: width of a panel and height of the
-    panelling, by variant. wallpapers: names of patterns; wallpaper_inks: colours on a ground.
+    panelling, by variant. wallpapers: names of patterns, plain_wallpapers: of
+    those in one colour; wallpaper_inks: colours on a ground.
     print_pixels: a picture for a wall, and its family. rugs, bath_mats, door_mats: names of
     patterns for rug_pixels. ring: a rectangular moulding; facing_disc: a profile turned about +z.
     """
@@ -68,6 +69,7 @@ class Content:
     paint_files: Sequence[Path]
     panels_m: Mapping[str, tuple[float, float]]
     wallpapers: Sequence[str]
+    plain_wallpapers: Sequence[str]
     wallpaper_inks: Callable[[Rng, Rgb, Rgb], tuple[Rgb, Rgb]]
     print_pixels: Callable[..., tuple[Srgb8Image, str]]
     rug_pixels: Callable[..., Srgb8Image]

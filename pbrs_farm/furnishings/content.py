@@ -11,7 +11,7 @@ from pbrs_farm.furnishings.rug_patterns import BATH_MATS, DOOR_MATS, RUGS, rug_p
 from pbrs_farm.furnishings.surroundings import with_surroundings
 from pbrs_farm.furnishings.textures.families import maps_of, size_of
 from pbrs_farm.furnishings.textures.panelling import PANELS_M
-from pbrs_farm.furnishings.textures.wallpaper import PATTERNS, inks
+from pbrs_farm.furnishings.textures.wallpaper import PATTERNS, PLAIN, inks
 from pbrs_farm.furnishings.things import books, case_goods, families, hung, radiators
 from pbrs_farm.furnishings.things.book_covers import book_covers
 from pbrs_farm.furnishings.things.maker import Thing, described_in
@@ -38,6 +38,7 @@ CONTENT: Final = Content(
     paint_files=tuple(sorted((Path(__file__).parent / "textures").glob("*.py"))),
     panels_m=PANELS_M,
     wallpapers=PATTERNS,
+    plain_wallpapers=PLAIN,
     wallpaper_inks=inks,
     print_pixels=print_pixels,
     rug_pixels=rug_pixels,

@@ -131,7 +131,7 @@ def walls_of(
     # Paint most rooms; paper, brick and rough plaster by the style.
     draw = rng.random()
     paper_share = (
-        0.38 if style.walls[0] == "wallpaper" else 0.25 if "wallpaper" in style.walls else 0.05
+        0.24 if style.walls[0] == "wallpaper" else 0.15 if "wallpaper" in style.walls else 0.04
     )
     if draw < paper_share:
         paper = _wallpaper(rng, style, paint.tints[0])
@@ -218,9 +218,9 @@ def _brick(rng: np.random.Generator, style: Style) -> Pattern:
 
 def _wallpaper(rng: np.random.Generator, style: Style, ground: Rgb) -> Pattern:
     tint, accent = content().wallpaper_inks(rng, ground, mix(style.palette[2], style.accent, 0.25))
-    return Pattern(
-        "wallpaper", _seed(rng), (ground, tint, accent), variant=_pick(rng, style.papers)
-    )
+    # As many papers are plain as printed.
+    papers = content().plain_wallpapers if rng.random() < 0.5 else style.papers
+    return Pattern("wallpaper", _seed(rng), (ground, tint, accent), variant=_pick(rng, papers))
 
 
 def _wall_tiles(rng: np.random.Generator, style: Style, height_m: float) -> tuple[Pattern, float]:

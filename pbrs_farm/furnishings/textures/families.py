@@ -62,7 +62,7 @@ _SIZE_M: Final = {
     "chevron": _FLOOR_M, "marble": (2.4, 2.4), "terracotta": _FLOOR_M, "brick": _FLOOR_M,
     "painted brick": _FLOOR_M, "paint": (1.0, 1.0), "plaster": _FLOOR_M,
     "smooth plaster": _FLOOR_M, "concrete": _FLOOR_M, "carpet": (1.0, 1.0),
-    "loop carpet": (0.64, 0.64), "printed carpet": (0.8, 0.8), "wallpaper": (WIDTH_M, WIDTH_M), "grain": (1.0, 1.0),
+    "loop carpet": (0.64, 0.64), "printed carpet": (0.8, 0.8), "wallpaper": (WIDTH_M, WIDTH_M), "grain": (1.0, 0.5),
     "weave": (0.25, 0.25), "twill": (0.25, 0.25), "leather": (0.3, 0.3),
     "upright boards": (1.2, 1.2), "level boards": (1.2, 1.2), "wall planks": (1.6, 1.6),
     "slats": (1.2, 1.2),
@@ -184,7 +184,7 @@ def _terracotta(rng: np.random.Generator, p: Pattern) -> SurfaceMaps:
 
 
 def _wallpaper(rng: np.random.Generator, p: Pattern) -> SurfaceMaps:
-    """Variant: a name of wallpaper.PATTERNS; tints: ground, print, accent."""
+    """Variant: a name of wallpaper.PATTERNS or PLAIN; tints: ground, print, accent."""
     return wallpaper_maps(rng, _COARSE, p.variant, p.tints[0], p.tints[1], p.tints[2])
 
 
@@ -228,7 +228,7 @@ FAMILIES: dict[str, _Painter] = {
         p.variant if p.variant in PATTERNS else PATTERNS[0],
         (p.tints[0], p.tints[1], p.tints[2]),
     ),
-    "grain": lambda r, p: grain_maps(r, p.wood, edge_px=pixels_of(size_of(p))[0]),
+    "grain": lambda r, p: grain_maps(r, p.wood, size_of(p), pixels_of(size_of(p))[1]),
     "weave": lambda r, p: _woven_cloth(r, p, twill=False),
     "twill": lambda r, p: _woven_cloth(r, p, twill=True),
     "leather": lambda r, p: leather_maps(r, _COARSE, size_of(p), p.tints[0]),

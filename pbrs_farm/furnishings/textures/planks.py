@@ -182,16 +182,18 @@ def _start_of_planks(
 def grain_maps(
     rng: np.random.Generator,
     wood: Wood,
-    size_m: float = 1.0,
+    size_m: tuple[float, float] = (1.0, 0.5),
     edge_px: int = 512,
     roughness: float = 0.4,
 ) -> SurfaceMaps:
-    """Veneer without joints, the grain along u, for furniture."""
-    shape = (edge_px, edge_px)
-    sheet = wood_sheet(rng, wood, shape, size_m / edge_px)
+    """Veneer without joints, the grain along u, for furniture.
+
+    The sheet is laid narrower than it is drawn: rings of veneer are half as wide as those of planks.
+    """
+    sheet = wood_sheet(rng, wood, (edge_px, edge_px), size_m[0] / edge_px)
     colour = ramp(sheet.tone, wood.dark, wood.light)
     return surface_maps(
-        colour, roughness + 0.12 * (0.62 - sheet.tone), 0.00005 * sheet.tone, (size_m, size_m), 0.5
+        colour, roughness + 0.12 * (0.62 - sheet.tone), 0.00005 * sheet.tone, size_m, 0.5
     )
 
 

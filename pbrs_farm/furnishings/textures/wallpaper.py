@@ -1,4 +1,4 @@
-"""Wallpaper: stripes, damask, leaves and geometric prints, drawn by distance fields; no effects."""
+"""Wallpaper: woven plain papers, stripes, damask, leaves and geometric prints; no effects."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from pbrs_farm.dress.surface_maps import SurfaceMaps, surface_maps
 WIDTH_M = 0.53  # width of a roll
 
 PATTERNS = ("stripes", "damask", "geometric", "leaves")
+PLAIN = ("linen", "grasscloth")  # of one colour
 
 
 def wallpaper_maps(
@@ -258,9 +259,22 @@ def _damask(rng: np.random.Generator, shape: Shape2) -> list[F32]:
     return [ink, second]
 
 
+def _woven(rng: np.random.Generator, shape: Shape2, *, is_linen: bool) -> list[F32]:
+    """Threads across the roll and, of linen, along it."""
+    threads = noise(rng, shape, slope=0.4, stretch=(1.0, 30.0), band=(20.0, 1e9))
+    if is_linen:
+        threads = 0.6 * threads + 0.6 * noise(
+            rng, shape, slope=0.4, stretch=(30.0, 1.0), band=(20.0, 1e9)
+        )
+    ink = np.clip(0.35 + 0.3 * threads, 0, 1)
+    return [np.asarray(ink, np.float32), np.zeros(shape, np.float32)]
+
+
 _DRAWN: dict[str, Callable[[np.random.Generator, Shape2], list[F32]]] = {
     "stripes": _stripes,
     "geometric": _geometric,
     "leaves": _leaves,
     "damask": _damask,
+    "linen": partial(_woven, is_linen=True),
+    "grasscloth": partial(_woven, is_linen=False),
 }

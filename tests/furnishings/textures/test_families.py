@@ -12,7 +12,7 @@ from pbrs_farm.dress.style import WOODS
 from pbrs_farm.dress.surface_maps import normals_from_height
 from pbrs_farm.furnishings.textures import families
 from pbrs_farm.furnishings.textures.families import FAMILIES, size_of
-from pbrs_farm.furnishings.textures.wallpaper import PATTERNS
+from pbrs_farm.furnishings.textures.wallpaper import PATTERNS, PLAIN
 from pbrs_farm.read.builtin.builtin_home import builtin_home
 
 maps_of = cache(families.maps_of)  # each is painted once for the tests of this module
@@ -20,7 +20,7 @@ maps_of = cache(families.maps_of)  # each is painted once for the tests of this 
 GREEN = ((0.7, 0.75, 0.7), (0.5, 0.6, 0.5), (0.3, 0.5, 0.4))
 ALL = [
     *(Pattern(f, 5, GREEN, variant="20" if f == "tiles" else "leaves") for f in FAMILIES),
-    *(Pattern("wallpaper", 6, GREEN, variant=v) for v in PATTERNS),
+    *(Pattern("wallpaper", 6, GREEN, variant=v) for v in (*PATTERNS, *PLAIN)),
     *(
         Pattern("tiles", 6, GREEN, variant=v)
         for v in ("60-stone", "10-checker", "mosaic-mixed", "subway")
@@ -58,6 +58,16 @@ def test_equal_patterns_give_equal_pixels_and_other_seeds_others(family: str) ->
 def test_a_plain_surface_has_its_tint_as_mean_colour(family: str) -> None:
     colour = maps_of(Pattern(family, 3, GREEN)).colour
     assert np.abs(colour.reshape(-1, 3).mean(0) / 255 - GREEN[0]).max() < 0.02
+
+
+def test_rings_of_veneer_are_a_few_millimetres_wide() -> None:
+    for wood in ("oak", "beech", "walnut"):
+        maps = maps_of(Pattern("grain", 1, wood=WOODS[wood]))
+        rows = maps.colour.astype(float).mean(2)
+        power = (np.abs(np.fft.rfft(rows - rows.mean(0), axis=0)) ** 2).mean(1)
+        per_m = np.arange(len(power)) / maps.size_m[1]
+        rings = (per_m > 60) & (per_m < 600)
+        assert 180 < np.average(per_m[rings], weights=power[rings]) < 400, wood
 
 
 def test_dark_wood_makes_a_darker_floor_than_pale_wood() -> None:
