@@ -48,7 +48,7 @@ class Content:
     panelling, by variant. wallpapers: names of patterns, plain_wallpapers: of
     those in one colour; wallpaper_inks: colours on a ground.
     print_pixels: a picture for a wall, and its family. rugs, bath_mats, door_mats: names of
-    patterns for rug_pixels. ring: a rectangular moulding; facing_disc: a profile turned about +z.
+    patterns for rug_pixels. moulding: along a rectangle, of a profile; facing_disc: a profile turned about +z.
     """
 
     things: Mapping[str, Callable[..., Model]]
@@ -76,7 +76,7 @@ class Content:
     rugs: Sequence[str]
     bath_mats: Sequence[str]
     door_mats: Sequence[str]
-    ring: Callable[..., Surface]
+    moulding: Callable[..., Surface]
     facing_disc: Callable[..., Surface]
     with_surroundings: Callable[[House, str, int], House]
 

@@ -45,7 +45,7 @@ CONTENT: Final = Content(
     rugs=tuple(RUGS),
     bath_mats=tuple(BATH_MATS),
     door_mats=tuple(DOOR_MATS),
-    ring=hung.ring,
+    moulding=hung.moulding,
     facing_disc=hung.facing_disc,
     with_surroundings=with_surroundings,
 )

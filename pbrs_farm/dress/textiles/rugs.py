@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import shapely
@@ -14,15 +15,16 @@ from pbrs_farm.core.catalogue import Place
 from pbrs_farm.core.classes import BATHTUB, BED, FLOOR_MAT, SINK, SOFA, TABLE
 from pbrs_farm.core.house import Item, ItemKind, Material, Surface
 from pbrs_farm.dress.content import content
-from pbrs_farm.dress.models import Model, hanging_piece
+from pbrs_farm.dress.models import Model, Part, hanging_piece
 from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.space import HouseSpace, RoomSpace, house_space
-from pbrs_farm.dress.style import Style, room_style
+from pbrs_farm.dress.style import Style, room_style, shade
 from pbrs_farm.dress.thing_materials import plain
 from pbrs_farm.dress.walls.hanging import next_id
 from pbrs_farm.dress.walls.hung_things import jpeg_texture
-from pbrs_farm.geometry.bodies import loft, slab
-from pbrs_farm.geometry.outlines import oval, rect
+from pbrs_farm.geometry.bodies import hoop, loft
+from pbrs_farm.geometry.outlines import Triple, gathered, oval, rect
+from pbrs_farm.geometry.solids import boxes_surface
 from pbrs_farm.home.room_use import RoomKind
 
 # fmt: off
@@ -30,8 +32,12 @@ PASS = "textiles"
 RUG_TAG = "rug"
 _FROM_WALL_M = 0.3
 _BORDERED = ("bordered", "plain", "sisal", "diamonds", "faded")
-_RUG_FORMS = ("sharp", "sharp", "rounded", "fringed", "oval")
-_MAT_FORMS = ("sharp", "rounded", "oval")
+_RUG_FORMS = ("sharp", "rounded", "fringed", "long fringe", "tassels", "bound", "rope", "stitched",
+    "scalloped", "octagon", "oval", "oval rope", "hide")
+_MAT_FORMS = ("sharp", "rounded", "oval", "bound", "rope", "stitched", "scalloped", "octagon")
+_DOOR_MAT_FORMS = ("sharp", "rounded", "half", "bound", "stitched", "octagon")
+_STRAIGHT = ("sharp", "fringed", "tassels", "bound", "rope", "stitched")  # forms with square corners
+_FLEECES = ("shag", "plain", "bobbles")  # patterns of hides
 _GAP_M = 0.0005  # gap between the floor and the rug's back
 _SIZES = ((1.6, 2.3), (1.7, 2.4), (2.0, 3.0), (2.0, 2.9), (1.4, 2.0), (1.2, 1.7))
 _LEAST_M, _MOST_M = 0.3, 6.0  # least and greatest side of a rug
@@ -41,15 +47,17 @@ def rug(rng: np.random.Generator, width: float, length: float, style: Style,
     patterns: Sequence[str] = (), forms: Sequence[str] = _RUG_FORMS) -> Model:
     """A rug with its length along x and its back at y = 0, of one of the patterns and forms.
 
-    Forms: sharp or rounded corners, fringed ends, oval (half of an oval: half).
+    Forms: what its edge is like; half is half of an oval.
     """
     patterns = patterns or content().rugs
     pattern, form = str(rng.choice(list(patterns))), str(rng.choice(list(forms)))
     # A border runs along straight sides, rings along round ones.
-    if form == "oval" and pattern in _BORDERED:
-        form = "rounded"
+    if pattern in _BORDERED and form not in _STRAIGHT:
+        form = str(rng.choice(_STRAIGHT))
     elif pattern == "rings":
-        form = "oval"
+        form = str(rng.choice(("oval", "oval rope")))
+    elif form == "hide" and pattern not in _FLEECES:
+        form = "bound"
     thick = float(rng.uniform(0.008, 0.0095))
     pixels = content().rug_pixels(rng, width, length, style, pattern)
     texture = jpeg_texture(f"rug {pattern}", pixels)
@@ -57,25 +65,86 @@ def rug(rng: np.random.Generator, width: float, length: float, style: Style,
     # The back and the edge take the mean colour of the face.
     r, g, b = (round(float(c) / 255, 2) for c in pixels.reshape(-1, 3).mean(0))
     edge = plain("rug edge", (r, g, b), 1.0)
-    fringe = 0.05 if form == "fringed" else 0.0
-    face, back = _slab(
-        _rug_outline(length - 2 * fringe, width, form), thick, (length - 2 * fringe, width)
-    )
-    parts = [(face, shown), (back, edge)]
-    if fringe:
-        yarn = plain("fringe", (0.8, 0.76, 0.68), 1.0)
-        parts += [(s, yarn) for s in _fringe(rng, width, length / 2, fringe)]
+    inset, trimmings = _trimmings(rng, width, length, form, edge, style)
+    size = (length - 2 * inset[0], width - 2 * inset[1])
+    face, back = _slab(_rug_outline(rng, *size, form), thick, size)
+    parts = [(face, shown), (back, edge), *trimmings]
     return hanging_piece("rug", "rug", FLOOR_MAT, parts, [texture], Place.FLOOR)
 
 
-def _rug_outline(length: float, width: float, form: str) -> list[tuple[float, float]]:
-    if form == "oval":
-        return oval(length, width, n=40)
-    if form == "half":
-        # The straight side is at the door.
-        t = np.pi * np.arange(25) / 24
-        return [(float(length / 2 * np.cos(a)), float(width * (0.5 - np.sin(a)))) for a in t]
-    return rect(length, width, 0.08 if form == "rounded" else 0.0005)
+def _rug_outline(
+    rng: np.random.Generator, length: float, width: float, form: str
+) -> list[tuple[float, float]]:
+    match form:
+        case "oval" | "oval rope":
+            return oval(length, width, n=40)
+        case "half":
+            # The straight side is at the door.
+            t = np.pi * np.arange(25) / 24
+            return [(float(length / 2 * np.cos(a)), float(width * (0.5 - np.sin(a)))) for a in t]
+        case "octagon":
+            return rect(length, width, 0.22 * width, n=1)
+        case "scalloped":
+            return gathered(length - 0.03, width - 0.03, float(rng.uniform(0.07, 0.13)), 0.015)
+        case "hide":
+            # Legs at the corners, uneven sides.
+            t = -2 * np.pi * (np.arange(48) + 0.5) / 48
+            r = 0.86 + 0.1 * np.cos(4 * t + np.pi) + sum(
+                0.02 * rng.normal() * np.cos(k * t + rng.uniform(0, 6)) for k in range(2, 7))
+            ring = r * np.stack([np.cos(t), np.sin(t)])
+            low, high = ring.min(1), ring.max(1)
+            x, z = ((ring.T - (low + high) / 2) / (high - low) * [length, width]).T
+            return [(float(a), float(b)) for a, b in zip(x, z, strict=True)]
+        case "rounded":
+            return rect(length, width, 0.08)
+    return rect(length, width, 0.0005)
+
+
+def _trimmings(rng: np.random.Generator, width: float, length: float, form: str, edge: Material,
+    style: Style) -> tuple[tuple[float, float], list[Part]]:
+    """The distances of a rug's body from its ends and sides, and the parts between."""
+    yarn = plain("fringe", (0.8, 0.76, 0.68), 1.0)
+    colour = style.textiles[int(rng.integers(len(style.textiles)))]
+    dyed = plain("rug border", shade(colour, 0.7), 1.0)
+    end, side = length / 2, width / 2
+    match form:
+        case "fringed":
+            return (0.05, 0.0), [(_fringe(rng, side, end, 0.05, 0.025), yarn)]
+        case "long fringe":
+            cord = yarn if rng.random() < 0.6 else edge
+            return (0.1, 0.0), [(_fringe(rng, side, end, 0.1, 0.05), cord)]
+        case "tassels":
+            boxes: list[tuple[Triple, Triple]] = []
+            for x, z in product((-1.0, 1.0), (-side, side - 0.03)):
+                spans = [(0.045, 0.062, z, 0.03, 0.009)]
+                spans += [(0.0, 0.05, z + 0.011 * k, 0.008, 0.003) for k in range(3)]
+                for near, far, low, wide, thick in spans:
+                    x0, x1 = sorted((x * (end - near), x * (end - far)))
+                    boxes.append(((x0, 0.0, low), (x1, thick, low + wide)))
+            return (0.06, 0.0), [(boxes_surface("tassels", boxes, 0), dyed)]
+        case "bound":
+            t, high = float(rng.uniform(0.02, 0.05)), 0.0098
+            tape = [((-end, 0.0, -side), (end, high, t - side)),
+                ((-end, 0.0, side - t), (end, high, side)),
+                ((-end, 0.0, t - side), (t - end, high, side - t)),
+                ((end - t, 0.0, t - side), (end, high, side - t))]
+            return (t, t), [(boxes_surface("tape", tape, 0), dyed)]
+        case "rope" | "oval rope":
+            along, across = length - 0.012, width - 0.012
+            path = rect(along, across, 0.02) if form == "rope" else oval(along, across, n=48)
+            return (0.006, 0.006), [(hoop(path, 0.0049, 0.0049), dyed)]
+        case "stitched":
+            return (0.004, 0.004), [(_stitches(side, end, float(rng.uniform(0.04, 0.07))), dyed)]
+    return (0.0, 0.0), []
+
+
+def _stitches(side: float, end: float, step: float) -> Surface:
+    """Stitches over the edge all round."""
+    ends = product(np.arange(step / 2 - end, end - 0.004, step), (0.011 - side, side - 0.011))
+    sides = product((0.011 - end, end - 0.011), np.arange(step - side, side - step / 2, step))
+    rows = [(x, z, 0.003, 0.011) for x, z in ends] + [(x, z, 0.011, 0.003) for x, z in sides]
+    stitches = [((x - a, 0.0, z - b), (x + a, 0.0099, z + b)) for x, z, a, b in rows]
+    return boxes_surface("stitches", stitches, 0)
 
 
 def _slab(
@@ -89,15 +158,15 @@ def _slab(
     return face, replace(whole, faces=whole.faces[~is_top])
 
 
-def _fringe(rng: np.random.Generator, width: float, end: float, long: float) -> list[Surface]:
+def _fringe(rng: np.random.Generator, w: float, end: float, long: float, step: float) -> Surface:
     """Tassels at both ends of a rug."""
     tassels = []
-    for z in np.arange(-width / 2 + 0.01, width / 2 - 0.01, 0.025):
+    for z in np.arange(-w + 0.01, w - 0.01, step):
         for side in (-1.0, 1.0):
             tip = end - float(rng.uniform(0.0, 0.012))
             x0, x1 = sorted((side * (end - long), side * tip))
-            tassels.append(slab((x0, 0.0, float(z)), (x1, 0.003, float(z) + 0.012)))
-    return tassels
+            tassels.append(((x0, 0.0, float(z)), (x1, 0.003, float(z) + 0.012)))
+    return boxes_surface("fringe", tassels, 0)
 
 
 def lay_rugs(
@@ -222,7 +291,7 @@ def _doormats(
         turn = float(np.arctan2(out[0], out[2]))
         _lay_largest(house, house_space(house), room, style, rng, position, turn,
             [(0.45, 0.75), (0.4, 0.6)], from_wall=0.05, patterns=content().door_mats,
-            forms=("sharp", "sharp", "rounded", "half"), bare=True, at_doors=True)
+            forms=_DOOR_MAT_FORMS, bare=True, at_doors=True)
 
 
 def _furniture_of_class(house: MutableHouse, room: RoomSpace, nyu40: int) -> list[int]:

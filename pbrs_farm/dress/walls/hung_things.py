@@ -20,6 +20,7 @@ from pbrs_farm.dress.content import content
 from pbrs_farm.dress.models import Model, hanging_piece
 from pbrs_farm.dress.style import Rgb, Style, shade
 from pbrs_farm.dress.thing_materials import metal, plain
+from pbrs_farm.geometry.bodies import square_tube
 from pbrs_farm.geometry.solids import box, quads_surface
 from pbrs_farm.images import jpeg_from_array
 
@@ -60,6 +61,32 @@ def faced_slab(name: str, low: F64, high: F64, z: tuple[float, float]) -> tuple[
     return face, replace(whole, faces=whole.faces[keep])
 
 
+# Profiles of mouldings, (share of the width, share of the depth) from the outer edge to the inner one.
+# fmt: off
+_PROFILES: Final[dict[str, tuple[tuple[float, float], ...]]] = {
+    "flat": ((0, 0), (0, 0.92), (0.1, 1), (0.9, 1), (1, 0.92), (1, 0)),
+    "square": ((0, 0), (0, 1), (1, 1), (1, 0)),
+    "sloping out": ((0, 0), (0, 0.5), (0.85, 1), (1, 0.95), (1, 0)),
+    "sloping in": ((0, 0), (0, 0.95), (0.12, 1), (1, 0.5), (1, 0)),
+    "round": ((0, 0), (0, 0.5), (0.12, 0.8), (0.32, 0.97), (0.5, 1), (0.68, 0.97), (0.88, 0.8), (1, 0.5), (1, 0)),
+    "scoop": ((0, 0), (0, 1), (0.2, 1), (0.35, 0.75), (0.55, 0.58), (0.8, 0.5), (1, 0.5), (1, 0)),
+    "plate": ((0, 0), (0, 0.95), (0.05, 1), (0.25, 1), (0.25, 0.7), (0.75, 0.7), (0.75, 0.85), (1, 0.85), (1, 0)),
+    "steps": ((0, 0), (0, 0.5), (0.35, 0.5), (0.35, 0.78), (0.7, 0.78), (0.7, 1), (1, 1), (1, 0)),
+    "ogee": ((0, 0), (0, 0.55), (0.15, 0.6), (0.35, 0.85), (0.55, 1), (0.7, 1), (0.7, 0.8), (0.9, 0.62), (1, 0.6), (1, 0)),
+}
+# fmt: on
+_MOUNTS: Final = ("none", "none", "mat", "mat", "double mat", "lip", "float")
+_RELIEF_M: Final = 0.006  # that a print lies below the front of its frame
+
+
+def ring(
+    name: str, low: F64, high: F64, width: float, depth: float, kind: str = "square"
+) -> Surface:
+    """A frame along a rectangle, of a kind of moulding; low, high (2,) are its outer corners."""
+    profile = [(width * x, depth * z) for x, z in _PROFILES[kind]]
+    return content().moulding(name, low, high, profile)
+
+
 def framed(
     rng: np.random.Generator,
     style: Style,
@@ -68,38 +95,113 @@ def framed(
     print_: Texture,
     frame: Material,
 ) -> Model:
-    """A print behind a moulding, with or without a mat; outer size in metres."""
+    """A print behind one of nine mouldings and in one of five mounts; outer size in metres."""
     frame_m, depth = _moulding(rng, min(width, height))
+    kinds = list(_PROFILES)[: 4 if frame_m < 0.02 else None]
+    kind, mount = str(rng.choice(kinds)), str(rng.choice(_MOUNTS))
     low, high = np.array([-width / 2, 0.0]), np.array([width / 2, height])
-    shown = _printed(print_)
-    parts = [(content().ring("frame", low, high, frame_m, depth), frame)]
-    z = depth - 0.006
-    mat = float(rng.uniform(0.1, 0.17)) * min(width, height) if rng.random() < 0.6 else 0.0
-    inner_low, inner_high = low + frame_m, high - frame_m
-    if mat:
-        card = content().ring("mat", inner_low, inner_high, mat, z)
-        parts.append((card, plain("mat", (0.93, 0.92, 0.89), 0.9)))
-        inner_low, inner_high, z = (inner_low + mat - 0.002, inner_high - mat + 0.002, z - 0.002)
-    face, back = faced_slab("print", inner_low, inner_high, (0.001, z))
-    parts += [(face, shown), (back, plain("card", (0.6, 0.52, 0.42), 0.9))]
+    parts = [(ring("frame", low, high, frame_m, depth, kind), frame)]
+    if kind == "plate" and rng.random() < 0.5:
+        parts += [(b, frame) for b in _corner_blocks(low, high, frame_m, depth)]
+    # The inner edge of a moulding may lie below its front.
+    z = depth * _PROFILES[kind][-2][1] - _RELIEF_M
+    low, high = low + frame_m, high - frame_m
+    white = plain("mat", (0.93, 0.92, 0.89), 0.9)
+    mat = float(rng.uniform(0.1, 0.17)) * min(width, height)
+    if mount == "lip":
+        parts.append((ring("lip", low, high, 0.006, z + 0.004, "round"), metal(style)))
+        low, high, z = low + 0.005, high - 0.005, z - 0.002
+    elif mount in ("mat", "double mat"):
+        for card in (white, plain("mat", shade(style.accent, 0.9), 0.9))[: 1 + (mount != "mat")]:
+            parts.append((ring("mat", low, high, mat, z), card))
+            low, high, z, mat = low + mat - 0.002, high - mat + 0.002, z - 0.002, 0.008
+    elif mount == "float":
+        face, back = faced_slab("card", low, high, (0.001, z - 0.004))
+        parts += [(face, white), (back, white)]
+        low, high = low + 0.6 * mat, high - 0.6 * mat
+    face, back = faced_slab("print", low, high, (0.001, z))
+    parts += [(face, _printed(print_)), (back, plain("card", (0.6, 0.52, 0.42), 0.9))]
     return hanging_piece("framed_picture", "picture_frame", PICTURE, parts, [print_])
 
 
-def canvas(width: float, height: float, print_: Texture, edge: Rgb) -> Model:
-    """A stretched canvas."""
+def _corner_blocks(low: F64, high: F64, side: float, depth: float) -> list[Surface]:
+    """A square block on each corner of a frame."""
+    half = np.array([side / 2, side / 2, 0.003])
+    return [
+        box("block", np.array([x, y, depth + 0.002]), half, 0)
+        for x in (low[0] + side / 2, high[0] - side / 2)
+        for y in (low[1] + side / 2, high[1] - side / 2)
+    ]
+
+
+def canvas(
+    rng: np.random.Generator,
+    width: float,
+    height: float,
+    print_: Texture,
+    edge: Rgb,
+    frame: Material,
+) -> Model:
+    """A stretched canvas, half of them in a frame with a gap of shadow."""
     low, high = np.array([-width / 2, 0.0]), np.array([width / 2, height])
-    face, back = faced_slab(
-        "canvas", low, high, (0.0, 0.025 if max(width, height) < 0.8 else 0.035)
-    )
-    parts = [(face, _printed(print_)), (back, plain("canvas edge", edge, 0.85))]
+    depth, parts = 0.025 if max(width, height) < 0.8 else 0.035, []
+    if rng.random() < 0.5:
+        parts = [(ring("frame", low, high, 0.008, depth + 0.006, "flat"), frame)]
+        back = box(
+            "back",
+            np.array([0.0, height / 2, 0.002]),
+            np.array([width / 2 - 0.007, height / 2 - 0.007, 0.002]),
+            0,
+        )
+        parts.append((back, plain("floater", (0.05, 0.05, 0.05), 0.9)))
+        low, high = low + 0.016, high - 0.016
+    face, sides = faced_slab("canvas", low, high, (0.0 if not parts else 0.004, depth))
+    parts += [(face, _printed(print_)), (sides, plain("canvas edge", edge, 0.85))]
     return hanging_piece("canvas", "picture_frame", PICTURE, parts, [print_])
 
 
-def poster(width: float, height: float, print_: Texture) -> Model:
-    """A sheet of paper."""
+def poster(
+    rng: np.random.Generator, width: float, height: float, print_: Texture, frame: Material
+) -> Model:
+    """A sheet of paper: bare, taped at its corners, in clips, or between two rods on a cord."""
+    form, parts = int(rng.integers(4)), []
     low, high = np.array([-width / 2, 0.0]), np.array([width / 2, height])
-    face, back = faced_slab("poster", low, high, (0.0, 0.0015))
-    parts = [(face, _printed(print_, 0.5)), (back, plain("paper", (0.92, 0.92, 0.9), 0.8))]
+    z = 0.0015
+    x, tape = width / 2, plain("tape", (0.85, 0.8, 0.62), 0.6)
+    match form:
+        case 1:
+            corners = [
+                (a * (x - 0.012), b, 0.0018) for a in (-1, 1) for b in (0.012, height - 0.012)
+            ]
+            parts = [
+                (box("tape", np.array(p), np.array([0.02, 0.009, 0.0006]), 0), tape)
+                for p in corners
+            ]
+        case 2:
+            z = 0.006
+            clips = [(a * 0.6 * x, b, 0.004) for a in (-1, 1) for b in (0.007, height - 0.007)]
+            half = np.array([0.008, 0.01, 0.0045])
+            parts = [
+                (box("clip", np.array(p), half, 0), plain("clip", (0.6, 0.6, 0.6), 0.3))
+                for p in clips
+            ]
+        case 3:
+            low, high = low + np.array([0.006, 0.0]), high - np.array([0.006, 0.12 * width])
+            half = np.array([x, 0.011, 0.007])
+            rods = [
+                box("rod", np.array([0.0, y, 0.007]), half, 0) for y in (0.011, high[1] - 0.011)
+            ]
+            top = np.array([0.0, height - 0.003, 0.006])
+            cords = [
+                square_tube((a * 0.9 * x, high[1], 0.006), tuple(top), 0.002, 0.002)
+                for a in (-1, 1)
+            ]
+            parts = [
+                *((rod, frame) for rod in rods),
+                *((c, plain("cord", (0.6, 0.5, 0.38), 0.9)) for c in cords),
+            ]
+    face, back = faced_slab("poster", low, high, (0.0, z))
+    parts = [(face, _printed(print_, 0.5)), (back, plain("paper", (0.92, 0.92, 0.9), 0.8)), *parts]
     return hanging_piece("poster", "picture_frame", PICTURE, parts, [print_])
 
 
@@ -110,7 +212,7 @@ def mirror(width: float, height: float, frame: Material | None, frame_m: float =
     parts = []
     depth = 0.006
     if frame is not None:
-        parts.append((content().ring("frame", low, high, frame_m, 0.022), frame))
+        parts.append((ring("frame", low, high, frame_m, 0.022, "flat"), frame))
         low, high, depth = low + frame_m, high - frame_m, 0.014
     face, back = faced_slab("mirror", low, high, (0.001 if frame else 0.0, depth))
     parts += [(face, glass), (back, plain("mirror edge", (0.35, 0.4, 0.4), 0.3))]

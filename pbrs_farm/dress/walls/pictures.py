@@ -274,9 +274,9 @@ def _framed_picture(
 ) -> Model:
     width, height = size
     if kind == "canvas":
-        return canvas(width, height, shown.texture, shown.mean)
+        return canvas(rng, width, height, shown.texture, shown.mean, frame)
     if kind == "poster":
-        return poster(width, height, shown.texture)
+        return poster(rng, width, height, shown.texture, frame)
     return framed(rng, style, width, height, shown.texture, frame)
 
 

@@ -254,7 +254,8 @@ def round_mirror(m: Maker, diameter: float, frame: Material) -> None:
 @thing(group="pin_board", nyu40=WHITEBOARD, place=Place.WALL)
 def pin_board(m: Maker, width: float, height: float, frame: Material) -> None:
     """Cork in a frame, with papers, cards and photographs pinned to it."""
-    m.add(ring("frame", (-width / 2, 0.0), (width / 2, height), 0.022, 0.018), of=frame)
+    profile = [(0, 0), (0, 0.016), (0.002, 0.018), (0.02, 0.018), (0.022, 0.016), (0.022, 0)]
+    m.add(moulding("frame", (-width / 2, 0.0), (width / 2, height), profile), of=frame)
     m.box(width - 0.044, (0.022, height - 0.022), (0.001, 0.01),
         of=plain("cork", (0.66, 0.5, 0.34), 0.9))
     # Sheets are pinned to cells of a grid, so that they lie beside one another.
@@ -327,24 +328,18 @@ def coat(m: Maker, x: float, is_bath: bool) -> None:
                 at=(x + sign * (wide / 2 - 0.015), 0.02, 0.085))
 
 
-def ring(name: str, low: Sequence[float] | F64, high: Sequence[float] | F64, width: float,
-    depth: float) -> Surface:
-    """A closed rectangular moulding with mitred corners; low, high (2,) are its outer corners."""
+def moulding(name: str, low: Sequence[float] | F64, high: Sequence[float] | F64,
+    profile: Profile) -> Surface:
+    """A closed rectangular moulding with mitred corners; low, high (2,) are its outer corners.
+
+    profile: (inset from the outer edge, z) in metres, from the outer to the inner edge at the wall.
+    """
     outer = np.array([[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]])
-    inner = outer + width * np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]])
-    quads = []
-    for k in range(4):
-        a, b, c, d = outer[k], outer[(k + 1) % 4], inner[(k + 1) % 4], inner[k]
-        front, back = [_at(p, depth) for p in (a, b, c, d)], [_at(p, 0.0) for p in (a, b, c, d)]
-        quads.append(front)
-        quads.append([back[1], back[0], back[3], back[2]])
-        quads.append([back[0], back[1], front[1], front[0]])
-        quads.append([back[2], back[3], front[3], front[2]])
-    return quads_surface(name, np.array(quads), 0)
-
-
-def _at(p: F64, z: float) -> list[float]:
-    return [float(p[0]), float(p[1]), z]
+    inward = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]])
+    loops = np.array([np.c_[outer + inset * inward, np.full(4, z)] for inset, z in profile])
+    after, turned = np.roll(loops, -1, 0), np.roll(loops, -1, 1)
+    quads = np.stack([loops, turned, np.roll(after, -1, 1), after], 2)
+    return quads_surface(name, quads.reshape(-1, 4, 3), 0)
 
 
 def facing_disc(profile: Profile | F64, up: float, x: float = 0.0) -> Surface:

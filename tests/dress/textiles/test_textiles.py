@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import replace
 from typing import cast
 
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 import shapely
 
+from benchmarks.homes.variety import effective
 from pbrs_farm.core.catalogue import EMPTY
 from pbrs_farm.core.house import House, Item, ItemKind, Surface
 from pbrs_farm.core.joints import Joint, JointKind
@@ -214,8 +216,19 @@ def test_every_pattern_of_rugs_can_be_woven(pattern: str) -> None:
     assert len(inks_of(np.random.default_rng(3), STYLE)) == 5
 
 
+def test_rugs_end_in_many_ways_and_are_as_large_as_asked() -> None:
+    counts: Counter[str] = Counter()
+    for seed in range(120):
+        _piece, shape = rug(np.random.default_rng(seed), 0.9, 1.3, STYLE)
+        low, high = shape.bounds
+        assert (high - low)[[0, 2]] == pytest.approx([1.3, 0.9], abs=0.03)
+        assert high[1] < 0.01, "one walks over it"
+        counts[str(sorted(len(s.faces) for s in shape.surfaces))] += 1
+    assert effective(counts) > 12
+
+
 def test_a_rug_shows_its_picture_on_top() -> None:
-    _piece, shape = rug(np.random.default_rng(1), 1.0, 2.0, STYLE)
+    _piece, shape = rug(np.random.default_rng(1), 1.0, 2.0, STYLE, forms=("sharp",))
     face = shape.surfaces[0]
     assert shape.materials[face.material].texture_id
     corners = triangle_corners(face.positions, face.faces)

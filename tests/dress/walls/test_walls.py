@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
 import numpy as np
 import pytest
 
+from benchmarks.homes.variety import effective
 from pbrs_farm.core.catalogue import EMPTY, PRINTS, Catalogue, Picture
 from pbrs_farm.core.classes import (
     CLOTHES,
@@ -133,6 +136,20 @@ def test_prints_have_the_shape_that_is_asked_for() -> None:
     pixels, _family = print_pixels(np.random.default_rng(1), 0.7, _style())
     assert pixels.dtype == np.uint8
     assert pixels.shape[1] / pixels.shape[0] == pytest.approx(0.7, abs=0.01)
+
+
+def test_pictures_hang_in_many_frames() -> None:
+    texture = hung_things.jpeg_texture("t", np.zeros((8, 8, 3), np.uint8))
+    counts: Counter[str] = Counter()
+    for seed in range(150):
+        rng = np.random.default_rng(seed)
+        style = style_for(rng)
+        frame = hung_things.frame_material(rng, style)
+        piece, shape = hung_things.framed(rng, style, 0.5, 0.7, texture, frame)
+        assert shape.bounds[0, 2] == pytest.approx(0, abs=1e-9)
+        assert piece.size[0] == pytest.approx(0.5)
+        counts[str(sorted(len(s.faces) for s in shape.surfaces))] += 1
+    assert effective(counts) > 12
 
 
 def test_a_framed_print_shows_its_picture_upright_and_its_faces_outward() -> None:
