@@ -20,7 +20,7 @@ from pbrs_farm.dress.thing_materials import (
     plain,
 )
 from pbrs_farm.furnishings.things.cups import handle
-from pbrs_farm.furnishings.things.joints import shell
+from pbrs_farm.furnishings.things.joints import pull, shell
 from pbrs_farm.furnishings.things.maker import Maker, thing
 from pbrs_farm.geometry.bodies import HALF_TURN
 from pbrs_farm.geometry.outlines import bent, rect, rings
@@ -131,23 +131,38 @@ def microwave(m: Maker) -> None:
         of=glass((0.9, 0.95, 0.95), 0.2))
     m.box((edge + 0.0015, hw), (0.014, h - 0.002), (front - 0.0218, front), 0.004,
         of=m.pick(case, BLACK_GLASS))
+    grip = m.pick("bar", "bow", "square", "button", "button")
+    black = plain("machine black", (0.04, 0.04, 0.042), 0.5)
     with m.hinged("door", at=(-hw, 0.014, front), axis=(0.0, -1.0, 0.0), upper_rad=_DOOR_RAD):
-        m.box((-hw, edge - 0.0015), (0.014, h - 0.002), (front - 0.0218, front), 0.004, of=case)
-        m.box((-hw + 0.035, edge - 0.045), (0.05, h - 0.045), 0.0008, against=front, of=BLACK_GLASS)
-        if m.chance(0.6):
-            m.tube(bent([(edge - 0.022, 0.05, front - 0.002), (edge - 0.022, 0.05, front + 0.03),
-                (edge - 0.022, h - 0.045, front + 0.03), (edge - 0.022, h - 0.045, front - 0.002)],
-                0.012), 0.006, n=6, of=m.pick(CHROME, case))
+        m.box((-hw, edge - 0.0015), (0.014, h - 0.002), (front - 0.0218, front), 0.004,
+            of=case)
+        # A window of dark glass in a rim, with the mesh behind it as a darker field.
+        x, y = (-hw + 0.03, edge - (0.03 if grip == "button" else 0.05)), (0.045, h - 0.04)
+        m.box(x, y, 0.0008, 0.0003, against=front, of=BLACK_GLASS)
+        m.frame(x, y, 0.007, 0.0022, 0.0008, against=front, of=m.pick(case, black, CHROME))
+        m.box((x[0] + 0.03, x[1] - 0.03), (y[0] + 0.025, y[1] - 0.025), 0.0003,
+            against=front + 0.0008, of=plain("mesh", (0.12, 0.12, 0.12), 0.35))
+        if grip != "button":
+            pull(m, grip, edge - 0.022, h / 2, front - 0.0005, False, h - 0.1, m.pick(CHROME, case))
+        m.box(0.035, 0.004, 0.0006, x=(x[0] + x[1]) / 2, on=h - 0.026, against=front, of=CHROME)
     x, keys = hw - panel / 2, plain("keys", (0.7, 0.7, 0.7), 0.5)
-    m.box(0.06, 0.03, 0.0008, x=x, on=h - 0.075, against=front,
-        of=plain("clock", (0.02, 0.06, 0.05), 0.1))
-    for y in (h * 0.26, h * 0.5):
-        if m.chance(0.5):
-            m.frustum((0.02, 0), (0.017, 0.018), turn=LYING_ALONG_Z, at=(x, y, front - 0.001),
-                of=m.pick(CHROME, keys))
-        else:
-            for i, k in product(range(3), range(4)):
-                m.box(0.016, 0.02, 0.0012, left=x - 0.03 + 0.022 * i, on=0.045 + 0.03 * k,
-                    against=front, of=keys)
+    m.box(0.066, 0.03, 0.0008, x=x, on=h - 0.065, against=front, of=BLACK_GLASS)
+    for k in range(4):
+        m.box(0.006, 0.012, 0.0003, x=x + 0.012 * (k - 1.5), on=h - 0.056, against=front + 0.0007,
+            of=plain("digits", (0.55, 0.88, 0.8), 0.5))
+    low = 0.06 if grip == "button" else 0.03
+    if grip == "button":
+        m.box(panel - 0.03, 0.022, 0.003, 0.001, x=x, on=0.026, against=front, of=keys)
+    if m.chance(0.45):
+        for y in (h * 0.34, h * 0.58):
+            m.turned([(0.021, 0), (0.019, 0.016), (0.016, 0.018)], n=20, turn=LYING_ALONG_Z,
+                at=(x, y, front - 0.001), of=m.pick(CHROME, keys, black))
+            m.box(0.003, 0.016, 0.0006, x=x, on=y + 0.001, against=front + 0.0168, of=RUBBER)
+    else:
+        for i, k in product(range(3), range(m.pick(4, 5))):
+            m.box(0.018, 0.014, 0.0016, x=x + 0.023 * (i - 1), on=low + 0.0225 * k,
+                against=front, of=keys)
+    for k in range(6):  # air
+        m.box(0.0006, 0.003, 0.09, x=hw, on=0.6 * h + 0.009 * k, z=-0.1 * d, of=black)
     for a, b in product((-hw + 0.05, hw - 0.05), (-d / 2 + 0.04, front - 0.06)):
         m.cylinder(0.014, 0, 0.0125, n=10, at=(a, 0, b), of=RUBBER)

@@ -40,21 +40,49 @@ def monitor(m: Maker) -> None:
 
 @thing(group="laptop")
 def laptop(m: Maker) -> None:
-    """An open laptop; its screen is dark."""
-    # Width and depth of a 13 to 15 inch laptop; z points to who sits before it.
+    """An open laptop: keys in a well, a pad, a hinge, ports; its screen is dark in a bezel."""
+    # Width and depth of a 13 to 16 inch laptop; z points to who sits before it.
     w, d = m.uniform(0.3, 0.36), m.uniform(0.21, 0.25)
-    grey = m.pick(0.12, 0.62, 0.75)
-    shell = plain("laptop", (grey, grey, grey * 1.01), 0.35)
-    m.box(w, 0.014, d, of=shell)
-    m.box(0.88 * w, (0.014, 0.0155), (-d * 0.38, d * 0.08),
-        of=plain("keys", (0.09, 0.09, 0.09), 0.6))
-    m.box(0.3 * w, (0.014, 0.0145), (d * 0.16, d * 0.42), of=plain("pad",
-        shade((grey, grey, grey), 0.85), 0.3))
-    # Lid and screen are open by 105 degrees about the hinge at the back.
-    lean = rotation_x(-m.uniform(0.15, 0.4))
-    m.box(w, d, (-0.006, 0), turn=lean, at=(0, 0.0142, -d / 2), of=shell)
-    m.box(0.94 * w, (d * 0.06, d * 0.96), (0, 0.0006), turn=lean, at=(0, 0.0142, -d / 2),
-        of=plain("screen", (0.02, 0.02, 0.025), 0.08))
+    grey = m.pick(0.12, 0.3, 0.62, 0.75, 0.86)
+    shell = m.pick(plain("laptop", (grey, grey, grey * 1.01), 0.35), plain("laptop",
+        m.pick((0.2, 0.26, 0.36), (0.72, 0.6, 0.52), (0.55, 0.58, 0.56)), 0.35))
+    dark = plain("bezel", (0.03, 0.03, 0.033), 0.3)
+    keys = plain("keys", m.pick((0.06, 0.06, 0.06), (0.09, 0.09, 0.09), (0.8, 0.8, 0.8)), 0.6)
+    y, round_m = 0.016, m.pick(0.004, 0.01, 0.016)
+    m.board(w, d, 0.002, y, round_m, 0.0025, of=shell)
+    for x, z in product((0.03 - w / 2, w / 2 - 0.03), (0.03 - d / 2, d / 2 - 0.03)):
+        m.cylinder(0.008, 0.0, 0.0022, n=10, at=(x, 0, z), of=dark)
+    has_numbers = w > 0.335 and m.chance(0.5)
+    columns, wide = (16, 0.93 * w) if has_numbers else (m.pick(12, 13, 14), m.pick(0.82, 0.9) * w)
+    step, back = wide / columns, -0.38 * d
+    m.box(wide + 0.006, (y, y + 0.0003), (back - 0.003, back + 5 * 0.0185 + 0.003),
+        of=m.pick(dark, plain("deck", shade((grey, grey, grey), 0.8), 0.4)))
+    for i, k in product(range(4), range(columns)):
+        m.box(step - 0.0028, (y + 0.0002, y + 0.0016), 0.0125 if i == 0 else 0.0157,
+            left=-wide / 2 + step * k + 0.0014, against=back + 0.0185 * i, of=keys)
+    for k, (a, b) in enumerate(((0.0, 0.1), (0.1, 0.2), (0.2, 0.28), (0.28, 0.68), (0.68, 0.76),
+        (0.76, 0.88), (0.88, 1.0))):
+        m.box((wide * (a - 0.5) + 0.0014, wide * (b - 0.5) - 0.0014), (y + 0.0002, y + 0.0016),
+            0.0157, against=back + 0.074, of=keys, name=f"key {k}")
+    m.box(m.pick(0.26, 0.32, 0.4) * w, (y, y + 0.0006), (0.14 * d, 0.44 * d), 0.0004,
+        of=plain("pad", shade((grey, grey, grey), 0.85), 0.3))
+    if m.chance(0.4):  # loudspeakers beside the keys
+        m.box(0.035 * w, (y, y + 0.0003), (back, back + 0.09), left=0.012 - w / 2, mirrored="x", of=dark)
+    for side, k in product((-1.0, 1.0), range(m.pick(2, 3))):  # ports
+        m.box(0.0008, (0.006, 0.0115), 0.009 + 0.004 * (k == 0), x=side * w / 2,
+            z=-0.3 * d + 0.03 * k, of=dark)
+    # The lid is open by 100 to 115 degrees about the hinge at the back.
+    m.rod((-0.36 * w, 0.36 * w), y, 0.006 - d / 2, 0.005, n=10, of=m.pick(dark, shell))
+    lean, b = rotation_x(-m.uniform(0.15, 0.4)), m.pick(0.005, 0.008, 0.014)
+    with m.moved(turn=lean, at=(0, y - 0.001, 0.004 - d / 2)):
+        m.box(w, (0.003, d), (-0.006, 0), 0.002, of=shell)
+        m.box(w - 0.004, (0.008, d - 0.002), 0.0006, against=0.0, of=dark)
+        m.box(w - 2 * b, (m.pick(0.016, 0.03), d - b - 0.003), 0.0004, against=0.0006,
+            of=plain("screen", (0.02, 0.02, 0.025), 0.08))
+        m.cylinder(0.0018, 0.0, 0.0003, n=10, turn=LYING_ALONG_Z, at=(0, d - 0.5 * b - 0.002,
+            0.0005), of=CHROME)
+        if m.chance(0.6):  # a mark on the lid's back
+            m.box(0.05, 0.008, 0.0006, on=0.55 * d, against=-0.0064, of=CHROME)
 
 
 @thing(group="newspaper", nyu40=PAPER)

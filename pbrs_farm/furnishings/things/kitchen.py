@@ -56,6 +56,7 @@ from pbrs_farm.geometry.outlines import bent, d_shape, oval, rect, rings
 # fmt: off
 _OVEN: Final = glossy("oven enamel", (0.09, 0.09, 0.095), 0.35)
 CLEAR_PLASTIC: Final = glass((0.93, 0.96, 0.96), 0.25)
+_DIGITS: Final = plain("digits", (0.75, 0.88, 0.92), 0.5)
 _FALLING_RAD: Final = radians(88)  # of doors that fall open
 _FRIDGE_RAD: Final = radians(95)  # beside a wall it opens no farther
 _MACHINE_RAD: Final = radians(110)  # of a washing machine's round door
@@ -247,7 +248,15 @@ def sink_bowl(m: Maker, x: float, z: float, w: float, d: float, y: float, r: flo
         (w - 0.002, d - 0.002, r, y - 0.001), (w, d, r, y + 0.002),
         (w - 0.02, d - 0.02, r, y + 0.003), (w - 0.03, d - 0.03, r, y - 0.14),
         (w - 0.1, d - 0.1, r, y - 0.175)], x=x, z=z))
-    m.cylinder(0.04, y - 0.175, y - 0.172, at=(x, 0.0, z), of=CHROME)
+    # A strainer in a ring, and the slots of an overflow under the back rim.
+    m.revolve([(0.026, 0.0), (0.043, 0.0), (0.041, 0.004), (0.03, 0.003), (0.026, 0.0)], n=24,
+        at=(x, y - 0.175, z), of=CHROME)
+    m.cylinder(0.027, y - 0.1748, y - 0.1738, n=20, at=(x, 0.0, z), of=RUBBER)
+    m.turned([(0.012, 0.0), (0.012, 0.002), (0.004, 0.004), (0.004, 0.009)], n=12,
+        at=(x, y - 0.174, z), of=CHROME)
+    for k in range(3):
+        m.box(0.008, 0.014, 0.001, 0.0, x=x + 0.014 * (k - 1), on=y - 0.045,
+            against=z - d / 2 + 0.0145, of=RUBBER)
 
 
 def kitchen_tap(m: Maker, y: float, z: float, top: float) -> None:
@@ -451,19 +460,41 @@ def dishwasher(m: Maker, size: Size, k: KitchenSet) -> None:
 
 def dishwasher_front(m: Maker, k: KitchenSet, x: Pair, y: float, f: float) -> None:
     """A front of the kitchen, or a maker's front with a panel, up to y before f."""
-    hw = x[1]
-    if m.chance(0.45):
-        drawer_front(m, k.look, x, (k.plinth_h, y), f)
+    hw, low = x[1], k.plinth_h
+    panel_of = m.pick(BLACK_GLASS, BLACK_STEEL)
+    if m.chance(0.3):
+        # Built in: its keys are on the upper edge, a dark line over the front.
+        drawer_front(m, k.look, x, (low, y - 0.012), f)
+        m.box(2 * hw - 0.006, (y - 0.0095, y), 0.016, 0.0015, against=f, of=panel_of)
+        return
+    material, strip = m.pick(ENAMEL, STEEL, STEEL, BLACK_STEEL), m.pick(0.09, 0.11, 0.13)
+    top = y - strip - 0.004
+    m.box(2 * hw - 0.006, (low + 0.002, top), 0.02, 0.003, against=f, of=material)
+    m.box(2 * hw - 0.006, (top + 0.004, y), 0.02, 0.003, against=f, of=m.pick(material, panel_of))
+    front, middle = f + 0.0199, top + 0.004 + strip / 2
+    grip = m.pick("bar", "square", "bow", "pocket")
+    if grip == "pocket":
+        m.box(0.26, 0.03, 0.001, against=front, on=middle - 0.024, of=RUBBER)
+        m.box(0.28, 0.006, 0.012, 0.0025, against=front, on=middle + 0.006, of=material)
     else:
-        material = m.pick(ENAMEL, STEEL, STEEL, BLACK_GLASS)
-        m.box(2 * hw - 0.004, (k.plinth_h, y - 0.12), 0.02, 0.003, against=f, of=material)
-        m.box(2 * hw - 0.004, (y - 0.117, y), 0.02, 0.002, against=f, of=material)
-        m.box(0.12, 0.035, 0.0008, on=y - 0.07, against=f + 0.0199, of=BLACK_GLASS)
-        for i in range(m.pick(3, 4, 5)):
-            m.cylinder(0.008, 0.0, 0.003, n=10, turn=LYING_ALONG_Z,
-                at=(0.1 + i * 0.03, y - 0.052, f + 0.02), of=m.pick(CHROME, RUBBER))
-        pull(m, m.pick("bar", "bow", "square"), 0.0, y - 0.16, f + 0.019, True, 0.42,
-            m.pick(STEEL, CHROME))
+        pull(m, grip, 0.0, top - 0.04, f + 0.019, True, m.pick(0.42, 0.5), m.pick(STEEL, CHROME))
+    clock(m, -0.75 * hw if grip == "pocket" else 0.0, middle, front)
+    keys = m.pick(CHROME, RUBBER)
+    for i in range(m.pick(3, 4, 5)):
+        m.turned([(0.009, 0.0), (0.009, 0.002), (0.007, 0.0035)], n=12, turn=LYING_ALONG_Z,
+            at=(hw - 0.03 - i * 0.027, middle, front), of=keys)
+    m.box(0.05, 0.005, 0.0008, x=0.0, on=low + 0.05, against=front, of=CHROME)
+    for i in range(8):  # air for drying
+        m.box(0.03, 0.003, 0.0006, left=-hw + 0.04, on=low + 0.03 + 0.007 * i, against=front,
+            of=RUBBER)
+
+
+def clock(m: Maker, x: float, y: float, z: float) -> None:
+    """A display with four digits about (x, y) before z."""
+    m.box(0.075, 0.03, 0.0008, x=x, on=y - 0.015, against=z, of=BLACK_GLASS)
+    for i in range(4):
+        m.box(0.006, 0.011, 0.0003, x=x + 0.011 * (i - 1.5), on=y - 0.0055, against=z + 0.0007,
+            of=_DIGITS)
 
 
 @family(group="hood", nyu40=OTHERFURNITURE, place=Place.KITCHEN, called="range_hood", variants=24,
@@ -480,7 +511,11 @@ def hood(m: Maker, size: Size) -> None:
     cz = -hd + cd / 2
     with m.of(material):
         if form < 4:
-            m.box(c, (0.1, h), cd, 0.002, against=-hd)
+            # The chimney telescopes, or is of one piece.
+            joint = m.pick(h, 0.55 * h, 0.62 * h)
+            m.box(c, (0.1, joint), cd, 0.002, against=-hd)
+            if joint < h:
+                m.box(c - 0.006, (joint - 0.01, h), cd - 0.004, 0.001, against=-hd)
         match form:
             case 0:  # a beam
                 m.box(w, 0.07, d, 0.002)
@@ -498,9 +533,18 @@ def hood(m: Maker, size: Size) -> None:
             case 4:  # flat
                 m.box(w, 0.035, d, 0.002)
                 m.box(w - 0.04, (0.035, h), (-hd, hd - 0.14), 0.003)
-    m.box(0.4, (-0.002, 0.001), d - 0.2, of=glossy("filter", (0.35, 0.35, 0.36), 0.4))
-    for k in range(4):
-        m.box(0.02, (0.012, 0.024), 0.002, x=0.035 * k - 0.05, against=hd - 0.001, of=RUBBER)
+    filters = m.pick(1, 2, 2, 3)
+    for x in row(-0.24, 0.24, filters, gap=0.008):
+        m.box(x, (-0.002, 0.001), d - 0.2, 0.001, of=glossy("filter", (0.35, 0.35, 0.36), 0.4))
+        m.box((x[0] + 0.02, x[1] - 0.02), (-0.003, 0.001), d - 0.26, of=STEEL)
+    for x in m.pick((-0.18, 0.18), (-0.2, 0.0, 0.2), (0.0,)):  # lights
+        m.cylinder(0.026, -0.0025, 0.001, n=16, at=(x, 0.0, hd - 0.055), of=CHROME)
+    n = m.pick(3, 4, 5)
+    for k in range(n):
+        m.box(0.02, (0.012, 0.024), 0.002, x=0.035 * (k - (n - 1) / 2), against=hd - 0.001,
+            of=m.pick(RUBBER, CHROME))
+    if m.chance(0.35):  # a rail along the front edge
+        m.rod((-w / 2 + 0.03, w / 2 - 0.03), 0.03, hd - 0.001, 0.005, of=STEEL)
 
 
 @family(group="fridge", nyu40=REFRIGERATOR, place=Place.FLOOR, variants=32,
@@ -532,6 +576,7 @@ def fridge(m: Maker, size: Size) -> None:
         spaces = [(foot, cut, "drawers" if cut < 0.6 * h else "shelves", 1), (cut, h, "shelves", 1)]
         spaces = spaces if cut < h else [(foot, h, "shelves", 1)]
     shows_time = grip == "none" or m.chance(0.2)
+    has_water, has_notes = m.chance(0.4 if w > 0.8 else 0.12), m.chance(0.3)
     for c, e, filling, n_doors in spaces:
         fridge_space(m, (-hw, hw), (c, e), (-d / 2, f), material, 0.05 if retro else 0.006, filling)
         if n_doors == 0:
@@ -546,6 +591,9 @@ def fridge(m: Maker, size: Size) -> None:
             with m.hinged("door", at=(a if is_left else b, c, f + 0.07),
                 axis=(0.0, -1.0 if is_left else 1.0, 0.0), upper_rad=_FRIDGE_RAD):
                 door_racks(m, (a + 0.06, b - 0.06), (c, e), f)
+                # A seal in the gap between body and door.
+                m.frame((a + 0.012, b - 0.012), (c + 0.012, e - 0.012), 0.014, (f, f + 0.0045),
+                    of=RUBBER)
                 if n_doors == 2:
                     m.rounded((a + 0.002, b - 0.002), (c + 0.003, e), 0.066, 0.01, n=1,
                         against=f + 0.004, of=material)
@@ -558,11 +606,44 @@ def fridge(m: Maker, size: Size) -> None:
                     pull(m, grip, (hw - 0.05) * (1 if hinges_left else -1),
                         e - 0.2 if e < 0.6 * h else level, f + 0.069, False,
                         min(0.34, 0.6 * (e - c)), grip_material)
-                if shows_time and e == h and k == 0:
-                    x = -0.05 if n_doors == 1 else -0.112
-                    m.box(0.1, 0.1, 0.0013, left=x, on=h - 0.3, against=f + 0.0695, of=BLACK_GLASS)
+                if e == h and k == 0:
+                    fridge_fittings(m, (a + b) / 2, (c, e), f + 0.0695, shows_time, has_water,
+                        has_notes and not retro)
+                if grip == "none":
+                    # A dark groove for fingers along the edge without hinges.
+                    m.box(0.016, (c + 0.06, min(e - 0.06, c + 0.9)), 0.0008,
+                        left=b - 0.03 if is_left else a + 0.014, against=f + 0.0695, of=RUBBER)
     for x, z in product((-hw + 0.06, hw - 0.06), (-d / 2 + 0.06, f - 0.06)):
         m.frustum((0.022, 0.0), (0.018, foot + 0.01), n=10, at=(x, 0.0, z), of=RUBBER)
+    if not retro:  # a grille before its feet
+        m.box(w - 0.03, (0.008, foot - 0.004), 0.01, against=f - 0.02, of=RUBBER)
+        for k in range(m.pick(0, 1, 2)):
+            m.box(w - 0.1, 0.004, 0.002, on=0.018 + 0.012 * k, against=f - 0.0105, of=STEEL)
+
+
+def fridge_fittings(m: Maker, x: float, y: Pair, z: float, shows_time: bool, has_water: bool,
+    has_notes: bool) -> None:
+    """A display, a niche for water, a badge and notes on a fridge's door before z."""
+    if has_water and y[1] - y[0] > 0.8:
+        low = y[0] + 0.5 * (y[1] - y[0])
+        m.box(0.2, 0.3, 0.0012, 0.0005, x=x, on=low, against=z, of=BLACK_GLASS)
+        m.frame((x - 0.085, x + 0.085), (low + 0.015, low + 0.2), 0.008, 0.004, 0.001, against=z,
+            of=STEEL)
+        m.box(0.05, 0.03, 0.014, 0.003, x=x, on=low + 0.165, against=z, of=RUBBER)
+        m.box(0.13, 0.006, 0.012, 0.001, x=x, on=low + 0.022, against=z, of=STEEL)
+        clock(m, x, low + 0.25, z + 0.0012)
+    elif shows_time:
+        m.box(0.1, 0.1, 0.0013, x=x, on=y[1] - 0.3, against=z, of=BLACK_GLASS)
+        clock(m, x, y[1] - 0.24, z + 0.0012)
+    if m.chance(0.7):
+        m.box(m.pick(0.05, 0.08), 0.009, 0.0012, x=x, on=y[1] - 0.1, against=z, of=CHROME)
+    for _ in range(m.integers(2, 7) if has_notes else 0):
+        wide, high = m.uniform(0.05, 0.1), m.uniform(0.05, 0.12)
+        at = x + m.uniform(-0.12, 0.12), y[0] + (y[1] - y[0]) * m.uniform(0.5, 0.86)
+        m.box(wide, high, 0.0006, x=at[0], on=at[1], against=z + 0.0014 * m.integers(0, 6),
+            of=plain("note", m.pick((0.93, 0.92, 0.88), m.any_colour()), 0.9))
+        m.turned([(0.012, 0.0), (0.012, 0.003), (0.01, 0.005)], n=12, turn=LYING_ALONG_Z,
+            at=(at[0], at[1] + high - 0.012, z + 0.0078), of=plain("magnet", m.any_colour(), 0.4))
 
 
 def fridge_space(m: Maker, x: Pair, y: Pair, z: Pair, material: Material, r: float,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import product
 
 from pbrs_farm.core.classes import PAPER
@@ -9,7 +10,7 @@ from pbrs_farm.core.frames import LYING_ALONG_Z, rotation_x, rotation_y, rotatio
 from pbrs_farm.dress.thing_materials import STEEL, plain
 from pbrs_farm.furnishings.things.maker import Maker, thing
 from pbrs_farm.geometry.bodies import bevelled
-from pbrs_farm.geometry.outlines import fluted, oval, rect, rings
+from pbrs_farm.geometry.outlines import Outline, fluted, oval, rect, rings
 
 
 # fmt: off
@@ -27,39 +28,63 @@ def one_plate(m: Maker) -> None:
     pile(m, 1)
 
 
+# Profiles of round plates, (share of the radius, metres), from the foot round the rim to the inside.
+_ROUND = (
+    [(0.6, 0), (0.72, 0.006), (1, 0.02), (0.985, 0.0225), (0.7, 0.0095), (0.6, 0.005)],
+    [(0.55, 0), (1, 0.026), (0.985, 0.028), (0.55, 0.005)],
+    [(0.45, 0), (0.47, 0.003), (0.75, 0.006), (0.93, 0.015), (1, 0.024), (0.985, 0.0255),
+        (0.9, 0.0175), (0.6, 0.009), (0.3, 0.006)],
+    [(0.9, 0), (0.97, 0.003), (1, 0.02), (0.985, 0.021), (0.95, 0.007), (0.9, 0.0055)],
+    [(0.5, 0), (0.53, 0), (0.56, 0.006), (0.8, 0.01), (1, 0.018), (0.985, 0.02), (0.78, 0.0125),
+        (0.5, 0.0085)],
+    [(0.6, 0), (0.72, 0.006), (1, 0.02), (0.985, 0.0225), (0.95, 0.0205), (0.93, 0.0215),
+        (0.9, 0.019), (0.87, 0.02), (0.84, 0.0165), (0.7, 0.0095), (0.6, 0.005)],
+    [(0.5, 0), (0.6, 0.026), (0.95, 0.034), (0.935, 0.036), (0.58, 0.03), (0.47, 0.005)],
+)
+_DEEP = 6  # of these: no others lie on it
+
+
 def pile(m: Maker, n: int) -> None:
     """Plates of one form on top of each other."""
-    r, glaze, form = m.uniform(0.1, 0.14), m.china(), m.integers(0, 6)
-    # A deep plate has no others.
-    form = 0 if form == 4 and n > 1 else form
-    sides = 24 if n == 1 else 16
-    # Flat in the middle, then the rim, and the inside; plates nest 6.3 mm apart.
+    r, glaze, form = m.uniform(0.1, 0.14), m.china(), m.integers(0, 13)
+    form = 0 if form == _DEEP and n > 1 else form
+    sides = 24 if n == 1 else 16 if n < 4 else 10
+    # They nest 6.6 mm apart.
     for k in range(n):
         with m.moved(at=(0, 0.0066 * k, 0)), m.of(glaze):
             match form:
-                case 0:  # flat
-                    m.turned([(r * 0.6, 0), (r * 0.72, 0.006), (r, 0.02), (r - 0.002, 0.0225),
-                        (r * 0.7, 0.0095), (r * 0.6, 0.005)], n=sides)
-                case 1:  # deep
-                    m.turned([(r * 0.55, 0), (r, 0.026), (r - 0.002, 0.028), (r * 0.55, 0.005)],
-                        n=sides)
-                case 2:  # square
-                    m.loft(rings(rect, [(1.2 * r, 1.2 * r, 0.01, 0),
-                        (1.9 * r, 1.9 * r, 0.02, 0.016), (1.9 * r - 0.003, 1.9 * r - 0.003, 0.019,
-                        0.018), (1.2 * r, 1.2 * r, 0.01, 0.005)], n=2))
-                case 3:  # oval
-                    m.loft(rings(oval, [(1.6 * r, 1.0 * r, 0), (2.4 * r, 1.6 * r, 0.018),
-                        (2.4 * r - 0.004, 1.6 * r - 0.004, 0.02), (1.6 * r, 1.0 * r, 0.005)], n=18))
-                case 4:  # with a well
-                    m.turned([(r * 0.5, 0), (r * 0.6, 0.026), (r * 0.95, 0.034),
-                        (r * 0.95 - 0.002, 0.036), (r * 0.58, 0.03), (r * 0.47, 0.005)], n=sides)
-                case 5:  # fluted
-                    m.loft(rings(fluted, [(1.3 * r, 10, 0.03, 0), (2 * r, 10, 0.06, 0.019),
-                        (2 * r - 0.004, 10, 0.06, 0.021), (1.3 * r, 10, 0.03, 0.005)]), sharp=70.0)
+                case 7:  # square
+                    plate_of(m, rect, (1.2 * r, 1.2 * r, 0.01), (1.9 * r, 1.9 * r, 0.02), n=2)
+                case 8:  # oval
+                    plate_of(m, oval, (1.6 * r, r), (2.4 * r, 1.6 * r), n=18)
+                case 9:  # fluted
+                    plate_of(m, fluted, (1.3 * r, 10, 0.03), (2 * r, 10, 0.06))
+                case 10:  # with eight corners
+                    plate_of(m, oval, (1.3 * r, 1.3 * r), (2 * r, 2 * r), n=8)
+                case 11:  # long, with round corners
+                    plate_of(m, rect, (1.5 * r, 0.8 * r, 0.02), (2.3 * r, 1.3 * r, 0.04), n=4)
+                case 12:  # of many scallops
+                    ribs = 16 if n == 1 else 8
+                    plate_of(m, fluted, (1.3 * r, ribs, 0.02), (2 * r, ribs, 0.045))
+                case _:
+                    m.turned([(x * r, y) for x, y in _ROUND[form]], n=sides)
+    if form in (0, 2, 3, 4) and m.chance(0.35):
+        top = 0.0066 * (n - 1) + max(y for _x, y in _ROUND[form])
+        m.hoop(oval(1.975 * r, 1.975 * r, n=28), top - 0.001, 0.0012, n=5, of=plain("china band",
+            m.any_colour(), 0.2))
     # Some have a spoon, a fork or crumbs on them.
     if n == 1 and m.chance(0.25):
         m.tube([(-0.5 * r, 0.012, 0.01), (0.6 * r, 0.026, 0.0)], 0.0025, n=5, of=m.metal)
         m.ellipsoid((0.022, 0.004, 0.013), n=8, at=(-0.55 * r, 0.0125, 0.01), of=m.metal)
+
+
+def plate_of(m: Maker, outline: Callable[..., Outline], foot: tuple[float, ...],
+    rim: tuple[float, ...], **alike: float) -> None:
+    """A plate from the outline of its foot to that of its rim, 4 mm thick there."""
+    # Widths are between 0.1 and 1 m; corners are smaller, and numbers of ribs larger.
+    inner = tuple(v - 0.004 if 0.1 < v < 1 else v for v in rim)
+    m.loft(rings(outline, [(*foot, 0), (*rim, 0.018), (*inner, 0.02), (*foot, 0.005)], **alike),
+        sharp=70.0 if outline is fluted else 50.0)
 
 
 @thing(group="kitchen_tool")
