@@ -133,7 +133,7 @@ def panel(m: Maker, kind: str, x: Pair, y: Pair, z: float, material: Material) -
     rail = min(0.065, 0.22 * (b - a), 0.3 * (d - c))
     with m.of(material):
         if kind in ("shaker", "glazed"):
-            m.frame((a, b), (c, d), rail, 0.019, 0.0015, against=z)
+            m.frame((a, b), (c, d), rail, 0.019, 0.002, against=z)
             inner = (a + rail, b - rail), (c + rail, d - rail)
             if kind == "shaker":
                 m.box(*inner, 0.011, against=z)

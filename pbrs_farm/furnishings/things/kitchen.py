@@ -16,7 +16,7 @@ import numpy as np
 from pbrs_farm.core.arrays import I32
 from pbrs_farm.core.catalogue import Place
 from pbrs_farm.core.classes import CABINET, COUNTER, OTHERFURNITURE, REFRIGERATOR, SINK
-from pbrs_farm.core.frames import LYING_ALONG_Z
+from pbrs_farm.core.frames import LYING_ALONG_X, LYING_ALONG_Z
 from pbrs_farm.core.house import Material, Surface
 from pbrs_farm.dress.style import mix
 from pbrs_farm.dress.thing_materials import (
@@ -110,6 +110,16 @@ def unit_body(m: Maker, size: Size, top_h: float, k: KitchenSet) -> None:
     m.box(w, k.plinth_h, (-d / 2 + 0.02, f - 0.05), of=k.plinth)
 
 
+def worktop(m: Maker, w: float, y: Pair, d: float, material: Material,
+    back: float | None = None) -> None:
+    """A worktop to 12 mm before a unit's depth d, its front edges cut by 3 mm; flush at both ends."""
+    back, front, cut = -d / 2 if back is None else back, d / 2 - 0.012, 0.003
+    # Outlines across it, which lie on their side: x is down there.
+    outline = [(-y[1], back), (-y[1], front - cut), (cut - y[1], front), (-y[0] - cut, front),
+        (-y[0], front - cut), (-y[0], back)]
+    m.loft([(outline, -w / 2), (outline, w / 2)], sharp=20.0, turn=LYING_ALONG_X, of=material)
+
+
 _FRONTS: Final[Mapping[str, list[tuple[str, ...]]]] = {"door": [("door",)],
     "low_door": [("low", "door")], "three_drawers": [("drawer", "drawer", "drawer")],
     "low_two_drawers": [("low", "drawer", "drawer")], "two_doors": [("door",), ("door",)],
@@ -142,7 +152,7 @@ def unit(m: Maker, size: Size, k: KitchenSet, p: KitchenUnit) -> None:
     look = Look(p.front_kind, p.front, p.body, p.worktop, p.pull, p.pull_material)
     unit_body(m, size, k.top_h, replace(k, look=look, plinth=p.plinth))
     w, d, h = size
-    m.box(w, (h - k.top_t, h), (-d / 2, d / 2 - 0.012), of=p.worktop)
+    worktop(m, w, (h - k.top_t, h), d, p.worktop)
     y = (k.plinth_h, h - k.top_t - 0.003)
     fronts_of(m, look, (-w / 2, w / 2), y, d / 2 - 0.049, _FRONTS[p.fronts], False,
         Inside(-d / 2 + _BACK_M))
@@ -171,7 +181,7 @@ def blind_cabinet(m: Maker, size: Size, k: KitchenSet) -> None:
     w, h = size[0], size[2]
     # It is drawn like its neighbours, whose pulls reach 12 mm before their worktop.
     unit_body(m, (w, 0.6, h), k.top_h, k)
-    m.box(w, (h - k.top_t, h), (-0.3, 0.288), of=k.worktop)
+    worktop(m, w, (h - k.top_t, h), 0.6, k.worktop)
     panel(m, "flat", (-w / 2, w / 2), (k.plinth_h, h - k.top_t - 0.003), 0.251, k.look.front)
 
 
@@ -215,10 +225,10 @@ def kitchen_sink(m: Maker, size: Size, k: KitchenSet) -> None:
     bd, z0 = 0.4, -0.005
     x0, x1, a, b = -bw / 2, bw / 2, z0 - bd / 2, z0 + bd / 2
     with m.of(k.worktop):
-        m.box((-w / 2, x0), (k.top_h - k.top_t, k.top_h), (-hd, hd - 0.012))
-        m.box((x1, w / 2), (k.top_h - k.top_t, k.top_h), (-hd, hd - 0.012))
+        m.box((-w / 2, x0), (k.top_h - k.top_t, k.top_h), (-hd, b))
+        m.box((x1, w / 2), (k.top_h - k.top_t, k.top_h), (-hd, b))
         m.box((x0, x1), (k.top_h - k.top_t, k.top_h), (-hd, a))
-        m.box((x0, x1), (k.top_h - k.top_t, k.top_h), (b, hd - 0.012))
+    worktop(m, w, (k.top_h - k.top_t, k.top_h), d, k.worktop, b)
     with m.of(basin):
         match form:
             case 0:  # one bowl
@@ -422,7 +432,7 @@ def built_in_cooker(m: Maker, size: Size, k: KitchenSet) -> None:
     # Lower the worktop by the height of the hob.
     y = h - _HOB_M[kind]
     unit_body(m, (w, d, y), y, k)
-    m.box(w, (y - k.top_t, y), (-d / 2, d / 2 - 0.012), of=k.worktop)
+    worktop(m, w, (y - k.top_t, y), d, k.worktop)
     hob_top(m, w - 0.02, 0.51, y - 0.001, -0.02, kind, m.pick(STEEL, ENAMEL, BLACK_GLASS))
     material = m.pick(STEEL, STEEL, BLACK_GLASS, ENAMEL)
     low, panel_h = y - k.top_t - 0.003 - 0.595, m.pick(0.09, 0.12)
@@ -445,7 +455,7 @@ def dishwasher(m: Maker, size: Size, k: KitchenSet) -> None:
     hw = w / 2
     f, y = d / 2 - 0.049, h - k.top_t - 0.003
     unit_body(m, size, k.top_h, k)
-    m.box(w, (h - k.top_t, h), (-d / 2, d / 2 - 0.012), of=k.worktop)
+    worktop(m, w, (h - k.top_t, h), d, k.worktop)
     # A tub of steel with two baskets behind the door, which falls open.
     shell(m, (-hw + 0.0166, hw - 0.0166), (k.plinth_h + 0.0166, y - 0.014),
         (-d / 2 + _BACK_M, f - 0.001), 0.02, STEEL)
