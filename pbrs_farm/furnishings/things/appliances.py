@@ -20,7 +20,7 @@ from pbrs_farm.dress.thing_materials import (
     plain,
 )
 from pbrs_farm.furnishings.things.cups import handle
-from pbrs_farm.furnishings.things.joints import pull, shell
+from pbrs_farm.furnishings.things.joints import clock, pull, shell
 from pbrs_farm.furnishings.things.maker import Maker, thing
 from pbrs_farm.geometry.bodies import HALF_TURN
 from pbrs_farm.geometry.outlines import bent, rect, rings
@@ -134,22 +134,18 @@ def microwave(m: Maker) -> None:
     grip = m.pick("bar", "bow", "square", "button", "button")
     black = plain("machine black", (0.04, 0.04, 0.042), 0.5)
     with m.hinged("door", at=(-hw, 0.014, front), axis=(0.0, -1.0, 0.0), upper_rad=_DOOR_RAD):
-        m.box((-hw, edge - 0.0015), (0.014, h - 0.002), (front - 0.0218, front), 0.004,
-            of=case)
+        m.box((-hw, edge - 0.0015), (0.014, h - 0.002), (front - 0.0218, front), 0.004, of=case)
         # A window of dark glass in a rim, with the mesh behind it as a darker field.
-        x, y = (-hw + 0.03, edge - (0.03 if grip == "button" else 0.05)), (0.045, h - 0.04)
-        m.box(x, y, 0.0008, 0.0003, against=front, of=BLACK_GLASS)
-        m.frame(x, y, 0.007, 0.0022, 0.0008, against=front, of=m.pick(case, black, CHROME))
-        m.box((x[0] + 0.03, x[1] - 0.03), (y[0] + 0.025, y[1] - 0.025), 0.0003,
+        across, up = (-hw + 0.03, edge - (0.03 if grip == "button" else 0.05)), (0.045, h - 0.04)
+        m.box(across, up, 0.0008, 0.0003, against=front, of=BLACK_GLASS)
+        m.frame(across, up, 0.007, 0.0022, 0.0008, against=front, of=m.pick(case, black, CHROME))
+        m.box((across[0] + 0.03, across[1] - 0.03), (up[0] + 0.025, up[1] - 0.025), 0.0003,
             against=front + 0.0008, of=plain("mesh", (0.12, 0.12, 0.12), 0.35))
         if grip != "button":
             pull(m, grip, edge - 0.022, h / 2, front - 0.0005, False, h - 0.1, m.pick(CHROME, case))
-        m.box(0.035, 0.004, 0.0006, x=(x[0] + x[1]) / 2, on=h - 0.026, against=front, of=CHROME)
+        m.box(0.035, 0.004, 0.0006, x=sum(across) / 2, on=h - 0.026, against=front, of=CHROME)
     x, keys = hw - panel / 2, plain("keys", (0.7, 0.7, 0.7), 0.5)
-    m.box(0.066, 0.03, 0.0008, x=x, on=h - 0.065, against=front, of=BLACK_GLASS)
-    for k in range(4):
-        m.box(0.006, 0.012, 0.0003, x=x + 0.012 * (k - 1.5), on=h - 0.056, against=front + 0.0007,
-            of=plain("digits", (0.55, 0.88, 0.8), 0.5))
+    clock(m, x, h - 0.05, front)
     low = 0.06 if grip == "button" else 0.03
     if grip == "button":
         m.box(panel - 0.03, 0.022, 0.003, 0.001, x=x, on=0.026, against=front, of=keys)

@@ -10,12 +10,13 @@ from numpy import pi
 
 from pbrs_farm.core.frames import LYING_ALONG_Z, rotation_x, rotation_z
 from pbrs_farm.core.house import Material
-from pbrs_farm.dress.thing_materials import FROSTED
+from pbrs_farm.dress.thing_materials import BLACK_GLASS, FROSTED, plain
 from pbrs_farm.furnishings.things.maker import Maker
 from pbrs_farm.furnishings.things.shapes import Pair, row
 from pbrs_farm.geometry.outlines import Outline, bent, d_shape, rect, ring_path, rings
 
 # fmt: off
+_DIGITS: Final = plain("digits", (0.75, 0.88, 0.92), 0.5)
 _HEIGHTS: Final = {"door": 3.4, "low": 0.7}  # of fronts in one column, against a drawer's
 _FRONT_M: Final = 0.019  # thickness of a front
 _BOARD_M: Final = 0.016  # of a carcass
@@ -262,3 +263,11 @@ def fronts_of(m: Maker, look: Look, x: Pair, y: Pair, z: float, columns: Sequenc
             if inside.has_boards and not is_drawer(kind, (c, d)):
                 shelves(m, space, (c, min(d, inside.top)), (inside.back, z), look.body,
                     inside.rail if k % 2 == 0 else None)
+
+
+def clock(m: Maker, x: float, y: float, z: float) -> None:
+    """A display with four digits about (x, y) before z."""
+    m.box(0.075, 0.03, 0.0008, x=x, on=y - 0.015, against=z, of=BLACK_GLASS)
+    for i in range(4):
+        m.box(0.006, 0.011, 0.0003, x=x + 0.011 * (i - 1.5), on=y - 0.0055, against=z + 0.0007,
+            of=_DIGITS)

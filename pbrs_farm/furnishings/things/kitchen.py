@@ -38,6 +38,7 @@ from pbrs_farm.dress.thing_materials import (
 from pbrs_farm.furnishings.things.joints import (
     Inside,
     Look,
+    clock,
     drawer_box,
     drawer_front,
     fronts_of,
@@ -56,7 +57,6 @@ from pbrs_farm.geometry.outlines import bent, d_shape, oval, rect, rings
 # fmt: off
 _OVEN: Final = glossy("oven enamel", (0.09, 0.09, 0.095), 0.35)
 CLEAR_PLASTIC: Final = glass((0.93, 0.96, 0.96), 0.25)
-_DIGITS: Final = plain("digits", (0.75, 0.88, 0.92), 0.5)
 _FALLING_RAD: Final = radians(88)  # of doors that fall open
 _FRIDGE_RAD: Final = radians(95)  # beside a wall it opens no farther
 _MACHINE_RAD: Final = radians(110)  # of a washing machine's round door
@@ -499,14 +499,6 @@ def dishwasher_front(m: Maker, k: KitchenSet, x: Pair, y: float, f: float) -> No
             of=RUBBER)
 
 
-def clock(m: Maker, x: float, y: float, z: float) -> None:
-    """A display with four digits about (x, y) before z."""
-    m.box(0.075, 0.03, 0.0008, x=x, on=y - 0.015, against=z, of=BLACK_GLASS)
-    for i in range(4):
-        m.box(0.006, 0.011, 0.0003, x=x + 0.011 * (i - 1.5), on=y - 0.0055, against=z + 0.0007,
-            of=_DIGITS)
-
-
 @family(group="hood", nyu40=OTHERFURNITURE, place=Place.KITCHEN, called="range_hood", variants=24,
     size=lambda m: (0.6, m.pick(0.45, 0.48, 0.5), m.pick(0.3, 0.7, 0.8, 0.9)))
 def hood(m: Maker, size: Size) -> None:
@@ -544,9 +536,9 @@ def hood(m: Maker, size: Size) -> None:
                 m.box(w, 0.035, d, 0.002)
                 m.box(w - 0.04, (0.035, h), (-hd, hd - 0.14), 0.003)
     filters = m.pick(1, 2, 2, 3)
-    for x in row(-0.24, 0.24, filters, gap=0.008):
-        m.box(x, (-0.002, 0.001), d - 0.2, 0.001, of=glossy("filter", (0.35, 0.35, 0.36), 0.4))
-        m.box((x[0] + 0.02, x[1] - 0.02), (-0.003, 0.001), d - 0.26, of=STEEL)
+    for a, b in row(-0.24, 0.24, filters, gap=0.008):
+        m.box((a, b), (-0.002, 0.001), d - 0.2, 0.001, of=glossy("filter", (0.35, 0.35, 0.36), 0.4))
+        m.box((a + 0.02, b - 0.02), (-0.003, 0.001), d - 0.26, of=STEEL)
     for x in m.pick((-0.18, 0.18), (-0.2, 0.0, 0.2), (0.0,)):  # lights
         m.cylinder(0.026, -0.0025, 0.001, n=16, at=(x, 0.0, hd - 0.055), of=CHROME)
     n = m.pick(3, 4, 5)
