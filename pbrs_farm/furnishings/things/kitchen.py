@@ -49,7 +49,7 @@ from pbrs_farm.furnishings.things.joints import (
     shell,
 )
 from pbrs_farm.furnishings.things.maker import Maker, Size, family
-from pbrs_farm.furnishings.things.parameters import Choice, Front, Pull
+from pbrs_farm.furnishings.things.parameters import Choice, Front, Pull, Range
 from pbrs_farm.furnishings.things.shapes import Pair, row
 from pbrs_farm.geometry.bodies import creased
 from pbrs_farm.geometry.outlines import bent, d_shape, oval, rect, rings
@@ -447,9 +447,31 @@ def built_in_cooker(m: Maker, size: Size, k: KitchenSet) -> None:
             drawer_box(m, inner, (k.plinth_h, low), (-d / 2 + _BACK_M, f), k.look.body)
 
 
+@dataclass(frozen=True, slots=True)
+class Dishwasher:
+    """Parameters of a dishwasher; a built-in one has a front of its kitchen and no others."""
+
+    built_in: bool
+    front: Material
+    panel: Material  # above the front, with keys and a display
+    panel_m: Annotated[float, Range(0.06, 0.16)]
+    pull: Annotated[str, Choice("bar", "square", "bow", "pocket")]
+    pull_material: Material
+    keys: Annotated[int, Range(0, 6)]
+    key_material: Material
+
+
+def draw_dishwasher(m: Maker, _size: Size, _k: KitchenSet) -> Dishwasher:
+    """Draw a dishwasher's parameters."""
+    front = m.pick(ENAMEL, STEEL, STEEL, BLACK_STEEL)
+    return Dishwasher(m.chance(0.3), front, m.pick(front, front, BLACK_GLASS, BLACK_STEEL),
+        m.pick(0.09, 0.11, 0.13), m.pick("bar", "square", "bow", "pocket"), m.pick(STEEL, CHROME),
+        m.pick(3, 4, 5), m.pick(CHROME, RUBBER))
+
+
 @family(group="dishwasher", nyu40=OTHERFURNITURE, place=Place.FLOOR, variants=32,
-    of_set=kitchen_set, size=lambda m, k: (0.6, 0.6, k.top_h))
-def dishwasher(m: Maker, size: Size, k: KitchenSet) -> None:
+    of_set=kitchen_set, draw=draw_dishwasher, size=lambda m, k: (0.6, 0.6, k.top_h))
+def dishwasher(m: Maker, size: Size, k: KitchenSet, p: Dishwasher) -> None:
     """A dishwasher under the kitchen's worktop: a front of the kitchen, or its own with a panel."""
     w, d, h = size
     hw = w / 2
@@ -465,34 +487,30 @@ def dishwasher(m: Maker, size: Size, k: KitchenSet) -> None:
                 n=12 if rim == 0 else 2)
     with m.hinged("door", at=(-hw, k.plinth_h, f + 0.02), axis=(1.0, 0.0, 0.0),
         upper_rad=_FALLING_RAD):
-        dishwasher_front(m, k, (-hw, hw), y, f)
+        dishwasher_front(m, k, (-hw, hw), y, f, p)
 
 
-def dishwasher_front(m: Maker, k: KitchenSet, x: Pair, y: float, f: float) -> None:
+def dishwasher_front(m: Maker, k: KitchenSet, x: Pair, y: float, f: float, p: Dishwasher) -> None:
     """A front of the kitchen, or a maker's front with a panel, up to y before f."""
     hw, low = x[1], k.plinth_h
-    panel_of = m.pick(BLACK_GLASS, BLACK_STEEL)
-    if m.chance(0.3):
-        # Built in: its keys are on the upper edge, a dark line over the front.
+    if p.built_in:
+        # Its keys are on the upper edge, a dark line over the front.
         drawer_front(m, k.look, x, (low, y - 0.012), f)
-        m.box(2 * hw - 0.006, (y - 0.0095, y), 0.016, 0.0015, against=f, of=panel_of)
+        m.box(2 * hw - 0.006, (y - 0.0095, y), 0.016, 0.0015, against=f, of=p.panel)
         return
-    material, strip = m.pick(ENAMEL, STEEL, STEEL, BLACK_STEEL), m.pick(0.09, 0.11, 0.13)
-    top = y - strip - 0.004
-    m.box(2 * hw - 0.006, (low + 0.002, top), 0.02, 0.003, against=f, of=material)
-    m.box(2 * hw - 0.006, (top + 0.004, y), 0.02, 0.003, against=f, of=m.pick(material, panel_of))
-    front, middle = f + 0.0199, top + 0.004 + strip / 2
-    grip = m.pick("bar", "square", "bow", "pocket")
-    if grip == "pocket":
+    top = y - p.panel_m - 0.004
+    m.box(2 * hw - 0.006, (low + 0.002, top), 0.02, 0.003, against=f, of=p.front)
+    m.box(2 * hw - 0.006, (top + 0.004, y), 0.02, 0.003, against=f, of=p.panel)
+    front, middle = f + 0.0199, top + 0.004 + p.panel_m / 2
+    if p.pull == "pocket":
         m.box(0.26, 0.03, 0.001, against=front, on=middle - 0.024, of=RUBBER)
-        m.box(0.28, 0.006, 0.012, 0.0025, against=front, on=middle + 0.006, of=material)
+        m.box(0.28, 0.006, 0.012, 0.0025, against=front, on=middle + 0.006, of=p.front)
     else:
-        pull(m, grip, 0.0, top - 0.04, f + 0.019, True, m.pick(0.42, 0.5), m.pick(STEEL, CHROME))
-    clock(m, -0.75 * hw if grip == "pocket" else 0.0, middle, front)
-    keys = m.pick(CHROME, RUBBER)
-    for i in range(m.pick(3, 4, 5)):
+        pull(m, p.pull, 0.0, top - 0.04, f + 0.019, True, m.pick(0.42, 0.5), p.pull_material)
+    clock(m, -0.75 * hw if p.pull == "pocket" else 0.0, middle, front)
+    for i in range(p.keys):
         m.turned([(0.009, 0.0), (0.009, 0.002), (0.007, 0.0035)], n=12, turn=LYING_ALONG_Z,
-            at=(hw - 0.03 - i * 0.027, middle, front), of=keys)
+            at=(hw - 0.03 - i * 0.027, middle, front), of=p.key_material)
     m.box(0.05, 0.005, 0.0008, x=0.0, on=low + 0.05, against=front, of=CHROME)
     for i in range(8):  # air for drying
         m.box(0.03, 0.003, 0.0006, left=-hw + 0.04, on=low + 0.03 + 0.007 * i, against=front,
@@ -549,84 +567,106 @@ def hood(m: Maker, size: Size) -> None:
         m.rod((-w / 2 + 0.03, w / 2 - 0.03), 0.03, hd - 0.001, 0.005, of=STEEL)
 
 
-@family(group="fridge", nyu40=REFRIGERATOR, place=Place.FLOOR, variants=32,
+@dataclass(frozen=True, slots=True)
+class Fridge:
+    """Parameters of a fridge."""
+
+    body: Material
+    doors: Annotated[str, Choice("one", "two", "beside", "over_drawer")]
+    split: Annotated[float, Range(0.2, 0.8)]  # share of the height below the upper of two doors
+    hinges_left: bool
+    pull: Annotated[str, Choice("bar", "square", "bow", "none")]
+    pull_material: Material
+    retro: bool  # round edges, no grille
+    display: bool
+    water: bool  # a niche in a high door
+    notes: bool
+
+
+def draw_fridge(m: Maker, size: Size) -> Fridge:
+    """Draw a fridge's parameters."""
+    is_wide = size[0] > 0.8
+    body = m.pick(ENAMEL, ENAMEL, STEEL, STEEL, glossy("black", (0.07, 0.07, 0.075), 0.25),
+        glossy("enamel", m.pick((0.62, 0.75, 0.72), (0.75, 0.2, 0.16), (0.9, 0.86, 0.72),
+        (0.35, 0.48, 0.58)), 0.2))
+    grip = m.pick("bar", "square", "bow", *["none"] * (not is_wide))
+    doors = m.pick("beside", "over_drawer") if is_wide else m.pick(*["two"] * 4, "one")
+    retro = m.chance(0.25) and not is_wide
+    return Fridge(body, doors, m.pick(0.38, 0.36, 0.68, 0.72), m.chance(0.5), grip,
+        m.pick(STEEL, CHROME, CHROME, body), retro, grip == "none" or m.chance(0.2),
+        m.chance(0.4 if is_wide else 0.12), m.chance(0.3) and not retro)
+
+
+@family(group="fridge", nyu40=REFRIGERATOR, place=Place.FLOOR, variants=32, draw=draw_fridge,
     size=lambda m: (m.pick(0.55, 0.6, 0.6, 0.7, 0.9), m.uniform(0.6, 0.68),
     m.pick(1.45, 1.75, 1.8, 1.86, 2.0)))
-def fridge(m: Maker, size: Size) -> None:
+def fridge(m: Maker, size: Size, p: Fridge) -> None:
     """A fridge.
 
     One door, a freezer below or above, two doors side by side, drawers below two doors, or a round one on feet.
     """
     w, d, h = size
-    hw = w / 2
-    material = m.pick(ENAMEL, ENAMEL, STEEL, STEEL, glossy("black", (0.07, 0.07, 0.075), 0.25),
-        glossy("enamel", m.pick((0.62, 0.75, 0.72), (0.75, 0.2, 0.16), (0.9, 0.86, 0.72),
-        (0.35, 0.48, 0.58)), 0.2))
-    retro = m.chance(0.25) and w < 0.8
-    grip = m.pick("bar", "square", "bow", "none") if w < 0.8 else m.pick("bar", "square", "bow")
-    f, foot = d / 2 - (0.07 if grip == "none" else 0.1), 0.05
-    grip_material = m.pick(STEEL, CHROME, CHROME, material)
-    cut = m.pick(0.38, 0.36, 0.68, 0.72, 1.0) * h
-    hinges_left = m.chance(0.5)
+    hw, cut = w / 2, p.split * h
+    f, foot = d / 2 - (0.07 if p.pull == "none" else 0.1), 0.05
     # Its compartments from below: low, high, filling, number of doors.
-    if w > 0.8:
-        low = h * 0.4 if m.chance(0.5) else foot
-        spaces = [(low, h, "shelves", 2)]
-        if low > 0.1:
-            spaces.insert(0, (foot, low, "", 0))
-    else:
-        spaces = [(foot, cut, "drawers" if cut < 0.6 * h else "shelves", 1), (cut, h, "shelves", 1)]
-        spaces = spaces if cut < h else [(foot, h, "shelves", 1)]
-    shows_time = grip == "none" or m.chance(0.2)
-    has_water, has_notes = m.chance(0.4 if w > 0.8 else 0.12), m.chance(0.3)
+    spaces = {"one": [(foot, h, "shelves", 1)],
+        "two": [(foot, cut, "drawers" if cut < 0.6 * h else "shelves", 1), (cut, h, "shelves", 1)],
+        "beside": [(foot, h, "shelves", 2)],
+        "over_drawer": [(foot, 0.4 * h, "", 0), (0.4 * h, h, "shelves", 2)]}[p.doors]
     for c, e, filling, n_doors in spaces:
-        fridge_space(m, (-hw, hw), (c, e), (-d / 2, f), material, 0.05 if retro else 0.006, filling)
+        fridge_space(m, (-hw, hw), (c, e), (-d / 2, f), p.body, 0.05 if p.retro else 0.006, filling)
         if n_doors == 0:
-            with opens(m, "drawer", (-hw, hw), (c, e), f + 0.07, -d / 2), m.of(material):
+            with opens(m, "drawer", (-hw, hw), (c, e), f + 0.07, -d / 2), m.of(p.body):
                 m.rounded(w - 0.004, (c, e - 0.002), 0.066, 0.01, n=1, against=f + 0.004)
-                pull(m, grip, 0.0, e - 0.06, f + 0.069, True, 0.5 * w, grip_material)
+                pull(m, p.pull, 0.0, e - 0.06, f + 0.069, True, 0.5 * w, p.pull_material)
                 drawer_box(m, (-hw + 0.05, hw - 0.05), (c + 0.05, e - 0.05),
                     (-d / 2 + 0.08, f + 0.004), WHITE)
         for k in range(n_doors):
-            is_left = hinges_left if n_doors == 1 else k == 0
-            a, b = (-hw, hw) if n_doors == 1 else ((-hw, -0.002), (0.002, hw))[k]
-            with m.hinged("door", at=(a if is_left else b, c, f + 0.07),
+            span = (-hw, hw) if n_doors == 1 else ((-hw, -0.002), (0.002, hw))[k]
+            is_left = p.hinges_left if n_doors == 1 else k == 0
+            with m.hinged("door", at=(span[0] if is_left else span[1], c, f + 0.07),
                 axis=(0.0, -1.0 if is_left else 1.0, 0.0), upper_rad=_FRIDGE_RAD):
-                door_racks(m, (a + 0.06, b - 0.06), (c, e), f)
-                # A seal in the gap between body and door.
-                m.frame((a + 0.012, b - 0.012), (c + 0.012, e - 0.012), 0.014, (f, f + 0.0045),
-                    of=RUBBER)
-                if n_doors == 2:
-                    m.rounded((a + 0.002, b - 0.002), (c + 0.003, e), 0.066, 0.01, n=1,
-                        against=f + 0.004, of=material)
-                    pull(m, grip, 0.045 * (1 if k else -1), (c + e) / 2, f + 0.069, False,
-                        0.5 * (e - c), grip_material)
-                else:
-                    m.rounded(w - 0.002, (c + 0.002, e - 0.002), 0.064, 0.05 if retro else 0.008,
-                        n=3 if retro else 1, against=f + 0.006, of=material)
-                    level = c + 0.52 * (e - c) if e - c > 1.2 else c + min(0.28, 0.5 * (e - c))
-                    pull(m, grip, (hw - 0.05) * (1 if hinges_left else -1),
-                        e - 0.2 if e < 0.6 * h else level, f + 0.069, False,
-                        min(0.34, 0.6 * (e - c)), grip_material)
+                fridge_door(m, p, span, (c, e), f, is_left, n_doors == 2)
                 if e == h and k == 0:
-                    fridge_fittings(m, (a + b) / 2, (c, e), f + 0.0695, shows_time, has_water,
-                        has_notes and not retro)
-                if grip == "none":
-                    # A dark groove for fingers along the edge without hinges.
-                    m.box(0.016, (c + 0.06, min(e - 0.06, c + 0.9)), 0.0008,
-                        left=b - 0.03 if is_left else a + 0.014, against=f + 0.0695, of=RUBBER)
+                    fridge_fittings(m, p, sum(span) / 2, (c, e), f + 0.0695)
     for x, z in product((-hw + 0.06, hw - 0.06), (-d / 2 + 0.06, f - 0.06)):
         m.frustum((0.022, 0.0), (0.018, foot + 0.01), n=10, at=(x, 0.0, z), of=RUBBER)
-    if not retro:  # a grille before its feet
+    if not p.retro:  # a grille before its feet
         m.box(w - 0.03, (0.008, foot - 0.004), 0.01, against=f - 0.02, of=RUBBER)
         for k in range(m.pick(0, 1, 2)):
             m.box(w - 0.1, 0.004, 0.002, on=0.018 + 0.012 * k, against=f - 0.0105, of=STEEL)
 
 
-def fridge_fittings(m: Maker, x: float, y: Pair, z: float, shows_time: bool, has_water: bool,
-    has_notes: bool) -> None:
+def fridge_door(m: Maker, p: Fridge, x: Pair, y: Pair, f: float, is_left: bool,
+    is_pair: bool) -> None:
+    """A door before f with its racks, a seal in the gap to the body, and what opens it.
+
+    is_left: its hinges are there. is_pair: it has another beside it.
+    """
+    (a, b), (c, e) = x, y
+    door_racks(m, (a + 0.06, b - 0.06), y, f)
+    m.frame((a + 0.012, b - 0.012), (c + 0.012, e - 0.012), 0.014, (f, f + 0.0045), of=RUBBER)
+    grip_x = b - 0.05 if is_left else a + 0.05
+    if is_pair:
+        m.rounded((a + 0.002, b - 0.002), (c + 0.003, e), 0.066, 0.01, n=1, against=f + 0.004,
+            of=p.body)
+        level, long = (c + e) / 2, 0.5 * (e - c)
+    else:
+        m.rounded((a + 0.001, b - 0.001), (c + 0.002, e - 0.002), 0.064, 0.05 if p.retro else 0.008,
+            n=3 if p.retro else 1, against=f + 0.006, of=p.body)
+        long = min(0.34, 0.6 * (e - c))
+        level = c + 0.52 * (e - c) if e - c > 1.2 else c + min(0.28, 0.5 * (e - c))
+        level = e - 0.2 if c < 0.1 and p.doors == "two" and p.split < 0.6 else level
+    pull(m, p.pull, grip_x, level, f + 0.069, False, long, p.pull_material)
+    if p.pull == "none":
+        # A dark groove for fingers.
+        m.box(0.016, (c + 0.06, min(e - 0.06, c + 0.9)), 0.0008,
+            left=b - 0.03 if is_left else a + 0.014, against=f + 0.0695, of=RUBBER)
+
+
+def fridge_fittings(m: Maker, p: Fridge, x: float, y: Pair, z: float) -> None:
     """A display, a niche for water, a badge and notes on a fridge's door before z."""
-    if has_water and y[1] - y[0] > 0.8:
+    if p.water and y[1] - y[0] > 0.8:
         low = y[0] + 0.5 * (y[1] - y[0])
         m.box(0.2, 0.3, 0.0012, 0.0005, x=x, on=low, against=z, of=BLACK_GLASS)
         m.frame((x - 0.085, x + 0.085), (low + 0.015, low + 0.2), 0.008, 0.004, 0.001, against=z,
@@ -634,12 +674,12 @@ def fridge_fittings(m: Maker, x: float, y: Pair, z: float, shows_time: bool, has
         m.box(0.05, 0.03, 0.014, 0.003, x=x, on=low + 0.165, against=z, of=RUBBER)
         m.box(0.13, 0.006, 0.012, 0.001, x=x, on=low + 0.022, against=z, of=STEEL)
         clock(m, x, low + 0.25, z + 0.0012)
-    elif shows_time:
+    elif p.display:
         m.box(0.1, 0.1, 0.0013, x=x, on=y[1] - 0.3, against=z, of=BLACK_GLASS)
         clock(m, x, y[1] - 0.24, z + 0.0012)
     if m.chance(0.7):
         m.box(m.pick(0.05, 0.08), 0.009, 0.0012, x=x, on=y[1] - 0.1, against=z, of=CHROME)
-    for _ in range(m.integers(2, 7) if has_notes else 0):
+    for _ in range(m.integers(2, 7) if p.notes else 0):
         wide, high = m.uniform(0.05, 0.1), m.uniform(0.05, 0.12)
         at = x + m.uniform(-0.12, 0.12), y[0] + (y[1] - y[0]) * m.uniform(0.5, 0.86)
         m.box(wide, high, 0.0006, x=at[0], on=at[1], against=z + 0.0014 * m.integers(0, 6),
