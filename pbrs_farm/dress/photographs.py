@@ -23,6 +23,7 @@ class _Shown:
     roughness: float
     gloss: float
     least_m: float = 0.8  # of one repeat: a smaller one is seen to repeat on a floor or a wall
+    across: float = 1.0  # share of the stated width across the grain
 
 
 _WOOD_FLOOR: Final = _Shown("planks", 0.4, 0.5)
@@ -34,7 +35,7 @@ _SHOWN: Final = {
     "marble": _Shown("marble", 0.12, 0.5), "brick": _Shown("brick", 0.9, 0.0),
     "carpet": _Shown("carpet", 1.0, 0.0), "loop carpet": _Shown("carpet", 1.0, 0.0),
     "wallpaper": _Shown("wallpaper", 0.8, 0.0, 0.4), "plaster": _Shown("plaster", 0.9, 0.0),
-    "concrete": _Shown("concrete", 0.62, 0.15), "grain": _Shown("wood", 0.4, 0.5, 0.0),
+    "concrete": _Shown("concrete", 0.62, 0.15), "grain": _Shown("wood", 0.4, 0.5, 0.0, 0.6),
     "weave": _Shown("cloth", 0.95, 0.0, 0.0), "twill": _Shown("cloth", 0.95, 0.0, 0.0),
     "leather": _Shown("leather", 0.46, 0.4, 0.0),
 }
@@ -89,7 +90,9 @@ def photograph_material(
         roughness=shown.roughness,
         shininess=round(2.0 / max(shown.roughness, 0.1) ** 4 - 2.0, 1) if shown.gloss else 0.0,
     )
-    return house.material(material, (picture.texture,)), picture.size, mean
+    width, height = picture.size
+    size = (width, height * shown.across)
+    return house.material(material, (picture.texture,)), size, mean
 
 
 def _mean_rgb(picture: Picture) -> Rgb:

@@ -53,6 +53,14 @@ def test_a_photographed_material_has_its_size_and_its_mean() -> None:
     assert pattern.photograph in mutable.textures
 
 
+def test_photographed_veneer_is_narrower_than_a_plank() -> None:
+    catalogue = _catalogue(*(_picture(f"v{k}", "wood", 0.5) for k in range(100)))
+    mutable = MutableHouse(builtin_home(), 1)
+    several = (photographed(mutable, catalogue, Pattern("grain", seed)) for seed in range(9))
+    made = pattern_material(mutable, next(p for p in several if p.photograph))
+    assert made.size_m == pytest.approx((0.5, 0.3))
+
+
 def test_a_damaged_picture_is_one_note_and_the_surface_is_drawn() -> None:
     broken = _catalogue(*(_picture(f"x{k}", "tiles", 1.0, b"\xff\xd8\xff") for k in range(50)))
     mutable = MutableHouse(builtin_home(), 1)
