@@ -51,12 +51,13 @@ class Look(NamedTuple):
     pull_material: Material
 
 
-def hollow(m: Maker, x: Pair, y: Pair, z: Pair, t: float, material: Material) -> None:
+def hollow(m: Maker, x: Pair, y: Pair, z: Pair, t: float, material: Material,
+    has_top: bool = True) -> None:
     """A box of boards t thick, open to the front: sides, bottom, top, back."""
     with m.of(material):
         for a in (x[0], x[1] - t):
             m.box(t, (y[0], y[1]), (z[0], z[1]), left=a)
-        for b in (y[0], y[1] - t):
+        for b in (y[0], y[1] - t)[: 1 + has_top]:
             m.box((x[0] + t, x[1] - t), t, (z[0], z[1]), on=b)
         m.box((x[0] + t, x[1] - t), (y[0] + t, y[1] - t), min(_BACK_M, t), against=z[0])
 

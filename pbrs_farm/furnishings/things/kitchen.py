@@ -101,12 +101,15 @@ def kitchen_set(m: Maker) -> KitchenSet:
     return KitchenSet(top_h, top_t, look, upper_look, worktop, plinth, plinth_h)
 
 
-def unit_body(m: Maker, size: Size, top_h: float, k: KitchenSet) -> None:
-    """A unit's carcass and plinth; its worktop's upper side is to be at top_h."""
+def unit_body(m: Maker, size: Size, top_h: float, k: KitchenSet, has_top: bool = True) -> None:
+    """A unit's carcass and plinth; its worktop's upper side is to be at top_h.
+
+    has_top: False for a sink's, whose bowl hangs in it.
+    """
     w, d, _h = size
     f = d / 2 - 0.049
     hollow(m, (-w / 2 + 0.0005, w / 2 - 0.0005), (k.plinth_h, top_h - k.top_t), (-d / 2, f), 0.016,
-        k.look.body)
+        k.look.body, has_top)
     m.box(w, k.plinth_h, (-d / 2 + 0.02, f - 0.05), of=k.plinth)
 
 
@@ -214,7 +217,9 @@ def kitchen_sink(m: Maker, size: Size, k: KitchenSet) -> None:
     """A unit with a sink in its worktop: one bowl, two, or one with a drainer; many taps."""
     w, d, h = size
     hd = d / 2
-    unit_body(m, size, k.top_h, k)
+    unit_body(m, size, k.top_h, k, has_top=False)
+    m.box(w - 0.034, (k.top_h - k.top_t - 0.08, k.top_h - k.top_t), 0.016, against=hd - 0.065,
+        of=k.look.body)
     fronts_of(m, k.look, (-w / 2, w / 2), (k.plinth_h, k.top_h - k.top_t - 0.003), hd - 0.049,
         [("door",), ("door",)] if m.chance(0.7) else [("drawer", "drawer")], False,
         Inside(-hd + _BACK_M, has_boards=False, top=k.top_h - 0.2))

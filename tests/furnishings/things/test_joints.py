@@ -141,6 +141,20 @@ def test_a_shut_toilets_lid_stands_up_before_its_cistern_over_an_open_bowl() -> 
         assert (back[rays][:, 2] - hit[:, 2] > 0.001).all()
 
 
+def test_a_sink_has_a_deep_bowl_with_a_strainer() -> None:
+    for shape in shapes_of("kitchen_sink", 12):
+        body = [s.positions[s.faces] for s in shape.surfaces if s.part == ""]
+        corners = np.concatenate(body).astype(np.float64)
+        mesh = trimesh.Trimesh(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
+        worktop = shape.bounds[1, 1] - 0.3
+        xs = np.arange(-0.34, 0.35, 0.01)
+        eyes = np.c_[xs, np.full(len(xs), worktop + 0.02), np.full(len(xs), 0.06)]
+        at, _rays, _faces = mesh.ray.intersects_location(
+            eyes, np.tile([0, -1.0, 0], (len(eyes), 1)), multiple_hits=False
+        )
+        assert (worktop - at[:, 1] > 0.13).mean() > 0.3
+
+
 def test_a_microwave_has_a_door_and_a_plate_in_a_space_behind_it() -> None:
     for seed in range(6):
         rng = np.random.default_rng(seed)
