@@ -46,6 +46,12 @@ from pbrs_farm.read.habitat.urdf import MAX_BYTES, Robot, robot_from_urdf
 from pbrs_farm.regular_files import MAX_SCENE_BYTES, text_from_bytes
 
 _CONFIG: Final = "*.scene_dataset_config.json"
+_SECTIONS: Final = {
+    "stage": "stages",
+    "object": "objects",
+    "ao": "articulated_objects",
+    "lighting": "light_setups",
+}  # kind of template -> its section of the data set's configuration
 _LEVELS_UP: Final = 6  # from a scene to its data set's config
 _ARTICULATED: Final = "articulated_object_instances"
 _MOST_INSTANCES: Final = 20_000
@@ -119,16 +125,17 @@ def companions_of_habitat(given: GivenFile, files: SourceFiles) -> str:
         instances = [scene.get(key) or [] for key in ("object_instances", _ARTICULATED)]
         rows = [scene.get("stage_instance"), *(row for some in instances for row in some)]
         templates = {r.get("template_name") for r in rows if isinstance(r, dict)}
+        names |= set(dataset.configs)
         for template in sorted(t for t in templates if isinstance(t, str)):
             for kind in ("stage", "object"):
-                name = dataset.config(template, kind)
-                if name is not None:
-                    asset = dataset.json(name).get("render_asset")
+                settings, name = dataset.template(template, kind) or ({}, "")
+                if name:
+                    asset = settings.get("render_asset")
                     names |= {name} | (dataset.files_of(name, asset) if asset else set())
             urdf = dataset.urdf(template)
             if urdf is not None:
                 names |= {urdf, *dataset.files_of_robot(urdf)}
-                names |= {n for n in [dataset.config(template, "ao")] if n is not None}
+                names |= {found[1] for found in [dataset.template(template, "ao")] if found}
         for pattern in ("*.semantic_config.json", "*objects.csv", "*.lighting_config.json"):
             names |= set(dataset.named(pattern))
     except (BadHouse, OSError, AttributeError, TypeError):
@@ -146,6 +153,7 @@ class _Dataset:
             hint = "keep the scene in the folder of its data set"
             raise BadHouse(path, "", f"no {_CONFIG} in a folder above it", hint=hint)
         self.folder = RootFolder(root)
+        self.configs = sorted(file.name for file in root.glob(_CONFIG))
         self.scene = path.relative_to(root).as_posix()
         self._parsed: dict[str, dict[str, Any]] = {}
         self._files = sorted(_names_below(root))
@@ -169,11 +177,35 @@ class _Dataset:
             self._parsed[name] = value
         return self._parsed[name]
 
-    def config(self, template: str, kind: str) -> str | None:
-        """The config of a template's name; its folders may be left out."""
-        self.folder.name_from("", template)  # a name that leads out is refused
-        base = posixpath.basename(template).removesuffix(f".{kind}_config.json")
-        return self._by_name.get(f"{base}.{kind}_config.json")
+    def template(self, name: str, kind: str) -> tuple[dict[str, Any], str] | None:
+        """Fields of a template, and the file that its paths are relative to; None if it is unknown.
+
+        A template is an entry of `configs` in the data set's configuration, a config file, whose folders
+        may be left out, or a model without a config. The data set's default attributes come first.
+        """
+        self.folder.name_from("", name)  # a name that leads out is refused
+        base, defaults = _base_name(name, kind), {}
+        for config in self.configs:
+            section = object_at(self.json(config), _SECTIONS[kind])
+            defaults = defaults | object_at(section, "default_attributes")
+            rows = section.get("configs", [])
+            for row in rows if isinstance(rows, list) else []:
+                original = row.get("original_file") if isinstance(row, dict) else None
+                named = row.get("template_handle", original) if isinstance(row, dict) else None
+                if not isinstance(named, str) or _base_name(named, kind) != base:
+                    continue
+                fields, file = self._template_of_file(str(original), kind) or ({}, config)
+                return defaults | fields | object_at(row, "attributes"), file
+        known = self._template_of_file(base, kind)
+        return known and (defaults | known[0], known[1])
+
+    def _template_of_file(self, name: str, kind: str) -> tuple[dict[str, Any], str] | None:
+        base = _base_name(name, kind)
+        config = self._by_name.get(f"{base}.{kind}_config.json")
+        if config is not None:
+            return self.json(config), config
+        model = self._by_name.get(f"{base}.glb") if kind in ("stage", "object") else None
+        return model and ({"render_asset": posixpath.basename(model)}, model)
 
     def asset(self, config: str, reference: Any) -> str:
         """The name below the root of an asset that a config names."""
@@ -190,9 +222,9 @@ class _Dataset:
 
     def urdf(self, template: str) -> str | None:
         """Name of the URDF of an articulated object's template; None if it has none."""
-        config = self.config(template, "ao")
-        named = self.json(config).get("urdf_filepath") if config else None
-        if config and isinstance(named, str):
+        settings, config = self.template(template, "ao") or ({}, "")
+        named = settings.get("urdf_filepath")
+        if isinstance(named, str):
             name = self.folder.name_from(posixpath.dirname(config), named)
             return name if name in self._known else None
         base = posixpath.basename(template).removesuffix(".urdf")
@@ -219,6 +251,12 @@ class _Dataset:
                     category = next((w for w in words if w), "")
                     self._classes[next(iter(row.values())) or ""] = str(category)
         return self._classes.get(posixpath.basename(template), "")
+
+
+def _base_name(name: str, kind: str) -> str:
+    """Name of a template without folders and the ending of its file."""
+    base = posixpath.basename(name).removesuffix(f".{kind}_config.json")
+    return base.removesuffix(".glb") if kind in ("stage", "object") else base
 
 
 def _names_below(root: Path) -> list[str]:
@@ -379,10 +417,10 @@ def _plus(value: Any, by: int) -> Any:
 
 
 def _add_stage(dataset: _Dataset, template: str, built: _Built) -> None:
-    config = dataset.config(template, "stage")
-    if config is None:
+    known = dataset.template(template, "stage")
+    if known is None:
         raise BadHouse(dataset.scene, f"stage_instance: {template}", "has no stage_config.json")
-    row = dataset.json(config)
+    row, config = known
     name = dataset.asset(config, row.get("render_asset"))
     if _BAKED in name.lower():
         text = "has light baked into its pictures, so it cannot be relit"
@@ -401,18 +439,17 @@ def _add_object(dataset: _Dataset, row: Any, origin: Any, place: str, built: _Bu
     if not isinstance(row, dict) or not isinstance(row.get("template_name"), str):
         raise BadHouse(dataset.scene, f"{place}.template_name", "expected a name")
     template = row["template_name"]
-    config = dataset.config(template, "object")
-    settings = dataset.json(config) if config else {}
+    settings, config = dataset.template(template, "object") or ({}, "")
     added = None
-    if config and settings.get("render_asset"):
+    if settings.get("render_asset"):
         added = built.asset(dataset, dataset.asset(config, settings["render_asset"]))
     if added is None:
         return False
     roots, gltf = added
     matrix = _matrix_of_instance(row, place, dataset.scene)
-    inner = _upright_matrix(settings, gltf, config or "")
+    inner = _upright_matrix(settings, gltf, config)
     if str(row.get("translation_origin", origin)).lower() != "asset_local":
-        centre = _centre(gltf, inner, settings, config or "")
+        centre = _centre(gltf, inner, settings, config)
         inner = inner.copy()
         inner[:3, 3] -= centre
     name = dataset.class_of(template) or str(settings.get("name") or posixpath.basename(template))
@@ -464,8 +501,7 @@ def _add_robot(
 ) -> bool:
     """Place the links of a robot as an instance says; whether any of its models is here."""
     template = row["template_name"]
-    config = dataset.config(template, "ao")
-    settings = dataset.json(config) if config else {}
+    settings, config = dataset.template(template, "ao") or ({}, "")
     pose = row.get("initial_joint_pose")
     order = str(row.get("link_order", settings.get("link_order", "")))
     values = robot.values(pose, dataset.scene, f"{place}.initial_joint_pose", order)
@@ -524,10 +560,11 @@ def _add_lights(dataset: _Dataset, named: Any, built: _Built, notes: Notes) -> N
 
     Habitat's intensities have no unit: each light is as strong as a bulb.
     """
-    config = dataset.config(named, "lighting") if isinstance(named, str) and named else None
-    if config is None:
+    known = dataset.template(named, "lighting") if isinstance(named, str) and named else None
+    if known is None:
         return
-    rows = dataset.json(config).get("lights", {})
+    settings, config = known
+    rows = settings.get("lights", {})
     if not isinstance(rows, dict) or len(rows) > _MOST_LIGHTS:
         raise BadHouse(config, "lights", f"expected an object of at most {_MOST_LIGHTS}")
     where = Gltf({}, (), config)

@@ -14,7 +14,7 @@ from pbrs_farm.prepare.finished_house import repaired_house
 from pbrs_farm.prepare.read_source import read_house
 from pbrs_farm.prepare.source import resolve
 from tests.inputs.habitat_files import written
-from tests.read.gltf.gltf_scenes import item, two_rooms
+from tests.read.gltf.gltf_scenes import Scene, item, two_rooms
 from tests.read.habitat.habitat_sets import dataset
 
 
@@ -105,3 +105,66 @@ def test_a_scene_outside_its_data_set_is_told_so(tmp_path: Path) -> None:
     path = written(tmp_path / "one.scene_instance.json", {"stage_instance": {"template_name": "a"}})
     with pytest.raises(BadHouse, match="scene_dataset_config"):
         house(path)
+
+
+def test_templates_within_the_configuration_of_the_data_set_are_found(tmp_path: Path) -> None:
+    sofas = [
+        {"template_name": name, "translation": [x, 0.3, 1.5], "translation_origin": "COM"}
+        for x, name in ((1, "long_sofa"), (2, "new_sofa"), (5, "objects/plain"))
+    ]
+    path = dataset(
+        tmp_path,
+        stage_instance={"template_name": "own_stage"},
+        object_instances=sofas,
+        default_lighting="own_lights",
+    )
+    plain = Scene()
+    plain.node("mesh 3", mesh=plain.box([0, 0, 0], [1, 1, 1]))
+    written(tmp_path / "objects/plain.glb", plain.glb())
+    upright = {"up": [0, 0, 1], "front": [0, -1, 0], "units_to_meters": 0.01}
+    lights = {"0": {"type": "point", "position": [1, 2.3, 1], "intensity": 1.0}}
+    written(
+        tmp_path / "x.scene_dataset_config.json",
+        {
+            "stages": {
+                "configs": [
+                    {
+                        "template_handle": "own_stage",
+                        "attributes": {"render_asset": "stages/flat.glb"},
+                    }
+                ]
+            },
+            "objects": {
+                "default_attributes": {"scale": [0.5, 0.5, 0.5]},
+                "paths": {".json": ["objects"], ".glb": ["objects"]},
+                "configs": [
+                    {"template_handle": "unusable"},
+                    {
+                        "original_file": "objects/ab12.object_config.json",
+                        "template_handle": "long_sofa",
+                        "attributes": {"scale": [1.5, 1, 1]},
+                    },
+                    {
+                        "template_handle": "new_sofa",
+                        "attributes": {"render_asset": "objects/ab12.glb"} | upright,
+                    },
+                ],
+            },
+            "light_setups": {
+                "configs": [{"template_handle": "own_lights", "attributes": {"lights": lights}}]
+            },
+        },
+    )
+    found = house(path)
+    assert not [n for n in found.notes if n.kind == "missing-model"]
+    sizes = {
+        name: np.ptp(next(i for i in found.items if i.name == name).bounds, axis=0).tolist()
+        for name in ("long_sofa", "new_sofa", "plain")
+    }
+    assert sizes["long_sofa"] == pytest.approx([3.0, 0.6, 0.8])
+    assert sizes["new_sofa"] == pytest.approx([1.0, 0.3, 0.4])
+    assert sizes["plain"] == pytest.approx([0.5, 0.5, 0.5])
+    assert len([i for i in found.items if i.lights]) == 1
+    before = resolve(str(path)).fingerprint
+    (tmp_path / "objects/plain.glb").write_bytes(two_rooms().glb())
+    assert resolve(str(path)).fingerprint != before
