@@ -55,6 +55,14 @@ def json_from_bytes(data: bytes, file: object, *, error: type[BadInput] = BadHou
     raise error(file, place, f"no valid JSON: {text}")
 
 
+def utf8_of_json(data: bytes) -> bytes:
+    """JSON text as UTF-8 without a byte order mark; UTF-16 and UTF-32 are converted, damage is replaced."""
+    encoding = json.detect_encoding(data)
+    if encoding.startswith("utf-8"):
+        return data.removeprefix(BOM_UTF8)
+    return data.decode(encoding, "replace").removeprefix("\ufeff").encode()
+
+
 class _NoNumberError(ValueError):
     """NaN or an infinity where JSON knows none."""
 
@@ -79,7 +87,7 @@ def checked(
     adapter: TypeAdapter[T] = kind if isinstance(kind, TypeAdapter) else _adapter_of(kind)
     try:
         if isinstance(data, bytes):
-            return adapter.validate_json(data.removeprefix(BOM_UTF8))
+            return adapter.validate_json(utf8_of_json(data))
         return adapter.validate_python(data)
     except ValidationError as fault:
         # Name the first fault: the others may follow from it.

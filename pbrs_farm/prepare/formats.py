@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Final
 
 from pbrs_farm import read
+from pbrs_farm.core.checked_json import utf8_of_json
 from pbrs_farm.core.data_format import DataFormat
 from pbrs_farm.core.errors import BadHouse, MachineFailed
 from pbrs_farm.core.house import House
@@ -142,7 +143,8 @@ class _Look:
     def _head(self) -> bytes:
         try:
             with open_regular(self._path, _MOST_BYTES) as file:
-                return file.read(_HEAD_BYTES)
+                head = file.read(_HEAD_BYTES)
+            return utf8_of_json(head) if self._suffix == ".json" else head
         except OSError as error:
             raise BadHouse(self._path, "", fault_of(error)) from None
 

@@ -93,6 +93,72 @@ class GivenCamera(BaseModel):
         )
 
 
+# y up  <-  z up, the world of transforms.json without applied_transform.
+_Y_UP_FROM_Z_UP: Final = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
+_LENSES: Final = ("PINHOLE", "SIMPLE_PINHOLE", "OPENCV")
+
+
+class _Optics(BaseModel):
+    """Intrinsics of transforms.json: of all frames, or of one."""
+
+    w: int | None = None
+    h: int | None = None
+    fl_x: float | None = None
+    fl_y: float | None = None
+    cx: float | None = None
+    cy: float | None = None
+    camera_angle_x: float | None = None  # radians
+    camera_model: str = "PINHOLE"
+    k1: float = 0.0
+    k2: float = 0.0
+    k3: float = 0.0
+    k4: float = 0.0
+    p1: float = 0.0
+    p2: float = 0.0
+
+    @model_validator(mode="after")
+    def _is_pinhole(self) -> _Optics:
+        distortion = any((self.k1, self.k2, self.k3, self.k4, self.p1, self.p2))
+        if distortion or self.camera_model not in _LENSES:
+            raise ValueError("has a lens; lenses are chosen by --set optics, not by the file")
+        return self
+
+
+class _Frame(_Optics):
+    transform_matrix: Pose
+
+
+class _Transforms(_Optics):
+    """transforms.json of nerfstudio and instant-ngp; `export --to nerfstudio` writes it."""
+
+    frames: list[_Frame] = Field(min_length=1, max_length=MAX_CAMERAS)
+    applied_transform: Annotated[tuple[Row, Row, Row], exactly(3, "rows")] | None = None
+
+    def cameras(self) -> list[dict[str, object]]:
+        """Each frame as a GivenCamera, in the y-up world before applied_transform."""
+        world_from_file = _Y_UP_FROM_Z_UP
+        if self.applied_transform is not None:
+            world_from_file = np.linalg.inv(np.vstack([self.applied_transform, [0, 0, 0, 1]]))
+        return [
+            {"world_from_camera": (world_from_file @ frame.transform_matrix).tolist()}
+            | self._view_of(frame)
+            for frame in self.frames
+        ]
+
+    def _view_of(self, frame: _Frame) -> dict[str, object]:
+        """K and its size, else the field of view; a frame's own values come first."""
+        whole = self.model_dump(exclude_none=True) | frame.model_dump(exclude_none=True)
+        w, h, fl_x = whole.get("w"), whole.get("h"), whole.get("fl_x")
+        angle = whole.get("camera_angle_x")
+        if w is None or h is None or fl_x is None:
+            return {} if angle is None else {"hfov_rad": angle}
+        k = [
+            [fl_x, 0, whole.get("cx", w / 2)],
+            [0, whole.get("fl_y", fl_x), whole.get("cy", h / 2)],
+        ]
+        return {"K": [*k, [0, 0, 1]], "width_px": w, "height_px": h}
+
+
 _CAMERAS: TypeAdapter[list[GivenCamera]] = TypeAdapter(list[GivenCamera])
 
 
@@ -101,12 +167,12 @@ def cameras_from_file_text(
 ) -> list[tuple[Camera, str | None]]:
     """(camera, id of its room if the file says it) of a user's file, in order.
 
-    The file is a JSON list of GivenCamera, else a room_camera.txt.
+    The file is a JSON list of GivenCamera, a transforms.json, else a room_camera.txt.
 
     Raises BadInput with the file and the place.
     """
-    # Tell the two formats apart by their first character; count before any camera is built.
-    is_json = text.lstrip().startswith("[")
+    # Tell the formats apart by their first character; count before any camera is built.
+    is_json = text.lstrip().startswith(("[", "{"))
     n_cameras = text.count("{") if is_json else text.count("\n")
     if n_cameras > MAX_CAMERAS:
         raise BadInput(file, "", f"has {n_cameras} cameras; the maximum is {MAX_CAMERAS}")
@@ -115,7 +181,10 @@ def cameras_from_file_text(
         if not lines:
             raise BadInput(file, "", "holds no camera")
         return [(line.camera, line.room_id) for line in lines]
-    rows = checked(_CAMERAS, text.encode(), file, "camera")
+    given: object = text.encode()
+    if text.lstrip().startswith("{"):
+        given = checked(_Transforms, given, file).cameras()
+    rows = checked(_CAMERAS, given, file, "camera")
     if not rows:
         raise BadInput(file, "", "holds no camera")
     return [(camera.camera(width_px, height_px), camera.room) for camera in rows]

@@ -28,6 +28,7 @@ from tests.inputs.plan_files import (
     WRITERS,
     traced,
     with_a_stub,
+    write_blueprint3d,
     write_cubicasa,
     write_procthor,
     write_react_planner,
@@ -253,6 +254,19 @@ def test_areas_without_an_inside_leave_the_rooms_to_the_lines(tmp_path: Path) ->
         area["coords"] = [[0, 0], [0, 0], [0, 0]]
     plan = plan_from_file(_written(path, value)).plan
     assert len(plan.rooms) == len(ROOMS)
+
+
+def test_corners_of_blueprint3d_are_in_centimetres_or_metres(tmp_path: Path) -> None:
+    sizes = []
+    for name, per_metre in (("old", 100.0), ("new", 1.0)):
+        (tmp_path / name).mkdir()
+        path = write_blueprint3d(tmp_path / name, per_metre=per_metre)
+        found = plan_from_file(path)
+        sizes.append(sorted(round(room.area, 2) for room in found.plan.rooms))
+        (bed,) = found.storeys[0].things
+        assert (bed.x, bed.z, bed.low) == pytest.approx((1.2, 1.3, 0.0), abs=0.01)
+        assert math.sin(bed.turn_rad) == pytest.approx(-1)
+    assert sizes[0] == sizes[1]
 
 
 def test_a_hole_without_a_place_is_a_guess_and_a_note(tmp_path: Path) -> None:

@@ -316,6 +316,30 @@ def write_zind(folder: Path, n_floors: int = 1) -> Path:
     return _json(folder / "zind_data.json", value)
 
 
+def write_blueprint3d(folder: Path, *, per_metre: float = 100.0) -> Path:
+    """A home of blueprint3d: corners, walls and items in centimetres, or corners in metres."""
+    points = [p for wall in _walls() for p in wall] + [tuple(p) for r in ROOMS for p in _ring(r)]
+    names = {p: f"{k:08x}-9e0e" for k, p in enumerate(dict.fromkeys(points))}
+    corners = {name: {"x": x * per_metre, "y": z * per_metre} for (x, z), name in names.items()}
+    paper = {"url": "rooms/textures/wallmap.png", "stretch": True, "scale": 0}
+    walls = [{"corner1": names[a], "corner2": names[b], "frontTexture": paper} for a, b in _walls()]
+    items = [
+        {"item_name": "Window" if h.kind == "window" else "Closed Door",
+         "item_type": 3 if h.kind == "window" else 7, "xpos": h.at[0] * 100, "zpos": h.at[1] * 100,
+         "ypos": 150 if h.kind == "window" else 110.8, "rotation": 0,
+         "scale_x": h.width / (1.0 if h.kind == "window" else 0.9)}
+        for h in HOLES
+    ]  # fmt: skip
+    items.append({"item_name": "Full Bed", "item_type": 1, "xpos": 120, "ypos": 45, "zpos": 130,
+                  "rotation": -1.5707963, "scale_x": 1, "scale_y": 1, "scale_z": 1})  # fmt: skip
+    rooms = {
+        ",".join(names[tuple(p)] for p in _ring(room)): {"name": room.type.capitalize()}
+        for room in ROOMS
+    }
+    plan = {"corners": corners, "walls": walls, "rooms": rooms, "wallTextures": []}
+    return _json(folder / "plan.json", {"floorplan": plan, "items": items})
+
+
 def write_react_planner(folder: Path) -> Path:
     """A drawing in centimetres, y up, walls by their vertices."""
     points: dict[tuple[float, float], str] = {}
@@ -367,6 +391,7 @@ WRITERS: Final[dict[str, Callable[[Path], Path]]] = {
     "own": write_own, "geojson": write_geojson, "swiss": write_swiss, "spatiallm": write_spatial_lm,
     "procthor": write_procthor, "roomplan": write_room_plan, "cubicasa": write_cubicasa, "zind": write_zind,
     "react-planner": write_react_planner,
+    "blueprint3d": write_blueprint3d,
 }  # fmt: skip
 TELLING: Final = ("swiss", "spatiallm", "procthor", "roomplan", "cubicasa", "react-planner")
 """Formats that tell of things."""

@@ -30,6 +30,7 @@ def sound_files(n_triangles: int = N_TRIANGLES) -> dict[str, SoundFile]:
         habitat_files,
         ifc_files,
         mjcf_files,
+        obj_files,
         plan_files,
         scenestate_files,
         usd_files,
@@ -44,6 +45,7 @@ def sound_files(n_triangles: int = N_TRIANGLES) -> dict[str, SoundFile]:
         "CubiCasa5k": plan_files.write_cubicasa,
         "ZInD": plan_files.write_zind,
         "react-planner": plan_files.write_react_planner,
+        "blueprint3d": plan_files.write_blueprint3d,
     }
     each = max(n_triangles // 20, 12)
 
@@ -53,6 +55,7 @@ def sound_files(n_triangles: int = N_TRIANGLES) -> dict[str, SoundFile]:
 
     return {
         "glTF": SoundFile(write_gltf),
+        "OBJ": SoundFile(obj_files.write_obj_home),
         "sceneState": SoundFile(
             lambda folder: scenestate_files.hssd_like(folder, triangles=each),
             scenestate_files.N_OPENINGS, lambda file: file.parent / "objects",

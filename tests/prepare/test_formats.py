@@ -299,3 +299,10 @@ def test_a_format_is_added_in_one_file(tmp_path: Path) -> None:
     store = MemoryStore()
     upload(store, [ref])
     assert store.get(SourceRef.model_validate_json(entry.source).location) == b"Scanned"
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-32"])
+def test_json_of_other_encodings_is_read_as_utf_8_is(tmp_path: Path, encoding: str) -> None:
+    path = WRITERS["react-planner"](tmp_path)
+    path.write_bytes(path.read_text("utf-8").encode(encoding))
+    assert read_house(resolve(str(path)), ReadFields()).rooms

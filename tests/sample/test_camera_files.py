@@ -1,12 +1,13 @@
 """Published camera files and a user's own: read and rejected."""
 
+import json
 import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from pbrs_farm.core.camera import PAPER_HFOV_RAD
+from pbrs_farm.core.camera import PAPER_HFOV_RAD, Camera
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.read.builtin.builtin_home import builtin_home
 from pbrs_farm.sample.camera_file import cameras_from_file_text
@@ -14,6 +15,7 @@ from pbrs_farm.sample.room_camera_file import cameras_from_text, with_names
 from pbrs_farm.sample.stored_cameras import stored_views, views_from_cameras
 from tests.sample.sampled_rooms import QUICK, counter_of
 
+Z_UP_FROM_Y_UP = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
 LINE = "1.5 1.55 2  0.6929 -0.19612 0.6929  0.1386 0.98058 0.1386  0.5534 0.433896  540"
 
 
@@ -137,3 +139,26 @@ def moved(world_from_camera: np.ndarray, x: float, z: float) -> np.ndarray:
 def test_a_file_of_too_many_cameras_is_rejected_before_one_is_built(text: str) -> None:
     with pytest.raises(BadInput, match="at most 10000 are read"):
         cameras_from_file_text(text, "mine", 64, 48)
+
+
+def test_transforms_json_gives_the_cameras_before_its_transform() -> None:
+    pose = Camera.look_at((1, 1.5, 2), (2, 1.2, 0), size=(640, 480), hfov_deg=60).world_from_camera
+    frame = {"file_path": "images/a.png", "transform_matrix": (Z_UP_FROM_Y_UP @ pose).tolist()}
+    optics = {"w": 640, "h": 480, "fl_x": 500.0, "fl_y": 510.0, "cx": 310.0, "cy": 250.0}
+    exported = {"camera_model": "PINHOLE", "applied_transform": Z_UP_FROM_Y_UP[:3].tolist(),
+                "frames": [frame | optics]}  # fmt: skip
+    published = optics | {"frames": [frame], "aabb_scale": 4}
+    blender = {"camera_angle_x": 0.9, "frames": [frame]}
+    for value in (exported, published, blender):
+        ((camera, room),) = cameras_from_file_text(json.dumps(value), "transforms.json", 320, 240)
+        np.testing.assert_allclose(camera.world_from_camera, pose, atol=1e-9)
+        assert room is None
+        if value is not blender:
+            assert camera.intrinsics.fx == pytest.approx(250)
+            assert camera.intrinsics.cy == pytest.approx(125)
+        else:
+            assert camera.intrinsics.fx == pytest.approx(160 / math.tan(0.45))
+    with pytest.raises(BadInput, match="has a lens"):
+        cameras_from_file_text(json.dumps(published | {"k1": 0.1}), "transforms.json", 320, 240)
+    with pytest.raises(BadInput, match=r"frames\[0\].transform_matrix"):
+        cameras_from_file_text('{"frames": [{}]}', "transforms.json", 320, 240)

@@ -8,9 +8,11 @@ from collections.abc import Callable
 from typing import Final, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from PIL import Image, UnidentifiedImageError
 
 from pbrs_farm.core import keys
+from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import USUAL_CUTOFF, Material, Texture
 from pbrs_farm.read.common.notes import Notes
 
@@ -189,6 +191,22 @@ class MaterialLibrary:
         if key not in self._loaded:
             self._loaded[key] = self._load(key, name, place, load)
         return self._loaded[key]
+
+    def colours_of_faces(self, rgb: NDArray[np.uint8], name: str) -> tuple[F64, str]:
+        """(F, 2) texture coordinates, one place a face, and the id of the picture of their colours.
+
+        rgb: (F, 3) sRGB. Blocks of 4 x 4 texels, so that filtering stays within a colour.
+        """
+        colours, of_face = np.unique(rgb, axis=0, return_inverse=True)
+        side = int(np.ceil(np.sqrt(len(colours))))
+        grid = np.zeros((side * side, 3), np.uint8)
+        grid[: len(colours)] = colours
+        picture = grid.reshape(side, side, 3).repeat(4, 0).repeat(4, 1)
+        row, column = np.divmod(of_face.reshape(-1), side)
+        uvs = np.stack([(column + 0.5) / side, 1 - (row + 0.5) / side], axis=1)
+        loaded = texture_from_bytes(_png_bytes(Image.fromarray(picture)), f"{name}.png")
+        self._loaded[f"texture {loaded.texture.id}"] = loaded
+        return uvs, loaded.texture.id
 
     def _load(
         self, key: str, name: str, place: str, load: Callable[[], bytes | None]

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import base64
 import binascii
+import json
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any, Final
@@ -38,8 +39,10 @@ UNDERSTOOD: Final = frozenset({
     "KHR_materials_specular", "KHR_materials_transmission", "KHR_materials_unlit",
     "KHR_mesh_quantization", "KHR_texture_transform", "EXT_texture_webp",
     "KHR_draco_mesh_compression", "KHR_texture_basisu", "KHR_materials_pbrSpecularGlossiness",
+    "EXT_mesh_gpu_instancing",
 })
 # fmt: on
+_INSTANCING: Final = "EXT_mesh_gpu_instancing"
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6  # values of primitive.mode
 UNREAD: Final = "unread-part"
 _WRAPS: Final = {33071: CLAMP, 33648: MIRROR}  # values of sampler.wrapS
@@ -84,7 +87,75 @@ def gltf_document(data: bytes, file: str, fetch: Fetch) -> Gltf:
     if not isinstance(buffers, list):
         raise BadHouse(file, "buffers", "expected a list")
     loaded = [_buffer(gltf, i, fetch) for i in range(len(buffers))]
-    return Gltf(gltf.document, tuple(loaded), file)
+    return _with_instances(Gltf(gltf.document, tuple(loaded), file))
+
+
+def _with_instances(gltf: Gltf) -> Gltf:
+    """The document with a node for each instance of EXT_mesh_gpu_instancing.
+
+    The new nodes are siblings of the instanced node, with its name, so that each is an item.
+    """
+    nodes = gltf.document.get("nodes")
+    rows = nodes if isinstance(nodes, list) else []
+    if _INSTANCING not in json.dumps(gltf.document.get("extensionsUsed")):
+        return gltf
+    rows = [dict(row) if isinstance(row, dict) else row for row in rows]
+    copies: dict[int, list[int]] = {}
+    for k, node in enumerate(list(rows)):
+        extension = (
+            object_at(object_at(node, "extensions"), _INSTANCING) if isinstance(node, dict) else {}
+        )
+        if not extension or "mesh" not in node:
+            continue
+        matrices = _instances(gltf, object_at(extension, "attributes"), f"nodes[{k}]")
+        if len(rows) + len(matrices) > MAX_NODES:
+            raise BadHouse(gltf.file, f"nodes[{k}]", f"more than {MAX_NODES} nodes")
+        parent_from_mesh = parent_from_node(gltf, node, k) @ matrices
+        copies[k] = list(range(len(rows), len(rows) + len(matrices)))
+        rows += [
+            {
+                "name": node.get("name", ""),
+                "mesh": node["mesh"],
+                "matrix": matrix.T.ravel().tolist(),
+            }
+            | {key: node[key] for key in ("extras",) if key in node}
+            for matrix in parent_from_mesh
+        ]
+        del rows[k]["mesh"]
+    scenes = gltf.document.get("scenes")
+    holders = [("nodes", row) for row in (scenes if isinstance(scenes, list) else [])]
+    holders = [(key, dict(row) if isinstance(row, dict) else row) for key, row in holders]
+    for key, row in (*holders, *(("children", row) for row in rows)):
+        listed = row.get(key) if isinstance(row, dict) else None
+        if isinstance(listed, list):
+            row[key] = [
+                n for k in listed for n in (k, *(copies.get(k, ()) if type(k) is int else ()))
+            ]
+    document = gltf.document | {"nodes": rows, "scenes": [row for _, row in holders]}
+    return Gltf(document, gltf.buffers, gltf.file)
+
+
+def _instances(gltf: Gltf, attributes: dict[str, Any], place: str) -> F64:
+    """(N, 4, 4) poses of the instances in their node's frame."""
+    widths = {"TRANSLATION": 3, "ROTATION": 4, "SCALE": 3}
+    arrays = {
+        key: _accessor_floats(gltf, attributes[key], width, f"{place}: {key}")
+        for key, width in widths.items()
+        if key in attributes
+    }
+    n = max((len(array) for array in arrays.values()), default=0)
+    if any(len(array) != n for array in arrays.values()) or n > MAX_NODES:
+        raise BadHouse(gltf.file, place, f"has instances of different numbers, or over {MAX_NODES}")
+    moved = arrays.get("TRANSLATION", np.zeros((n, 3)))
+    turned = arrays.get("ROTATION", np.tile([0.0, 0.0, 0.0, 1.0], (n, 1)))
+    sizes = arrays.get("SCALE", np.ones((n, 3)))
+    rows = [
+        parent_from_node(gltf, {"translation": t, "rotation": r, "scale": s}, k)
+        for k, (t, r, s) in enumerate(
+            zip(moved.tolist(), turned.tolist(), sizes.tolist(), strict=True)
+        )
+    ]
+    return np.array(rows).reshape(-1, 4, 4)
 
 
 def _check_extensions(gltf: Gltf) -> None:
@@ -347,11 +418,24 @@ def _mesh_of_primitive(gltf: Gltf, primitive: dict[str, Any], place: str) -> Mes
         normals = _accessor_floats(
             gltf, attributes["NORMAL"], 3, f"{place}.NORMAL", numbers_of.get("NORMAL")
         )
+    colours = None
+    if "COLOR_0" in attributes:
+        colours = _vertex_colours(gltf, attributes["COLOR_0"], place, numbers_of.get("COLOR_0"))
     # One value per vertex, or none.
-    for array in (uvs, normals):
+    for array in (uvs, normals, colours):
         if array is not None and len(array) != len(positions):
             raise BadHouse(gltf.file, place, "has attributes of different lengths")
-    return Mesh("", "", positions, faces, uvs, normals)
+    return Mesh("", "", positions, faces, uvs, normals, colours)
+
+
+def _vertex_colours(
+    gltf: Gltf, accessor: Any, place: str, decoded: NDArray[Any] | None
+) -> F64 | None:
+    """(V, 3) linear colours of vertices, without their alpha; None if all are white."""
+    raw = accessor_array(gltf, accessor) if decoded is None else decoded
+    width = 4 if raw.shape[1] == 4 else 3
+    rgb = _accessor_floats(gltf, accessor, width, f"{place}.COLOR_0", decoded)[:, :3]
+    return None if (rgb >= 1).all() else np.clip(rgb, 0, 1)
 
 
 def _accessor_floats(
@@ -418,7 +502,6 @@ def _transformed(gltf: Gltf, uvs: F64, info: dict[str, Any], place: str) -> F64:
 
 _PRIMITIVES: Final[dict[str, Callable[[_Row], bool]]] = {
     "points or lines": lambda row: not has_surface(row),
-    "vertex colours": lambda row: "COLOR_0" in object_at(row, "attributes"),
     "morph targets": lambda row: bool(row.get("targets")),
 }
 

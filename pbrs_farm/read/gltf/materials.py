@@ -63,6 +63,9 @@ class Emission:
     is_coloured: bool  # the file gives that colour, even if it is white
 
 
+_LEAST_DIFFERENCE: Final = 0.004  # of the colours of vertices, linear
+
+
 class SceneMaterials:
     """Resolves the materials of one scene into its material library."""
 
@@ -343,6 +346,33 @@ class SceneMaterials:
             return decoded_picture(image_bytes(self._gltf, source, self._fetch))
         except MissingFile:
             return None
+
+    def with_vertex_colours(self, mesh: Mesh, material: Material) -> tuple[Mesh, Material]:
+        """The mesh and its material with the colours of its vertices, as a picture if they differ.
+
+        A material with a picture takes their mean.
+        """
+        if mesh.colours is None:
+            return mesh, material
+        base = linear_from_srgb(np.array(material.diffuse))
+        faces = mesh.colours[mesh.faces].mean(1)
+        if not base.any():  # a metal
+            tint = linear_from_srgb(np.array(material.specular)) * faces.mean(0)
+            return mesh, replace(material, specular=_encoded(tint))
+        if material.texture_id is not None or np.ptp(faces, axis=0).max() < _LEAST_DIFFERENCE:
+            return mesh, replace(material, diffuse=_encoded(base * faces.mean(0)))
+        rgb = np.rint(255 * srgb_from_linear(faces * base)).astype(np.uint8)
+        uvs, texture = self.library.colours_of_faces(rgb, material.name or "vertex colours")
+        corners = mesh.faces.reshape(-1)
+        parted = replace(
+            mesh,
+            positions=mesh.positions[corners],
+            faces=np.arange(len(corners), dtype=np.int32).reshape(-1, 3),
+            uvs=uvs.repeat(3, 0),
+            normals=mesh.normals[corners],
+            colours=None,
+        )
+        return parted, replace(material, diffuse=(1.0, 1.0, 1.0), texture_id=texture)
 
     def laid(self, number: int | None, mesh: Mesh) -> Mesh:
         """The mesh as its material's pictures lie on it, which a surface repeats beyond their edges."""

@@ -23,6 +23,7 @@ from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.formats.glb import Gltf, entry
 from pbrs_farm.read.common.format import GivenFile
 from pbrs_farm.read.common.house_builder import HouseBuilder
+from pbrs_farm.read.common.name_classes import UNMAPPED
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.openings import openings
 from pbrs_farm.read.common.rooms import rooms_from_floors, rooms_from_json, rooms_from_value
@@ -134,7 +135,7 @@ def house_of_gltf(
         hint = (
             f"{_of_its_size(items, source.kind)}{hint}; `pbrs-farm objects` renders single models"
         )
-        raise BadHouse(name, "scene", "has no floor", hint=hint)
+        raise BadHouse(name, "scene", _why_no_floor(items), hint=hint)
     # Sort rooms into levels and items into rooms.
     builder = HouseBuilder(name, fields, notes, materials.library)
     builder.set_rooms(house_rooms)
@@ -146,6 +147,16 @@ def _rooms_of_scene(gltf: Gltf) -> Any:
     """The rooms in the scene's extras, as written by this project's exports."""
     scene = entry(gltf, "scenes", gltf.document.get("scene", 0))
     return object_at(scene, "extras").get("rooms")
+
+
+def _why_no_floor(items: Sequence[Item]) -> str:
+    """Reason why a scene has no floor: it is a scan or a flat of one mesh, or no object is a floor."""
+    shapes = [item for item in items if item.n_faces]
+    if shapes and all(UNMAPPED in item.tags for item in shapes):
+        n = len(shapes)
+        parts = "one mesh" if n == 1 else f"{n} objects"
+        return f"has no floor: {parts} without a known name, as in a scan; furniture and walls cannot be told apart"
+    return "has no floor"
 
 
 def _of_its_size(items: Sequence[Item], kind: str) -> str:

@@ -223,6 +223,7 @@ def _item(
             named = (number in glass or is_glass) and not materials.is_tagged(number)
             if named and material.kind is MaterialKind.OPAQUE:
                 material = replace(material, kind=clear, opacity=PANE_OPACITY)
+            coloured, material = materials.with_vertex_colours(mesh, material)
             # Emission of unknown strength counts for lamps only: screens and stickers glow, too.
             emits = emission is not None and not kind.is_structure
             is_known = emission is not None and emission.luminance > 0
@@ -232,7 +233,7 @@ def _item(
             if is_said and kind is ItemKind.OBJECT and material.kind is MaterialKind.OPAQUE:
                 # By that name repair knows a mirror or a pane of a piece.
                 name = part_name
-            laid = materials.laid(number, mesh)
+            laid = materials.laid(number, coloured)
             surface = placed(laid, part.world_from_node, name=name, material=index)
             if surface is None:
                 continue

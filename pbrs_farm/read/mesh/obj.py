@@ -32,6 +32,7 @@ class Mesh:
     faces: I32  # (F, 3)
     uvs: F64 | None  # (V, 2); None without texture coordinates
     normals: F64  # (V, 3) unit, creased where none are given
+    colours: F64 | None = None  # (V, 3) linear, times the material's; None without vertex colours
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -252,19 +252,12 @@ def _with_colour_a_face(
     surface: Surface, rgb: Any, library: MaterialLibrary, path: Path
 ) -> Surface:
     """Each triangle its own texel: vertices are parted, so that no colour runs into another."""
-    colours, of_face = np.unique(rgb.astype(np.uint8), axis=0, return_inverse=True)
+    colours = np.unique(rgb.astype(np.uint8), axis=0)
     if len(colours) == 1:
         r, g, b = (float(v) / 255 for v in colours[0])
         return replace(surface, material=library.index(Material(path.stem, diffuse=(r, g, b))))
-    # Blocks of 4 x 4 texels: filtering between texels stays within a colour.
-    side = int(np.ceil(np.sqrt(len(colours))))
-    grid = np.zeros((side * side, 3), np.uint8)
-    grid[: len(colours)] = colours
-    picture = grid.reshape(side, side, 3).repeat(4, 0).repeat(4, 1)
-    row, column = np.divmod(of_face.reshape(-1), side)
-    uv = np.stack([(column + 0.5) / side, 1 - (row + 0.5) / side], axis=1)
+    uv, texture = library.colours_of_faces(rgb.astype(np.uint8), path.stem)
     corners = surface.faces.reshape(-1)
-    texture = _add_vertex_colours(library, Image.fromarray(picture), path.stem)
     return replace(
         surface,
         positions=surface.positions[corners],

@@ -27,7 +27,7 @@ from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.placed_mesh import placed
 from pbrs_farm.read.common.root_folder import RootFolder
 from pbrs_farm.read.common.source_files import SourceFiles
-from pbrs_farm.read.gltf.document import files_of_gltf, gltf_document
+from pbrs_farm.read.gltf.document import files_of_gltf, gltf_document, note_unread
 from pbrs_farm.read.gltf.materials import SceneMaterials
 from pbrs_farm.read.gltf.node_classes import Mapping
 from pbrs_farm.read.gltf.scene_items import items_of_scene
@@ -183,6 +183,7 @@ def _gltf(
 
     gltf = gltf_document(data, name, fetch)
     materials = SceneMaterials(gltf, fetch, notes)
+    note_unread(gltf, notes)
     items = items_of_scene(gltf, Mapping(), materials, notes, fields)
     return [surface for item in items for surface in item.surfaces], materials.library
 

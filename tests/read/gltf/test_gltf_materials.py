@@ -1,12 +1,14 @@
 from __future__ import annotations
 
+import io
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 
-from pbrs_farm.core.frames import LM_PER_W
+from pbrs_farm.core.frames import LM_PER_W, srgb_from_linear
 from pbrs_farm.core.house import House, ItemKind, MaterialKind, geometry_from_house
 from pbrs_farm.core.lighting import LightForm, flux_lm
 from pbrs_farm.core.recipe import ReadFields, RepairFields, recipe_from_name
@@ -272,3 +274,35 @@ def test_a_part_named_glass_of_a_window_is_a_pane_whatever_its_material() -> Non
     house = read(s)
     kinds = [house.materials[x.material].kind for x in item(house, "Window").surfaces]
     assert kinds == [MaterialKind.PANE, MaterialKind.OPAQUE]
+
+
+def test_colours_of_vertices_are_the_materials_colour_or_a_picture() -> None:
+    s = two_rooms()
+    s.materials.append(
+        {"pbrMetallicRoughness": {"baseColorFactor": [0.5, 1, 1, 1], "metallicFactor": 0}}
+    )
+    for name, red_of_second_half in (("Even", 1.0), ("Painted", 0.0)):
+        s.node(name, mesh=s.box([1, 0, 1], [1.5, 0.5, 1.5], len(s.materials) - 1))
+        primitive = s.meshes[-1]["primitives"][0]
+        rgb = np.tile(np.array([[1.0, 0.25, 0.0]], np.float32), (24, 1))
+        rgb[12:, 0] = red_of_second_half
+        primitive["attributes"]["COLOR_0"] = s.writer.add_vertices(rgb)
+    house = read(s)
+    even, painted = (
+        house.materials[item(house, name).surfaces[0].material] for name in ("Even", "Painted")
+    )
+    assert even.texture_id is None
+    expected = srgb_from_linear(np.array([0.5, 0.25, 0.0]))
+    np.testing.assert_allclose(even.diffuse, expected, atol=1e-6)
+    assert painted.texture_id is not None
+    picture = Image.open(io.BytesIO(house.textures[painted.texture_id].data)).convert("RGB")
+    (surface,) = item(house, "Painted").surfaces
+    assert surface.uvs is not None
+    # The texel of the first corner of each face.
+    texels = np.array([
+        picture.getpixel((int(u * picture.width), int((1 - v) * picture.height)))
+        for u, v in surface.uvs[surface.faces[:, 0]]
+    ])  # fmt: skip
+    np.testing.assert_array_equal(texels[:6, 0], 188)
+    np.testing.assert_array_equal(texels[6:, 0], 0)
+    assert {n.kind for n in house.notes} == {"unmapped-class"}

@@ -9,7 +9,7 @@ import pytest
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.recipe import RepairFields
 from pbrs_farm.repair.repair_house import repair
-from tests.read.gltf.gltf_scenes import area, read, two_rooms
+from tests.read.gltf.gltf_scenes import Scene, area, read, two_rooms
 
 
 def test_rooms_are_the_pieces_of_floor_that_walls_part() -> None:
@@ -91,3 +91,10 @@ def test_a_wrong_room_file_is_refused_naming_the_room(rooms: Any, place: str) ->
     with pytest.raises(BadHouse) as caught:
         read(two_rooms(), rooms=json.dumps(rooms).encode())
     assert (caught.value.file, caught.value.place) == ("scene.rooms.json", place)
+
+
+def test_a_scan_of_one_mesh_is_refused_as_one() -> None:
+    s = Scene()
+    s.node("mesh_0", mesh=s.box([0, 0, 0], [6, 0.3, 4]))
+    with pytest.raises(BadHouse, match="has no floor: one mesh without a known name, as in a scan"):
+        read(s)

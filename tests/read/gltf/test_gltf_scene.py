@@ -157,3 +157,26 @@ def test_the_scene_survives_the_bundle() -> None:
     house = read(two_rooms())
     bundle = bundle_from_house(house)
     assert bundle_from_house(house_from_bundle(*bundle)) == bundle
+
+
+def test_each_instance_of_a_node_is_an_item() -> None:
+    s = two_rooms()
+    moves = np.array([[0, 0, 0], [1, 0, 0], [4, 0, 1]], np.float32)
+    sizes = np.array([[1, 1, 1], [1, 2, 1], [1, 1, 1]], np.float32)
+    attributes = {
+        "TRANSLATION": s.writer.add_vertices(moves),
+        "SCALE": s.writer.add_vertices(sizes),
+    }
+    extension = {"EXT_mesh_gpu_instancing": {"attributes": attributes}}
+    cube = s.box([0, 0, 0], [0.5, 0.5, 0.5])
+    chair = s.node("Chair", mesh=cube, translation=[0.5, 0, 1], extensions=extension)
+    s.node("Furniture", children=[chair])
+    s.more = {"extensionsUsed": ["EXT_mesh_gpu_instancing"]}
+    house = read(s)
+    chairs = [i for i in house.items if i.name == "Chair"]
+    assert [i.nyu40 for i in chairs] == [5, 5, 5]
+    np.testing.assert_allclose(
+        [i.bounds[0] for i in chairs], moves + np.array([0.5, 0, 1]), atol=1e-6
+    )
+    np.testing.assert_allclose([np.ptp(i.bounds[:, 1]) for i in chairs], [0.5, 1.0, 0.5])
+    assert not house.notes

@@ -1,0 +1,34 @@
+"""Homes as Wavefront OBJ, with an object or group for each item. No effects before `read`."""
+
+from __future__ import annotations
+
+import re
+
+from pbrs_farm.core.house import House
+from pbrs_farm.core.recipe import ReadFields
+from pbrs_farm.read.common.format import Format, GivenFile
+from pbrs_farm.read.common.source_files import SourceFiles
+
+
+def _read_obj(given: GivenFile, fields: ReadFields) -> House:
+    from pbrs_farm.read.obj_home import home
+
+    return home.read_obj_home(given, fields)
+
+
+def _companions_of_obj(given: GivenFile, files: SourceFiles) -> str:
+    from pbrs_farm.read.obj_home import home
+
+    return home.companions_of_obj_home(given, files)
+
+
+# fmt: off
+FORMAT = Format(
+    kind="obj-home", title="OBJ", files=".obj", order=35,
+    brings="what its groups are named", where="any modeller exports it", licence="of each home",
+    suffixes=(".obj",), shared_suffixes=frozenset({".obj"}), beside=("*.mtl",),
+    # a floor and a wall among its groups; other files are single models
+    contains=re.compile(rb"\A(?=[\s\S]*\n[go] [^\n]*floor)(?=[\s\S]*\n[go] [^\n]*wall)", re.IGNORECASE),
+    read=_read_obj, companions=_companions_of_obj,
+)
+# fmt: on

@@ -1,0 +1,171 @@
+"""An OBJ with named groups -> House. Effects: reads the file, its materials and pictures.
+
+Groups are brought to the reader of glTF as nodes. An OBJ has neither a unit nor an up axis: both
+follow from the height of the walls and the thinnest side of the floors.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import Any, Final
+from urllib.parse import quote
+
+import numpy as np
+
+from pbrs_farm.core import keys
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.core.frames import linear_from_srgb
+from pbrs_farm.core.house import House, ItemKind, Source
+from pbrs_farm.core.recipe import ReadFields
+from pbrs_farm.formats.glb import GlbWriter
+from pbrs_farm.read.common.format import GivenFile
+from pbrs_farm.read.common.name_classes import class_of_node_name
+from pbrs_farm.read.common.notes import Notes
+from pbrs_farm.read.common.root_folder import RootFolder
+from pbrs_farm.read.common.source_files import SourceFiles, read_mtl
+from pbrs_farm.read.gltf.node_classes import Mapping
+from pbrs_farm.read.gltf.scene import house_of_gltf
+from pbrs_farm.read.mesh.mtl import ObjMaterial, laid
+from pbrs_farm.read.mesh.obj import Mesh, parse_obj
+from pbrs_farm.regular_files import MAX_SCENE_BYTES
+
+_UNITS: Final = {"m": 1.0, "cm": 0.01, "in": 0.0254, "ft": 0.3048, "mm": 0.001}
+_UNIT_COMMENT: Final = re.compile(rb"^#.*units?\s*[=:]\s*(\w+)", re.MULTILINE | re.IGNORECASE)
+_WORDS: Final = {"meters": "m", "metres": "m", "centimeters": "cm", "millimeters": "mm",
+                 "inches": "in", "feet": "ft"}  # fmt: skip
+_USUAL_WALL_M: Final = 2.6  # height
+_FILLERS: Final = re.compile(r"\b(mesh|group|model|component|default|obj|object)(_?\d+)?\b", re.I)
+
+
+def read_obj_home(given: GivenFile, fields: ReadFields) -> House:
+    """The House of the file. Raises BadHouse naming the place, and for a model without named groups."""
+    path = given.path
+    folder, notes = RootFolder(path.parent), Notes(path.name, strict=fields.strict)
+    data = folder.read(path.name, max_bytes=MAX_SCENE_BYTES)
+    if data is None:
+        raise BadHouse(path, "", "no such file")
+    model = parse_obj(data, path.name, max_triangles=fields.max_triangles)
+    groups: dict[str, list[Mesh]] = {}
+    for mesh in model.meshes:
+        groups.setdefault(mesh.group, []).append(mesh)
+    kinds = {name: _kind_of_group(name) for name in groups}
+    if not {ItemKind.WALL, ItemKind.FLOOR} <= set(kinds.values()):
+        hint = "a home has groups named floor, wall, sofa ...;"
+        hint += f" `pbrs-farm objects {path} --out DIR` renders single models"
+        raise BadHouse(
+            str(path), "", "is a model, no home: no groups named floor and wall", hint=hint
+        )
+    library = next((name for name in model.mtllibs), f"{path.stem}.mtl")
+    mtl = {m.name: m for m in reversed(read_mtl(folder, folder.name_from("", library)) or ())}
+    walls = [m for name, ms in groups.items() if kinds[name] is ItemKind.WALL for m in ms]
+    floors = [m for name, ms in groups.items() if kinds[name] is ItemKind.FLOOR for m in ms]
+    matrix, guess = _world_from_file(data, walls, floors)
+    if guess:
+        notes.add("assumed-unit", path.name, guess)
+    document, writer = _document(groups, mtl, matrix)
+    source = Source("obj-home", path.name, keys.sha256(data))
+    return house_of_gltf(
+        writer.gltf(document, path.name),
+        source,
+        path.stem,
+        fields,
+        notes,
+        mapping=Mapping(),
+        fetch=lambda name: folder.read(name, max_bytes=MAX_SCENE_BYTES),
+    )
+
+
+def companions_of_obj_home(given: GivenFile, files: SourceFiles) -> str:
+    """Digest of the material libraries and their pictures; "" if there are none."""
+    path = given.path
+    folder = RootFolder(path.parent)
+    try:
+        data = folder.read(path.name, max_bytes=MAX_SCENE_BYTES) or b""
+        line = re.search(rb"^mtllib[ \t]+(.+?)\s*$", data, re.MULTILINE)
+        reference = line[1].decode("utf-8", "replace") if line else f"{path.stem}.mtl"
+        library = folder.name_from("", reference)
+    except (BadHouse, OSError):
+        return ""
+    return files.digest(folder, [library, *files.pictures(folder, library)])
+
+
+def _kind_of_group(name: str) -> ItemKind | None:
+    named = class_of_node_name(_FILLERS.sub(" ", name))
+    return named.kind if named else None
+
+
+def _world_from_file(data: bytes, walls: list[Mesh], floors: list[Mesh]) -> tuple[F64, str]:
+    """(4, 4) to metres with y up, and a sentence about the unit if the file states none."""
+    # Floors are flat across the up axis.
+    _, flat_y, flat_z = np.sum([np.ptp(m.positions, axis=0) for m in floors], axis=0)
+    up = 2 if flat_z < flat_y else 1
+    height = max(max(float(np.ptp(m.positions, axis=0)[up]) for m in walls), 1e-9)
+    comment = _UNIT_COMMENT.search(data[:4096])
+    word = comment[1].decode("ascii", "replace").lower() if comment else ""
+    unit, guess = _WORDS.get(word, word), ""
+    if unit not in _UNITS:
+        unit = min(_UNITS, key=lambda u: abs(math.log(height * _UNITS[u] / _USUAL_WALL_M)))
+        guess = f"states no unit; walls {height:.3g} high are read in {unit}"
+    matrix = np.diag([_UNITS[unit]] * 3 + [1.0])
+    if up == 2:
+        matrix[:3, :3] = matrix[:3, :3] @ [[1, 0, 0], [0, 0, 1], [0, -1, 0]]
+    return matrix, guess
+
+
+def _document(
+    groups: dict[str, list[Mesh]], mtl: dict[str, ObjMaterial], matrix: F64
+) -> tuple[dict[str, Any], GlbWriter]:
+    """The glTF document of the groups, a node each below one that turns and scales them."""
+    writer, nodes, meshes = GlbWriter(), [], []
+    images: list[dict[str, str]] = []
+    numbers = {name: k for k, name in enumerate(mtl)}
+    materials = [_material(m, images) for m in mtl.values()]
+    for name, parts in groups.items():
+        primitives = []
+        for part in parts:
+            mesh = laid(part, mtl.get(part.material))
+            row: dict[str, Any] = {
+                "attributes": {
+                    "POSITION": writer.add_vertices(
+                        mesh.positions.astype(np.float32), with_bounds=True
+                    ),
+                    "NORMAL": writer.add_vertices(mesh.normals.astype(np.float32)),
+                },
+                "indices": writer.add_faces(mesh.faces),
+            }
+            if mesh.uvs is not None:
+                uvs = (mesh.uvs * (1, -1) + (0, 1)).astype(np.float32)
+                row["attributes"]["TEXCOORD_0"] = writer.add_vertices(uvs)
+            if mesh.material in numbers:
+                row["material"] = numbers[mesh.material]
+            primitives.append(row)
+        nodes.append({"name": _FILLERS.sub(" ", name).strip() or name, "mesh": len(meshes)})
+        meshes.append({"primitives": primitives})
+    nodes.append({"children": list(range(len(nodes))), "matrix": matrix.T.ravel().tolist()})
+    return {
+        "asset": {"version": "2.0"},
+        "scene": 0,
+        "scenes": [{"nodes": [len(nodes) - 1]}],
+        "nodes": nodes,
+        "meshes": meshes,
+        "materials": materials,
+        "images": images,
+        "textures": [{"source": k} for k in range(len(images))],
+    }, writer
+
+
+def _material(material: ObjMaterial, images: list[dict[str, str]]) -> dict[str, Any]:
+    """A material of glTF; its picture is added to images."""
+    colour = linear_from_srgb(np.asarray(material.kd, np.float64)).tolist()
+    shading: dict[str, Any] = {
+        "baseColorFactor": [*(colour if not material.map_kd else (1.0, 1.0, 1.0)), material.d],
+        "metallicFactor": 0.0,
+        "roughnessFactor": float(np.clip(math.sqrt(2 / (material.ns + 2)), 0.05, 1.0)),
+    }
+    if material.map_kd:
+        shading["baseColorTexture"] = {"index": len(images)}
+        images.append({"uri": quote(material.map_kd)})
+    blended = {"alphaMode": "BLEND"} if material.d < 1 else {}
+    return {"name": material.name, "pbrMetallicRoughness": shading} | blended
