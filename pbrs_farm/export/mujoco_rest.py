@@ -6,7 +6,7 @@ such bodies about. They are moved apart first, by the smallest distance that fre
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -66,6 +66,12 @@ def _poses(world: Any, state: Any, names: Sequence[str]) -> F64:
     return np.array([state.qpos[k : k + 7] for k in starts], np.float64).reshape(-1, 7)
 
 
+def _is_movable(pair: tuple[int, int], body_of: Mapping[int, int], stuck: Bools) -> bool:
+    """True if a loose body is in a pair, and none that is stuck."""
+    loose = [body_of[body] for body in pair if body in body_of]
+    return bool(loose) and not stuck[loose].any()
+
+
 def _move_apart(
     mujoco: Any, world: Any, state: Any, names: Sequence[str], areas_m2: Sequence[float]
 ) -> Bools:
@@ -76,7 +82,7 @@ def _move_apart(
         pairs = {
             pair: depth
             for pair, depth in _depths(world, state).items()
-            if depth > _DEEP_M and not any(stuck[body_of[b]] for b in pair if b in body_of)
+            if depth > _DEEP_M and _is_movable(pair, body_of, stuck)
         }
         if not pairs:
             break

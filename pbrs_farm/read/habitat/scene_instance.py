@@ -10,6 +10,7 @@ import csv
 import io
 import json
 import posixpath
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -91,13 +92,19 @@ def read_habitat(given: GivenFile, fields: ReadFields) -> House:
         text = f"expected a list of at most {_MOST_INSTANCES}"
         raise BadHouse(path, "object_instances", text)
     origin = scene.get("translation_origin", "COM")
-    missing = 0
+    missing, errors = 0, list[BadHouse]()
     for k, row in enumerate(rows):
-        missing += not _add_object(dataset, row, origin, f"object_instances[{k}]", built)
+        place = f"object_instances[{k}]"
+        try:
+            missing += not _add_object(dataset, row, origin, place, built)
+        except BadHouse as error:
+            errors.append(error)
+            notes.add("unreadable-model", place, f"{error.message[:200]}; it is left out")
     if missing:
         notes.add(
             "missing-model", "object_instances", f"{missing} of {len(rows)} have no model here"
         )
+    _raise_if_many(errors, missing + len(errors), len(rows))
     if rows and missing > len(rows) / 3:
         text = f"{missing} of {len(rows)} objects have no model below {dataset.folder.root}"
         raise BadHouse(
@@ -434,6 +441,12 @@ def _add_stage(dataset: _Dataset, template: str, built: _Built) -> None:
         built.place([root], matrix, "", {})
 
 
+def _raise_if_many(errors: Sequence[BadHouse], n_lost: int, n_rows: int) -> None:
+    """Raise the first error of damaged objects if more than a third of all objects are lost."""
+    if errors and n_lost > n_rows / 3:
+        raise errors[0]
+
+
 def _add_object(dataset: _Dataset, row: Any, origin: Any, place: str, built: _Built) -> bool:
     """Whether an object instance has a model here; it is placed."""
     if not isinstance(row, dict) or not isinstance(row.get("template_name"), str):
@@ -454,8 +467,8 @@ def _add_object(dataset: _Dataset, row: Any, origin: Any, place: str, built: _Bu
         inner[:3, 3] -= centre
     name = dataset.class_of(template) or str(settings.get("name") or posixpath.basename(template))
     user_fields = row.get("user_defined")
-    extras = dict(user_fields) if isinstance(user_fields, dict) else {}
-    built.place(roots, matrix @ inner, name, extras)
+    own_fields = dict(user_fields) if isinstance(user_fields, dict) else {}
+    built.place(roots, matrix @ inner, name, {"one": True} | own_fields)
     return True
 
 
@@ -480,15 +493,21 @@ def _add_articulated(dataset: _Dataset, scene: dict[str, Any], built: _Built, no
     if not isinstance(rows, list) or len(rows) > _MOST_INSTANCES:
         text = f"expected a list of at most {_MOST_INSTANCES}"
         raise BadHouse(dataset.scene, _ARTICULATED, text)
-    n_missing = n_unread = 0
+    n_missing, n_unread, errors = 0, 0, list[BadHouse]()
     for k, row in enumerate(rows):
         place = f"{_ARTICULATED}[{k}]"
         if not isinstance(row, dict) or not isinstance(row.get("template_name"), str):
             raise BadHouse(dataset.scene, f"{place}.template_name", "expected a name")
-        urdf = dataset.urdf(row["template_name"])
-        robot = None if urdf is None else dataset.robot(urdf)
-        n_unread += 0 if robot is None else robot.n_unread
-        n_missing += robot is None or not _add_robot(dataset, str(urdf), robot, row, place, built)
+        try:
+            urdf = dataset.urdf(row["template_name"])
+            robot = None if urdf is None else dataset.robot(urdf)
+            n_unread += 0 if robot is None else robot.n_unread
+            is_added = robot and _add_robot(dataset, str(urdf), robot, row, place, built)
+            n_missing += not is_added
+        except BadHouse as error:
+            errors.append(error)
+            notes.add("unreadable-model", place, f"{error.message[:200]}; it is left out")
+    _raise_if_many(errors, len(errors), len(rows))
     if n_missing:
         notes.add("missing-model", _ARTICULATED, f"{n_missing} of {len(rows)} have no model here")
     if n_unread:

@@ -24,6 +24,7 @@ from pbrs_farm.home.room_use import named_kind
 from pbrs_farm.read.common.name_classes import NodeClass, class_of_node_name
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.gltf.document import MAX_DEPTH, MAX_NODES, UNREAD
+from pbrs_farm.read.usd.joints import add_joints
 from pbrs_farm.read.usd.shaders import Shaders
 from pbrs_farm.read.usd.shapes import NOT_READ, Shape, light_shape, mesh_shape, solid_shape
 
@@ -64,6 +65,7 @@ class StageNodes:
         self._lights: list[_Row] = []
         self._known: dict[Any, int | None] = {}
         self._unread: dict[str, int] = {}
+        self._nodes_of: dict[str, list[int]] = {}  # path of a prim -> its nodes
         self._n_triangles = 0
         self._holders = _holders(stage)
 
@@ -79,6 +81,7 @@ class StageNodes:
         while stack:
             prim, above = stack.pop()
             stack += reversed(list(self._visit(prim, above)))
+        add_joints(self._stage, self._nodes, self._nodes_of, self._notes)
         for kind, n in self._unread.items():
             self._notes.add(UNREAD, kind, f"{n} prims are {kind}, which are not read")
         shaders = self._shaders
@@ -145,6 +148,7 @@ class StageNodes:
         if prim.HasAPI(UsdLux.LightAPI) or prim.IsA(UsdLux.BoundableLightBase):
             self._light(prim, node, is_part=above.in_lamp)
         self._nodes[above.node]["children"].append(len(self._nodes))
+        self._nodes_of.setdefault(str(prim.GetPath()), []).append(len(self._nodes))
         self._nodes.append(node)
         label = cls if cls and cls.is_tagged and cls.kind in _STRUCTURE else above.structure
         return _Above(len(self._nodes) - 1, above.depth + 1, path, in_lamp, label)

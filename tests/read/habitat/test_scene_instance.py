@@ -168,3 +168,14 @@ def test_templates_within_the_configuration_of_the_data_set_are_found(tmp_path: 
     before = resolve(str(path)).fingerprint
     (tmp_path / "objects/plain.glb").write_bytes(two_rooms().glb())
     assert resolve(str(path)).fingerprint != before
+
+
+def test_one_damaged_object_is_left_out_with_a_note(tmp_path: Path) -> None:
+    good = {"template_name": "ab12", "translation": [2, 0.3, 1.5], "translation_origin": "COM"}
+    damaged = [{"template_name": "broken"}, good | {"translation": [1, None, 2]}]
+    rows = [good, damaged[0], good, good, damaged[1], good, good]
+    written(tmp_path / "objects/broken.glb", b"glTF, but not much of it")
+    found = house(dataset(tmp_path, object_instances=rows))
+    assert len([i for i in found.items if i.name == "couch"]) == 5
+    lost = [n for n in found.notes if n.kind == "unreadable-model"]
+    assert [n.place for n in lost] == ["object_instances[1]", "object_instances[4]"]
