@@ -121,11 +121,10 @@ def _make_of_plan(args: argparse.Namespace) -> int:
     """Furnish the user's own plan, once for each seed."""
     from pbrs_farm.core.catalogue import EMPTY
     from pbrs_farm.gallery.made_homes import write_home
-    from pbrs_farm.generate.plans.plan_files import plan_from_file
     from pbrs_farm.generate.plans.plan_format import Part
     from pbrs_farm.prepare.formats import format_of_file
-    from pbrs_farm.prepare.plan_house import furnish_plan_file
-    from pbrs_farm.read.common.format import PLAN
+    from pbrs_farm.prepare.plan_house import furnish_plan_file, plan_of_file
+    from pbrs_farm.read.common.format import PLAN, GivenFile
 
     at_least("--floor", args.floor or 0, 0)
     # The plan fixes the rooms, so options about rooms contradict it.
@@ -138,7 +137,7 @@ def _make_of_plan(args: argparse.Namespace) -> int:
     if entry is not None and entry.kind != PLAN:
         hint = f"`pbrs-farm run {args.plan}` reads it"
         raise BadInput(args.plan, "", f"is a house ({entry.kind}), not a floor plan", hint=hint)
-    plan_file = plan_from_file(args.plan, Part(args.apartment, args.floor))
+    plan_file = plan_of_file(GivenFile(args.plan), Part(args.apartment, args.floor))
     for line in plan_file.left_out:
         warn(f"left out: {line}")
     catalogue = EMPTY if args.empty else catalogue_here()

@@ -28,6 +28,8 @@ from pbrs_farm.prepare.source_ref import SourceRef
 from pbrs_farm.read.common.format import PLAN, Format, GivenFile
 from pbrs_farm.read.common.root_folder import RootFolder
 from pbrs_farm.read.common.source_files import SourceFiles
+from pbrs_farm.read.usd import FORMAT as STAGE
+from pbrs_farm.read.usd import SUFFIXES
 from pbrs_farm.regular_files import fault_of, open_regular
 
 _HEAD_BYTES: Final = 4 * 2**20
@@ -182,7 +184,9 @@ def _read_plan(given: GivenFile, fields: ReadFields) -> House:
 
 
 def _companions_of_plan(given: GivenFile, files: SourceFiles) -> str:
-    """Digest of the tables beside a plan."""
+    """Digest of the tables beside a plan, of the files that a scan's stage refers to."""
+    if given.path.suffix.lower() in SUFFIXES:
+        return STAGE.companions(given, files)
     if given.path.suffix.lower() != ".json":
         return ""
     folder = given.path.parent

@@ -19,12 +19,13 @@ from pbrs_farm.generate.floor_plan import PlacedPiece, Storey
 from pbrs_farm.generate.generated_home import GeneratedHome, furnish_storeys
 from pbrs_farm.generate.home_file import home_file
 from pbrs_farm.generate.plans.plan_files import PlanFile, PlanStorey, plan_from_file, upright
-from pbrs_farm.generate.plans.plan_format import part_of
+from pbrs_farm.generate.plans.plan_format import Part, part_of
 from pbrs_farm.prepare.stand_ins import with_stand_ins
 from pbrs_farm.read.common.box_only_items import box_only_item
 from pbrs_farm.read.common.format import PLAN, GivenFile
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.sweethome3d.home import read_home
+from pbrs_farm.read.usd import SUFFIXES, scan_of_stage
 from pbrs_farm.regular_files import digest_of_regular
 
 LEFT_OUT = "plan-left-out"
@@ -37,7 +38,7 @@ def house_of_plan(given: GivenFile, fields: ReadFields) -> House:
     Furniture of an unknown class or without a box becomes a note. The house has no cameras.
     """
     path = given.path
-    file = upright(plan_from_file(path, part_of(given.part)))
+    file = upright(plan_of_file(given, part_of(given.part)))
     notes = Notes(str(path), strict=fields.strict)
     for line in file.left_out:
         notes.add(LEFT_OUT, "", line)
@@ -59,6 +60,12 @@ def house_of_plan(given: GivenFile, fields: ReadFields) -> House:
         items=(*house.items, *items),
         notes=(*house.notes, *notes.all()),
     )
+
+
+def plan_of_file(given: GivenFile, part: Part) -> PlanFile:
+    """The plan of a file in any format. Raises BadInput; BadHouse for a stage of USD."""
+    is_stage = given.path.suffix.lower() in SUFFIXES
+    return plan_from_file(given.path, part, scan_of_stage(given) if is_stage else None)
 
 
 def _walls_of_plan(file: PlanFile, name: str, fields: ReadFields) -> House:

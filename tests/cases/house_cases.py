@@ -19,6 +19,7 @@ from tests.cases.surface_cases import room
 from tests.hostile.sound_inputs import suncg
 from tests.inputs import front3d_files, plan_files
 from tests.inputs.ifc_files import IfcHouse
+from tests.inputs.scanned_stages import dining_group, write_scanned_stage
 from tests.read.gltf.gltf_scenes import two_rooms
 from tests.read.habitat.habitat_sets import dataset
 from tests.read.suncg.suncg_root import item, material_of
@@ -33,6 +34,7 @@ def cases() -> Iterator[Case]:
     yield Case("react_coordinates", _react, _ask_for_holes_at_their_places)
     yield Case("zind_stub", _zind, _ask_for_the_stub)
     yield Case("roomplan_attic", _attic_scan, _ask_for_gables)
+    yield Case("roomplan_stage", _scanned_stage, _ask_for_chairs_and_a_passage)
     yield Case("ifc_attic", partial(_ifc, _attic), _ask_for_a_sloped_ceiling)
     yield Case("ifc_lowceiling", partial(_ifc, _low_ceiling), _ask_for_the_height_of_the_ceiling)
     yield Case("ifc_twostoreys", partial(_ifc, _two_storeys), _ask_for_two_rooms)
@@ -112,6 +114,20 @@ def _ask_for_the_stub(path: Path) -> None:
     _value, ring = plan_files.with_a_stub({"scale_meters_per_coordinate": {"floor_01": 1.0}})
     lost = shapely.Polygon(room.polygon).area - shapely.Polygon(ring).area
     assert abs(lost) < 0.3, f"the room is {lost:+.2f} m2 larger"
+
+
+def _scanned_stage(folder: Path) -> Path:
+    return write_scanned_stage(
+        folder, opening="Opening0", objects=dining_group(), label="diningRoom"
+    )
+
+
+def _ask_for_chairs_and_a_passage(path: Path) -> None:
+    house, _report = repaired(path)
+    assert [r.name for r in house.rooms] == ["Dining room"]
+    assert len([o for o in house.openings if not o.is_window]) == 2, "door and passage"
+    pieces = [i.name for i in house.items if "stand-in" in i.tags and "piece:box" not in i.tags]
+    assert pieces.count("chair") == 3, pieces
 
 
 _KNEE, _RIDGE = 1.2, 3.0

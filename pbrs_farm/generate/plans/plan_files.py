@@ -70,19 +70,19 @@ def plan_formats() -> tuple[PlanFormat, ...]:
     return tuple(sorted(formats, key=lambda one: one.order))
 
 
-def plan_from_file(path: Path, part: Part | str = "") -> PlanFile:
+def plan_from_file(path: Path, part: Part | str = "", value: Any = None) -> PlanFile:
     """Read the plan of a file, or of a part of it, rotated so that its longest walls are along x or z.
 
-    Raises BadInput, naming the room or opening. Invalid parts of machine-written files are left out.
+    value: of the file as JSON, where another reader has made one. Raises BadInput, naming the room or opening. Invalid parts of machine-written files are left out.
     """
     part = Part(apartment=part) if isinstance(part, str) else part
     suffix = path.suffix.lower()
     if part.apartment and suffix != ".csv":
         raise BadInput("--apartment", part.apartment, "names a row of a .csv", hint="leave it out")
     by_suffix = next((f for f in plan_formats() if suffix in f.suffixes), None)
-    if by_suffix is not None and by_suffix.read is not None:
+    if value is None and by_suffix is not None and by_suffix.read is not None:
         return _of_machine(path, by_suffix.read(path, None, part), part)
-    value = json_from_file(path)
+    value = json_from_file(path) if value is None else value
     if isinstance(value, dict) and not _is_own(value):
         for plan_format in plan_formats():
             if plan_format.read is not None and plan_format.fits(value):

@@ -1,4 +1,6 @@
-"""A scan of Apple's RoomPlan (CapturedRoom or CapturedStructure as JSON) -> a ParsedPlan; no effects.
+"""A scan of Apple's RoomPlan (CapturedRoom or CapturedStructure) -> a ParsedPlan; no effects.
+
+Its value is that of a JSON export, or what read/usd makes of a USD export.
 
 Metres, y up. A surface: dimensions [w, h, 0] and a transform, 16 numbers by column, its x along the
 wall, y up, its origin the middle. Older exports write the category as text and the transform as 4 rows.
@@ -7,6 +9,7 @@ wall, y up, its origin the middle. Older exports write the category as text and 
 from __future__ import annotations
 
 import math
+import re
 import statistics
 from pathlib import Path
 from typing import Any, Final
@@ -34,6 +37,8 @@ from pbrs_farm.generate.plans.room_types import DrawnArea, typed_rooms
 from pbrs_farm.generate.plans.wall_tops import WallTop, upper_edge
 from pbrs_farm.geometry.doorways import rooms_by_walls
 
+STAGES: Final = (".usdz", ".usda", ".usdc", ".usd")
+"""Suffixes of the other export, whose value `prepare` reads."""
 _MOST: Final = 3_000
 _JOIN_M: Final = 0.25  # scanned walls do not meet exactly
 _IN_WALL_M: Final = (
@@ -42,6 +47,14 @@ _IN_WALL_M: Final = (
 _SPURIOUS_M: Final = 12.0
 _SAME_HEIGHT_M: Final = 0.15  # maximum difference in wall height without a note, metres
 _UPRIGHT: Final = 0.98  # y of a wall's own up, at least: others lean
+# Names of rooms by their sections' labels, the most specific first.
+_NAMES: Final = {
+    "kitchen": "Kitchen",
+    "bathroom": "Bathroom",
+    "bedroom": "Bedroom",
+    "diningRoom": "Dining room",
+    "livingRoom": "Living room",
+}
 _KINDS: Final = {"door": "door", "window": "window", "opening": "passage"}
 
 
@@ -149,7 +162,10 @@ def _storey_of_scan(path: Path, scan: _Scan, left_out: LeftOut, *, is_top: bool)
         _thing(s, _parse_pose(path, f"object {k}", s), floor) for k, s in enumerate(scan.objects, 1)
     ]
     openings += passages_between(outlines, lines, openings)
-    areas = [DrawnArea(shape, _section_label(shape, scan.sections)) for shape in outlines]
+    labels = [_section_label(shape, scan.sections) for shape in outlines]
+    areas = [
+        DrawnArea(s, word, _NAMES.get(word, "")) for s, word in zip(outlines, labels, strict=True)
+    ]
     rooms = typed_rooms("roomplan", areas, things, openings, left_out)
     return ParsedStorey(value_of(rooms, openings, height), tuple(things), tops=tuple(tops))
 
@@ -252,9 +268,10 @@ def _thing(surface: _Surface, pose: F64, floor: float) -> Thing:
 
 
 def _section_label(shape: Polygon, sections: list[_Section]) -> str:
-    inside = (s for s in sections if shape.contains(Point(s.center[0], s.center[2])))
-    section = next(inside, None)
-    return str(section.label) if section else ""
+    """The label of the sections in a room, of several the one that its fixtures need."""
+    inside = [s for s in sections if shape.contains(Point(s.center[0], s.center[2]))]
+    labels = [str(s.label) for s in inside]
+    return next((word for word in _NAMES if word in labels), next(iter(labels), ""))
 
 
 def _is_scan(value: dict[str, Any]) -> bool:
@@ -267,11 +284,14 @@ def _is_scan(value: dict[str, Any]) -> bool:
 
 FORMAT = PlanFormat(
     title="RoomPlan",
-    files="*.json",
+    files="*.json or .usdz",
     order=140,
     brings="walls, doors, windows, boxes as stand-ins",
     where="a phone's own scan",
     licence="yours",
+    suffixes=STAGES,
+    shared_suffixes=frozenset(STAGES),
+    contains=re.compile(rb"\bArch_grp\b"),
     keys=(("walls", "doors", "windows", "objects"),),
     fits=_is_scan,
     read=lambda path, value, _part: plan_of_room_plan(path, value),

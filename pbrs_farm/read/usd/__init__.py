@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+import re
+from typing import Any, Final
+
 from pbrs_farm.core.house import House
 from pbrs_farm.core.recipe import ReadFields
+from pbrs_farm.installation import need
 from pbrs_farm.read.common.format import Format, GivenFile
 from pbrs_farm.read.common.source_files import SourceFiles
+
+SUFFIXES: Final = (".usd", ".usda", ".usdc", ".usdz")
 
 
 def _read_usd(given: GivenFile, fields: ReadFields) -> House:
@@ -20,12 +26,23 @@ def _companions_of_usd(given: GivenFile, files: SourceFiles) -> str:
     return stage.companions_of_usd(given, files)
 
 
+def scan_of_stage(given: GivenFile) -> dict[str, Any]:
+    """The rooms of a scan with RoomPlan as its JSON export has them. Raises BadHouse."""
+    need("pxr")
+    from pbrs_farm.read.usd import scanned_rooms
+
+    return scanned_rooms.scan_of_stage(given)
+
+
+_NO_SCAN: Final = re.compile(rb"\A(?!.*\bArch_grp\b)", re.DOTALL)  # scans of RoomPlan are plans
+
 # fmt: off
 FORMAT = Format(
     kind="usd", title="OpenUSD", files=".usd .usda .usdc .usdz", order=70,
     brings="meshes, materials, labels, lights", where="GRScenes, InteriorAgent, SimReady homes",
     licence="of each data set", needs="the extra usd", library="pxr",
-    suffixes=(".usd", ".usda", ".usdc", ".usdz"), beside=("*.classes.json", "*.rooms.json", "rooms.json"),
+    suffixes=SUFFIXES, shared_suffixes=frozenset(SUFFIXES), contains=_NO_SCAN,
+    beside=("*.classes.json", "*.rooms.json", "rooms.json"),
     read=_read_usd, companions=_companions_of_usd,
 )
 # fmt: on

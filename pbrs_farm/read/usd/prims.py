@@ -185,11 +185,16 @@ class StageNodes:
         return NodeClass(label_class.nyu40, label_class.kind, is_tagged=True)
 
     def _is_group(self, prim: Any) -> bool:
-        """True if a prim is a room's scope, or contains classified items."""
+        """True if a prim is a room's scope, contains classified items or groups items of its name."""
         own_class = class_of_node_name(prim.GetName())
         if own_class is not None and own_class.kind is ItemKind.LAMP:
             return False
-        return named_kind(prim.GetName()) is not None or str(prim.GetPath()) in self._holders
+        if named_kind(prim.GetName()) is not None or str(prim.GetPath()) in self._holders:
+            return True
+        # Three chairs of a Chair_grp are items of their own.
+        is_model_group = Usd.ModelAPI(prim).GetKind() == Kind.Tokens.group
+        names = [child.GetName() for child in _children(prim)] if is_model_group else []
+        return own_class is not None and own_class in map(class_of_node_name, names)
 
     def _component(self, prim: Any, node: _Row) -> None:
         own_class = class_of_node_name(prim.GetName())

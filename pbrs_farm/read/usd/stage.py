@@ -44,21 +44,28 @@ def read_usd(given: GivenFile, fields: ReadFields) -> House:
 
     from pbrs_farm.read.usd.prims import StageNodes
     from pbrs_farm.read.usd.shaders import Shaders
-    from pbrs_farm.read.usd.stage_files import FAULTS, StageFolder, damaged, opened_stage
+    from pbrs_farm.read.usd.stage_files import (
+        FAULTS,
+        StageFolder,
+        damaged,
+        diagnostics_in,
+        opened_stage,
+    )
 
     notes = Notes(path.name, strict=fields.strict)
     folder = StageFolder.of(path, models)
-    stage = opened_stage(folder, notes)
-    time = _time()
-    shaders = Shaders(notes, lambda asset: _material_text(folder, asset), time)
-    nodes = StageNodes(stage, path.name, notes, shaders, fields)
-    scale = float(UsdGeom.GetStageMetersPerUnit(stage))
-    is_z_up = UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.z
-    rooms = _given_rooms(stage, folder, path, scale, is_z_up=is_z_up)
-    try:
-        gltf = nodes.gltf({"rooms": rooms} if rooms else {})
-    except FAULTS as error:
-        raise damaged(path, error) from None
+    with diagnostics_in(notes) as diagnostics:
+        stage = opened_stage(folder, notes, diagnostics)
+        time = _time()
+        shaders = Shaders(notes, lambda asset: _material_text(folder, asset), time)
+        nodes = StageNodes(stage, path.name, notes, shaders, fields)
+        scale = float(UsdGeom.GetStageMetersPerUnit(stage))
+        is_z_up = UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.z
+        rooms = _given_rooms(stage, folder, path, scale, is_z_up=is_z_up)
+        try:
+            gltf = nodes.gltf({"rooms": rooms} if rooms else {})
+        except FAULTS as error:
+            raise damaged(path, error) from None
     sha256 = keys.sha256(path.read_bytes())
     house = house_of_gltf(
         gltf,
@@ -79,13 +86,15 @@ def companions_of_usd(given: GivenFile, files: SourceFiles) -> str:
     path, models = given.path, given.models
     if not is_installed("pxr"):
         return ""
-    from pbrs_farm.read.usd.stage_files import StageFolder, files_of_stage, try_out
+    from pbrs_farm.read.usd.stage_files import StageFolder, diagnostics_in, files_of_stage, try_out
 
     folder = StageFolder.of(path, models)
+    notes = Notes(path.name, strict=False)
     beside = [_name_beside_stage(folder, path, name) for name in (*side_files(path), "rooms.json")]
     try:
         try_out(folder)
-        names = [name for name, _ in files_of_stage(folder)]
+        with diagnostics_in(notes):  # reading notes its warnings
+            names = [name for name, _ in files_of_stage(folder)]
     except BadHouse:
         names = []
     own_name = folder.name_of(str(folder.path))

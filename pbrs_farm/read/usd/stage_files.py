@@ -8,7 +8,8 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import islice
@@ -140,17 +141,41 @@ def _name_below_root(folder: StageFolder, layer: str, asset: str) -> str | None:
     return name
 
 
-def opened_stage(folder: StageFolder, notes: Notes) -> Any:
+WARNED: Final = "library-warning"
+"""Kind of the notes about warnings of the library, one for each of its places."""
+
+
+@contextmanager
+def diagnostics_in(notes: Notes) -> Iterator[Any]:
+    """Collect the library's warnings, which it would print, as notes."""
+    diagnostics = UsdUtils.CoalescingDiagnosticDelegate()
+    try:
+        yield diagnostics
+    finally:
+        _note_warnings(diagnostics.TakeUncoalescedDiagnostics(), notes)
+
+
+def _note_warnings(rows: Iterable[Any], notes: Notes) -> None:
+    """A note for each place in the library that warned, with its first warning."""
+    texts: dict[tuple[str, int], dict[str, None]] = {}
+    for row in rows:
+        place = str(row.sourceFileName), int(row.sourceLineNumber)
+        texts.setdefault(place, {})[" ".join(str(row.commentary).split())] = None
+    for first, *others in texts.values():
+        times = f"{len(others) + 1} times: " if others else ""
+        notes.add(WARNED, "", f"USD warns {times}{first}")
+
+
+def opened_stage(folder: StageFolder, notes: Notes, diagnostics: Any) -> Any:
     """The composed stage; unresolved references become notes.
 
-    Raises BadHouse for a damaged file, too many prims, or if a third of the references is missing.
+    diagnostics: of diagnostics_in. Raises BadHouse for a damaged file, too many prims, or if a third of the references is missing.
     """
     path = folder.path
     if path.stat().st_size > MAX_SCENE_BYTES:
         raise BadHouse(path, "", f"is larger than {MAX_SCENE_BYTES / 1e6:.0f} MB")
     try_out(folder)
     layers = [name for name, is_layer in files_of_stage(folder) if is_layer]
-    diagnostics = UsdUtils.CoalescingDiagnosticDelegate()  # else the library writes to our terminal
     try:
         n_references = _check_size(folder, layers)
         stage = Usd.Stage.Open(str(path))
@@ -233,8 +258,8 @@ def damaged(path: Path, error: Exception) -> BadHouse:
 
 
 def _note_missing(diagnostics: Any, notes: Notes) -> int:
-    """Number of references that the library could not open; a note each."""
-    n = 0
+    """Number of references that the library could not open; a note each, and the other warnings'."""
+    n, rest = 0, []
     for row in diagnostics.TakeUncoalescedDiagnostics():
         text = " ".join(str(row.commentary).split())
         match = _UNOPENED.search(text)
@@ -245,6 +270,9 @@ def _note_missing(diagnostics: Any, notes: Notes) -> int:
             notes.add(
                 "reference-cycle", text.partition(">")[0].removeprefix("In <"), "refers to itself"
             )
+        else:
+            rest.append(row)
+    _note_warnings(rest, notes)
     return n
 
 
