@@ -16,11 +16,15 @@ NARROWEST_M: Final = 0.5
 WIDEST_M: Final = (
     1.3  # of a doorway with one leaf and its frame; wider gaps join two parts of a room
 )
+_WIDEST_WITH_DOOR_M: Final = 3.0  # of a doorway with leaves in it
+_AT_GAP_M: Final = 0.15  # maximum distance of a door from its gap's middle line
 LEAST_M2: Final = 1.2  # of what a doorway leads into
 _LEAST_WIDTH_M: Final = 0.7
 _THICKEST_M: Final = 0.6  # of a wall that ends
 _LEAST_LONG_M: Final = 0.3  # of the wall behind its end
 _THINNEST_M: Final = 0.004
+_ACROSS_M: Final = 0.01  # half the width that a doorway is closed by
+_SLIVER_M2: Final = 1e-4  # smaller pieces come of rounding
 _OFF_M: Final = 1e-3  # off the end itself
 _SQUARE: Final = 0.9  # least cosine between a wall's sides and the way out of its end
 _AT_EDGE_M: Final = 0.15  # walls nearer to the edge of a ground are its own
@@ -31,11 +35,14 @@ _REACH_M: Final = (
 )
 
 
-def doorways(walls: Any, reach_m: float = _REACH_M) -> list[LineString]:
+def doorways(
+    walls: Any, reach_m: float = _REACH_M, doors: Sequence[Polygon] = ()
+) -> list[LineString]:
     """A line across each door-sized gap between the end of a wall and the wall facing it.
 
     walls: their ground area as a shapely geometry, metres. reach_m: extension of each line into the
-    walls. A gap between two wall ends may be returned twice.
+    walls. doors: ground areas of doors, shut or open: a gap with one may be wider. A gap between two
+    wall ends may be returned twice.
     """
     lines = []
     rings = [shapely.get_coordinates(ring) for ring in _rings(walls)]
@@ -45,8 +52,8 @@ def doorways(walls: Any, reach_m: float = _REACH_M) -> list[LineString]:
     near = shapely.STRtree(faces)
     for ring in rings:
         for start, way in _ends(ring[:-1]):
-            gap = _gap_before(start, way, near)
-            if gap is not None:
+            gap = _gap_before(start, way, near, _WIDEST_WITH_DOOR_M if doors else WIDEST_M)
+            if gap is not None and (gap <= WIDEST_M or _holds_door(start, way, gap, doors)):
                 tip = way * reach_m
                 lines.append(LineString([start - tip, start + way * gap + tip]))
     return lines
@@ -82,6 +89,26 @@ def parted_at_doorways(piece: Polygon, lines: Iterable[LineString]) -> list[Poly
     return parts if len(parts) > 1 else [piece]
 
 
+def ground_between(feet: Sequence[Polygon], lines: Sequence[LineString]) -> list[Polygon]:
+    """The pieces of ground that walls enclose, closed at doorways, by their place.
+
+    feet: of the walls, metres; gaps of ends that miss each other are closed. lines: of doors, as door_line.
+    """
+    joined = shapely.union_all(feet).buffer(_JOIN_M / 2, join_style="mitre")
+    standing = shapely.union_all([joined.buffer(-_JOIN_M / 2, join_style="mitre"), *feet])
+    ways = [*doorways(standing), *lines]
+    # The area within the outer edge of walls and doorways, minus the walls.
+    closed = shapely.union_all([standing, *(way.buffer(_ACROSS_M) for way in ways)])
+    whole = shapely.union_all([Polygon(p.exterior) for p in _polygons(closed)])
+    pieces = _polygons(shapely.difference(whole, standing))
+    parts = [part for piece in pieces for part in parted_at_doorways(piece, ways)]
+    return sorted(parts, key=lambda p: (p.bounds, p.area))
+
+
+def _polygons(shape: Any) -> list[Polygon]:
+    return [p for p in shapely.get_parts(shape) if p.geom_type == "Polygon" and p.area > _SLIVER_M2]
+
+
 def _is_room(part: Polygon) -> bool:
     return bool(part.area >= LEAST_M2 and not part.buffer(-_LEAST_WIDTH_M / 2).is_empty)
 
@@ -107,14 +134,19 @@ def _ends(corners: F64) -> list[tuple[F64, F64]]:
     return [(corners[k] + sides[k] / 2, out[k]) for k in np.flatnonzero(is_end)]
 
 
-def _gap_before(start: F64, way: F64, faces: shapely.STRtree) -> float | None:
+def _holds_door(start: F64, way: F64, gap: float, doors: Sequence[Polygon]) -> bool:
+    line = LineString([start, start + way * gap]).buffer(_AT_GAP_M, cap_style="flat")
+    return any(line.intersects(door) for door in doors)
+
+
+def _gap_before(start: F64, way: F64, faces: shapely.STRtree, widest_m: float) -> float | None:
     """Distance in metres from a wall's end to the face in front of it; None unless door-sized."""
-    ahead = LineString([start + way * _OFF_M, start + way * (WIDEST_M + _OFF_M)])
+    ahead = LineString([start + way * _OFF_M, start + way * (widest_m + _OFF_M)])
     hit = shapely.intersection(faces.geometries[faces.query(ahead, "intersects")], ahead)
     if not len(hit):
         return None
     gap = float(shapely.distance(hit, Point(start)).min())
-    return gap if NARROWEST_M <= gap <= WIDEST_M else None
+    return gap if NARROWEST_M <= gap <= widest_m else None
 
 
 def rooms_by_walls(ground: Polygon, lines: Sequence[LineString]) -> list[Polygon]:

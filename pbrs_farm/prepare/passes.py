@@ -326,7 +326,7 @@ PASSES: Final = (
     Pass("furnish", GENERATE_VERSION + _FURNISH_VERSION, _furnish, _is_furnished, _furnish_depends),
     Pass("dress", 12, _dress, _is_dressed, _dress_depends),
     # Its version counts the generated ceiling lamps, too.
-    Pass("repair", 4, _repair, _is_home),
+    Pass("repair", 5, _repair, _is_home),
     Pass("open", 1, _leave_open, _stands_open, _open_depends),
     Pass("float", 1, _float, _has_floating_things, _float_depends),
     Pass(

@@ -38,6 +38,13 @@ def cases() -> Iterator[Case]:
     yield Case("ifc_attic", partial(_ifc, _attic), _ask_for_a_sloped_ceiling)
     yield Case("ifc_lowceiling", partial(_ifc, _low_ceiling), _ask_for_the_height_of_the_ceiling)
     yield Case("ifc_twostoreys", partial(_ifc, _two_storeys), _ask_for_two_rooms)
+    yield Case("ifc_skylight", partial(_ifc, _skylight), _ask_for_light_from_the_roof)
+    yield Case("ifc_no_floor", partial(_ifc, _no_floor), _ask_for_two_closed_rooms)
+    yield Case("ifc_no_records", partial(_ifc, _no_records), _ask_for_two_closed_rooms)
+    for slab in (True, False):
+        name = f"ifc_garage_{'solid' if slab else 'planar'}"
+        write = partial(_ifc, partial(_garage, has_slab=slab))
+        yield Case(name, write, _ask_for_a_closed_garage)
     yield Case("ifc_mapped", partial(_ifc, _mapped), _ask_for_positive_volumes)
     yield Case("grass", _grass, _ask_for_ground)
 
@@ -211,8 +218,8 @@ def _prism(house: IfcHouse, section: list[tuple[float, float]], x0: float, x1: f
     return house.mesh_solid(points, faces)
 
 
-def _attic(house: IfcHouse) -> None:
-    """Knee walls of 1 m, gables, and two sloped slabs that meet at 3.5 m."""
+def _attic(house: IfcHouse) -> Any:
+    """Knee walls of 1 m, gables, and two sloped slabs that meet at 3.5 m; returns the southern one."""
     house.storey("attic", 0.0)
     _four_walls(house, 0.0, 1.0, gables=False)
     slope = 2.5 / (_D / 2)
@@ -223,11 +230,114 @@ def _attic(house: IfcHouse) -> None:
     low = 1.0 - slope * _T
     south = [(-_T, low), (_D / 2, 3.5), (_D / 2, 3.75), (-_T, low + 0.25)]
     north = [(_D - y, z) for y, z in reversed(south)]
-    for name, section in (("roof south", south), ("roof north", north)):
-        solid = _prism(house, section, -_T, _W + _T)
-        house.product("IfcSlab", name, [solid], PredefinedType="ROOF")
+    roofs = [
+        house.product(
+            "IfcSlab", name, [_prism(house, section, -_T, _W + _T)], PredefinedType="ROOF"
+        )
+        for name, section in (("roof south", south), ("roof north", north))
+    ]
     space = [(0.0, 0.0), (_D, 0.0), (_D, 1.0), (_D / 2, 3.5), (0.0, 1.0)]
     house.product("IfcSpace", "1", [_prism(house, space, 0.0, _W)], LongName="Attic room")
+    return roofs[0]
+
+
+def _skylight(house: IfcHouse) -> None:
+    """The attic with a window of 1 x 1 m in the southern slope."""
+    roof = _attic(house)
+    up, out = np.array([0.707, 0.707]), np.array([-0.707, 0.707])  # along and out of the slope
+    middle = np.array([1.25, 2.25]) + 0.09 * out
+
+    def across(thick: float, size: float = 1.0) -> Any:
+        sides = ((-size, -thick), (size, -thick), (size, thick), (-size, thick))
+        section = [tuple(middle + a / 2 * up + b / 2 * out) for a, b in sides]
+        return _prism(house, section, 2.5, 3.5)
+
+    hole = house.product("IfcOpeningElement", "hole", [across(1.0)])
+    house.row("IfcRelVoidsElement", RelatingBuildingElement=roof, RelatedOpeningElement=hole)
+    house.style("glass", (0.8, 0.9, 0.9), 0.8)
+    pane = across(0.04)
+    house.model.createIfcStyledItem(pane, [house.styles["glass"]], None)
+    window = house.product("IfcWindow", "Roof window", [pane])
+    house.row("IfcRelFillsElement", RelatingOpeningElement=hole, RelatedBuildingElement=window)
+
+
+def _ask_for_light_from_the_roof(path: Path) -> None:
+    house, report = repaired(path)
+    assert len([o for o in house.openings if o.is_window]) == 1, "one roof window"
+    assert "windows" in house.rooms[0].lit_by, f"lit by {house.rooms[0].lit_by}"
+    assert report.leaks is not None
+    assert report.leaks.n_rays > 0, "the room counts as open"
+    _ask_for_no_leak(report)
+
+
+def _no_floor(house: IfcHouse) -> None:
+    """Walls, a deck, a door and a window of bars and a plate without a record of its hole."""
+    house.storey("s", 0.0)
+    _four_walls(house, 0.0, 2.5)
+    _slab(house, "deck", 2.5, 0.25, "ROOF")
+    inner = house.wall("Inner", (3.0, _D), (3.0, 0.0), 0.0, 2.5)
+    house.door(inner, 1.0)
+    outer = house.model.by_type("IfcWall")[0]
+    hole = house.product("IfcOpeningElement", "hole", [house.box_solid((1, -1, 0.9), (2, 1, 2.1))])
+    house.row("IfcRelVoidsElement", RelatingBuildingElement=outer, RelatedOpeningElement=hole)
+    bars = [
+        ((1, 0.9), (2, 1.0)),
+        ((1, 2.0), (2, 2.1)),
+        ((1, 1.0), (1.1, 2.0)),
+        ((1.9, 1.0), (2, 2.0)),
+    ]
+    parts = [
+        house.product("IfcMember", "bar", [house.box_solid((a[0], -0.2, a[1]), (b[0], -0.1, b[1]))])
+        for a, b in bars
+    ]
+    pane = house.box_solid((1.1, -0.16, 1.0), (1.9, -0.14, 2.0))
+    parts.append(house.product("IfcPlate", "pane", [pane]))
+    window = house.row("IfcWindow", Name="Window", ObjectPlacement=house.site_place)
+    house.row("IfcRelAggregates", RelatingObject=window, RelatedObjects=parts)
+
+
+def _ask_for_two_closed_rooms(path: Path) -> None:
+    house, report = repaired(path)
+    assert len(house.rooms) == 2
+    assert all(str(r.enclosure) == "closed" for r in house.rooms)
+    (window,) = (i for i in house.items if i.kind is ItemKind.WINDOW)
+    assert [o.item_id for o in house.openings if o.is_window] == [window.id]
+    _ask_for_no_leak(report)
+
+
+def _no_records(house: IfcHouse) -> None:
+    """A door in a gap of an inner wall and a window in a wall, neither with an opening element."""
+    house.storey("s", 0.0)
+    _slab(house, "floor", -0.25, 0.25, "FLOOR")
+    _slab(house, "deck", 2.5, 0.25, "ROOF")
+    _four_walls(house, 0.0, 2.5)
+    for k, (low, high) in enumerate(((0.0, 2.0), (2.9, _D))):
+        solid = house.box_solid((3, low, 0), (3.1, high, 2.5))
+        house.product("IfcWall", f"Inner {k}", [solid])
+    house.product("IfcDoor", "Door", [house.box_solid((3.02, 2, 0), (3.08, 2.9, 2.1))])
+    house.product("IfcWindow", "Window", [house.box_solid((1, -0.2, 0.9), (2, -0.1, 2.1))])
+
+
+def _garage(house: IfcHouse, *, has_slab: bool) -> None:
+    """A floor 8 cm below the foot of the walls, with a garage door down to that foot."""
+    house.storey("s", 0.0)
+    if has_slab:
+        solid = house.box_solid((0, 0, -0.33), (_W, _D, -0.08))
+        house.product("IfcSlab", "floor", [solid], PredefinedType="FLOOR")
+    _slab(house, "deck", 2.8, 0.25, "ROOF")
+    _four_walls(house, 0.0, 2.8)
+    outer = house.model.by_type("IfcWall")[0]
+    hole = house.product("IfcOpeningElement", "hole", [house.box_solid((1, -1, 0), (4, 1, 2.2))])
+    house.row("IfcRelVoidsElement", RelatingBuildingElement=outer, RelatedOpeningElement=hole)
+    door = house.product("IfcDoor", "Garage", [house.box_solid((1, -0.2, 0), (4, -0.1, 2.2))])
+    house.row("IfcRelFillsElement", RelatingOpeningElement=hole, RelatedBuildingElement=door)
+    _room(house, "Garage", -0.08, 2.88)
+
+
+def _ask_for_a_closed_garage(path: Path) -> None:
+    house, report = repaired(path)
+    assert [str(r.enclosure) for r in house.rooms] == ["closed"]
+    _ask_for_no_leak(report)
 
 
 def _ask_for_a_sloped_ceiling(path: Path) -> None:

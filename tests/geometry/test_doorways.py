@@ -30,6 +30,21 @@ def test_a_gap_as_wide_as_a_door_parts_two_rooms(width: float, n: int) -> None:
     assert len(parts(low, high)) == n
 
 
+@pytest.mark.parametrize(
+    ("width", "leaf", "n"),
+    [
+        (1.6, box(3.0, 2.0, 4.0, 2.05), 2),  # open, at right angles to its gap
+        (2.4, box(3.97, 2.0, 4.03, 4.4), 2),
+        (1.6, box(1.0, 2.0, 1.8, 2.05), 1),  # elsewhere
+        (3.2, box(3.97, 2.0, 4.03, 5.2), 1),
+    ],
+)
+def test_a_door_in_a_wider_gap_parts_two_rooms(width: float, leaf: Polygon, n: int) -> None:
+    walls = unary_union([OUTER, box(3.9, 0.2, 4.1, 2.0), box(3.9, 2.0 + width, 4.1, 5.8)])
+    (piece,) = shapely.get_parts(GROUND.difference(walls))
+    assert len(parted_at_doorways(piece, doorways(walls, doors=[leaf]))) == n
+
+
 def test_a_doorway_beside_a_corner_parts_two_rooms() -> None:
     areas = parts(box(3.9, 0.2, 4.1, 4.9))
     assert areas == pytest.approx([3.7 * 5.6 + 0.1 * 0.9] * 2)

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+import shapely
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import Box, Item, ItemKind, Opening, Surface, corners_of_surfaces
@@ -27,6 +28,10 @@ _BESIDE_M: Final = 0.15  # a wall's faces lie no farther from the door's own pla
 _PLANAR_M: Final = 0.01  # a thinner wall has one face, metres
 _THICKER_M: Final = 0.15  # how far the cutter of a planar wall reaches to either side
 _LEAST_SHARE: Final = 0.02  # a direction that has less of the wall's upright area is no face of it
+_ROOF_M: Final = 0.6  # maximum distance of a hole's middle from the faces of its roof
+_LEAST_SLOPE: Final = 0.1  # y of the normal of a roof's face, at least
+_SAME_WAY: Final = 0.999  # least cosine between normals of one plane of a roof
+_LEVEL: Final = 0.99  # y of the normal of a level roof, at least
 _UP: Final = np.array([0.0, 1.0, 0.0])
 _SIDE_SHARE: Final = (
     0.3  # of the largest direction's area: a direction that has less is no side of a wall
@@ -39,11 +44,13 @@ class Void:
 
     id: str
     level_id: str
-    walls: frozenset[str]  # ids of the wall items
+    walls: frozenset[str]  # ids of the wall items, or of those of a roof
     points: F64  # (N, 3) world, corners of the removed body
     item: Item | None = None  # the door or window in it
     is_window: bool = False
     undrawn: str = ""  # id of a door or window in it that has no mesh
+    in_roof: bool = False
+    others: tuple[str, ...] = ()  # ids of further doors and windows in it
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,6 +63,7 @@ class _WallFrame:
     points: F64  # (V, 3) world
     corners: F64  # (F, 3, 3) world, of the faces
     area_m2: float
+    is_side: bool  # no end of the wall
 
 
 def openings(items: Sequence[Item]) -> tuple[Opening, ...]:
@@ -83,7 +91,7 @@ def openings_of_voids(items: Sequence[Item], voids: Sequence[Void]) -> dict[str,
     frames = [f for item in items if item.kind is ItemKind.WALL for f in _frames(item)]
     openings: dict[str, Opening] = {}
     for void in sorted(voids, key=lambda v: (v.item is None, not v.undrawn)):
-        opening = _opening_of_void(void, frames)
+        opening = _opening_in_roof(void, items) if void.in_roof else _opening_of_void(void, frames)
         if opening is None:
             continue
         is_free = void.item is None and not void.undrawn
@@ -128,7 +136,7 @@ def _opening_of_void(void: Void, frames: Sequence[_WallFrame]) -> Opening | None
     wall_depths = [
         points
         for f in frames
-        if f.item_id not in void.walls
+        if f.item_id not in void.walls and f.is_side
         for points in _wall_points_around(f, axes, ends[0], ends[1])
     ]
     holes = [h for points in wall_depths if (h := _hole(points, ends[0], ends[1])) is not None]
@@ -142,6 +150,52 @@ def _opening_of_void(void: Void, frames: Sequence[_WallFrame]) -> Opening | None
         has_holes=is_bare,
         is_cut=is_bare and len(holes) == len(wall_depths),
     )
+
+
+def _opening_in_roof(void: Void, items: Sequence[Item]) -> Opening | None:
+    """The hole of a roof window, from the underside to the top of its roof; None without a roof around it."""
+    corners = corners_of_surfaces([s for i in items if i.id in void.walls for s in i.surfaces])
+    areas, centre = area_vectors(corners), void.points.mean(0)
+    size = np.linalg.norm(areas, axis=1)
+    # Of the planes beside the hole take the largest that is not upright.
+    away = np.abs(((corners[:, 0] - centre) * areas).sum(1)) / np.maximum(size, 1e-12)
+    is_near = (away < _ROOF_M) & (np.abs(areas[:, 1]) > _LEAST_SLOPE * size) & (size > 1e-9)
+    if not is_near.any():
+        return None
+    normals = areas[is_near] / size[is_near, None]
+    normals *= np.sign(normals[:, 1:2])
+    agrees = normals @ normals.T > _SAME_WAY
+    normal = normals[int((agrees * size[is_near]).sum(1).argmax())]
+    along = np.cross(_UP, normal) if abs(normal[1]) < _LEVEL else _longest_side(void, normal)
+    along = along / np.linalg.norm(along)
+    axes = np.stack([along, np.cross(normal, along), normal], 1)
+    body = void.points @ axes
+    low, high = body.min(0), body.max(0)
+    roof = corners.reshape(-1, 3) @ axes
+    rim = roof[(roof > low - _RIM_M).all(1) & (roof < high + _RIM_M).all(1)]
+    if len(rim) < 4 or np.ptp(rim[:, :2], axis=0).min() < LEAST_HOLE_M:
+        return None
+    ends = np.stack([rim.min(0), rim.max(0)])
+    return _opening(
+        void.id if void.item is None else f"{void.item.id}_hole",
+        void.level_id,
+        void.item,
+        is_window=void.is_window,
+        axes=axes,
+        ends=_across_walls(ends, [rim]),
+        has_holes=True,
+        is_cut=True,
+    )
+
+
+def _longest_side(void: Void, normal: F64) -> F64:
+    """(3,) the direction of a hole's longest edge in the plane of a level roof."""
+    flat = void.points - (void.points @ normal)[:, None] * normal
+    hull = shapely.MultiPoint(flat[:, [0, 2]]).minimum_rotated_rectangle
+    sides = np.diff(shapely.get_coordinates(hull), axis=0)
+    x, z = sides[int(np.hypot(*sides.T).argmax())] if len(sides) else (1.0, 0.0)
+    side = np.array([x, 0.0, z])
+    return np.asarray(side - (side @ normal) * normal)
 
 
 def _is_niche(rim: F64, sides: Sequence[F64]) -> bool:
@@ -190,6 +244,7 @@ def _frames(item: Item) -> list[_WallFrame]:
     n, area, corners = n[upright], area[upright], corners[upright]
     degree = np.rint(np.degrees(np.arctan2(n[:, 2], n[:, 0]))).astype(int) % 180
     wall_frames = []
+    of_degree = np.bincount(degree, area) if len(degree) else np.zeros(0)
     for d in np.unique(degree):
         mine = degree == d
         if area[mine].sum() < _LEAST_SHARE * area.sum():
@@ -200,7 +255,15 @@ def _frames(item: Item) -> list[_WallFrame]:
         normal = best / np.linalg.norm(best)
         area_m2 = float(area[mine].sum())
         wall_frames.append(
-            _WallFrame(item.id, item.level_id, normal, points, corners[mine], area_m2)
+            _WallFrame(
+                item.id,
+                item.level_id,
+                normal,
+                points,
+                corners[mine],
+                area_m2,
+                is_side=area_m2 >= _SIDE_SHARE * of_degree.max(),
+            )
         )
     return wall_frames
 

@@ -13,7 +13,7 @@ import numpy as np
 import shapely
 
 from pbrs_farm.core.arrays import F64
-from pbrs_farm.core.house import Surface
+from pbrs_farm.core.house import Surface, corners_of_surfaces
 from pbrs_farm.core.mesh import area_vectors, face_areas, triangle_corners
 from pbrs_farm.geometry.doorways import NARROWEST_M, door_line, doorways, parted_at_doorways
 
@@ -83,7 +83,7 @@ def floor_polygons(
 ) -> list[F64]:
     """Every piece of floor between the walls, planar walls too, that is a room by its size.
 
-    doors: (2, 3) bounds of each, which part rooms however wide they are. Each as floor_polygon gives it, largest first.
+    doors: (2, 3) bounds of each, which part rooms however wide they are, also open ones in a gap. Each as floor_polygon gives it, largest first.
     """
     corners = _faces_looking(floor, 1)
     if not len(corners):
@@ -94,7 +94,8 @@ def floor_polygons(
     for taken in (*feet, traces := _traces(walls)):
         between = shapely.difference(between, taken)
     # One room ends at the doorway to the next.
-    ways = doorways(shapely.union_all([*feet, traces]))
+    leaves = [shapely.box(*bounds[0, [0, 2]], *bounds[1, [0, 2]]) for bounds in doors]
+    ways = doorways(shapely.union_all([*feet, traces]), doors=leaves)
     ways += [line for bounds in doors if (line := _line_of_door(bounds)) is not None]
     parts = [p for whole in shapely.get_parts(between) for p in parted_at_doorways(whole, ways)]
     pieces = np.array(parts, object)
@@ -114,6 +115,14 @@ def _line_of_door(bounds: F64) -> shapely.LineString | None:
     if size[1 - across] > _THICKEST_DOOR_M or size[across] < NARROWEST_M:
         return None
     return door_line(middle, np.eye(2)[across], float(size[across]))
+
+
+def foot_of_wall(surfaces: Sequence[Surface]) -> Any:
+    """Ground area of a wall seen from above, as a shapely area; of a planar wall a strip."""
+    # Its top may slope with a roof: every face counts.
+    return shapely.union_all(
+        [_outline_from_above(corners_of_surfaces(surfaces)), _traces(surfaces)]
+    )
 
 
 def _grown(areas: Any, by_m: float) -> Any:

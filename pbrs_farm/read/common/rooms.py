@@ -19,16 +19,19 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.checked_json import Finite, checked, exactly, json_from_bytes
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import Item, ItemKind, Level, Room, Surface
+from pbrs_farm.geometry.doorways import door_line, ground_between
 from pbrs_farm.read.common.room_floors import (
     ceiling_height,
     covered_share,
     floor_height,
     floor_polygons,
+    foot_of_wall,
     polygon_of,
 )
 from pbrs_farm.read.common.room_limits import MAX_ROOMS, check_number
 
 MIN_ROOM_M2: Final = 1.0  # smaller pieces of floor are gaps under doors and walls
+LEAST_WALL_M: Final = 1.8  # lower walls enclose no room
 MIN_ROOM_WIDTH_M: Final = 0.5
 _STOREY_M: Final = 2.5  # default height of a room, metres
 _SAME_LEVEL_M: Final = 0.5  # floors nearer in height than this are one level
@@ -113,6 +116,34 @@ def rooms_from_floors(items: Sequence[Item]) -> list[Room]:
         )
         heights = {"floor_y": height, "ceiling_y": None}
         rooms += [_with_heights(p, "", (), heights, items) for p in pieces]
+    return rooms
+
+
+def rooms_from_walls(items: Sequence[Item]) -> list[Room]:
+    """The rooms that walls enclose where no floor is drawn, from the foot of the walls of each storey.
+
+    items: of the whole scene. Lower walls than a parapet enclose nothing; the rooms are as those of
+    rooms_from_floors.
+    """
+    walls = [i for i in items if i.kind is ItemKind.WALL and np.ptp(i.bounds[:, 1]) >= LEAST_WALL_M]
+    doors = [i.box for i in items if i.kind is ItemKind.DOOR and i.box is not None]
+    rooms: list[Room] = []
+    storeys: list[list[Item]] = []
+    for wall in sorted(walls, key=lambda w: float(w.bounds[0, 1])):
+        if not storeys or wall.bounds[0, 1] > storeys[-1][0].bounds[0, 1] + _SAME_LEVEL_M:
+            storeys.append([])
+        storeys[-1].append(wall)
+    for storey in storeys:
+        foot = float(np.median([w.bounds[0, 1] for w in storey]))
+        lines = [
+            door_line(box.centre[[0, 2]], box.axes[[0, 2], 0], 2 * float(box.half[0]))
+            for box in doors
+            if abs(box.corners[:, 1].min() - foot) < _SAME_LEVEL_M
+        ]
+        heights = {"floor_y": foot, "ceiling_y": None}
+        pieces = ground_between([foot_of_wall(w.surfaces) for w in storey], lines)
+        polygons = [polygon_of(p) for p in pieces if p.area >= MIN_ROOM_M2]
+        rooms += [_with_heights(p, "", (), heights, items) for p in polygons if p is not None]
     return rooms
 
 

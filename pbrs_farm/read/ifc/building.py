@@ -48,7 +48,7 @@ from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.openings import openings, openings_of_voids
 from pbrs_farm.read.common.placed_mesh import across_last, assumed_light, oriented_box, placed
 from pbrs_farm.read.common.room_floors import covered_share, floor_polygon
-from pbrs_farm.read.common.rooms import rooms_from_floors
+from pbrs_farm.read.common.rooms import rooms_from_floors, rooms_from_walls
 from pbrs_farm.read.ifc.ceilings import NEAR_M, ROOF_WORDS, Overheads, with_roofs
 from pbrs_farm.read.ifc.doors_and_windows import (
     glass_parts,
@@ -58,7 +58,7 @@ from pbrs_farm.read.ifc.doors_and_windows import (
     tags_of_name,
     voids_of_walls,
 )
-from pbrs_farm.read.ifc.meshes import ProductMesh, Style, meshes_of_products
+from pbrs_farm.read.ifc.meshes import ProductMesh, Style, Whole, meshes_of_products, with_wholes
 from pbrs_farm.read.ifc.model_file import model_of
 from pbrs_farm.read.mesh.obj import Mesh
 
@@ -122,8 +122,11 @@ class _Building:
         """The House of the whole building."""
         products = [p for p in self._model.by_type("IfcProduct") if p.Representation is not None]
         products = [p for p in products if not _is_nothing(p)]
-        self._meshes = meshes_of_products(self._model, products, self._path.name, self._fields)
-        self._note_failed(products)
+        meshes = meshes_of_products(self._model, products, self._path.name, self._fields)
+        wholes = _wholes_of_parts(self._model, self._metres)
+        self._meshes = with_wholes(meshes, {row.id(): parts for row, parts in wholes})
+        products += [row for row, _parts in wholes if row.id() in self._meshes]
+        self._note_failed([p for p in products if p.id() not in meshes])
         self._shift_to_origin()
         items = list(self._items(products))
         spaces = self._rooms_of_spaces()
@@ -161,7 +164,7 @@ class _Building:
             if item is not None:
                 builder.items.append(item)
                 cut[void.id] = replace(opening, item_id=item.id)
-        filled = {o.item_id for o in cut.values()}
+        filled = {o.item_id for o in cut.values()} | {i for void in voids for i in void.others}
         rest = [i for i in builder.items if i.id not in filled]
         of_item = {o.item_id: o for o in (*cut.values(), *openings(rest)) if o.item_id is not None}
         own_openings = [of_item[i.id] for i in builder.items if i.id in of_item]
@@ -494,6 +497,20 @@ def _is_nothing(product: Any) -> bool:
     )
 
 
+def _wholes_of_parts(model: Any, metres: float) -> list[tuple[Any, Whole]]:
+    """Doors and windows without a shape that are put together from bars and plates."""
+    from ifcopenshell.util.placement import get_local_placement
+
+    wholes = []
+    for row in (*model.by_type("IfcWindow"), *model.by_type("IfcDoor")):
+        parts = [p.id() for r in row.IsDecomposedBy or () for p in r.RelatedObjects]
+        if row.Representation is None and parts:
+            place = np.array(get_local_placement(row.ObjectPlacement), np.float64)
+            place[:3, 3] *= metres
+            wholes.append((row, Whole(place, tuple(parts))))
+    return wholes
+
+
 def _has_body(product: Any) -> bool:
     """Whether a product has a shape in space, not an axis or a footprint alone."""
     rows = getattr(product.Representation, "Representations", None) or ()
@@ -602,7 +619,7 @@ def _rooms_between_walls(
 ) -> list[tuple[Room, F64 | None]]:
     """Rooms of a building without IfcSpaces, as high as the ceiling over most of their area."""
     rooms: list[tuple[Room, F64 | None]] = []
-    for room in rooms_from_floors(items):
+    for room in rooms_from_floors(items) or rooms_from_walls(items):
         above = overheads.over(room)
         y = above.height() if above.share(np.inf) > _COVERED else None
         # Under a roof knee walls bound a room, under the sky they are parapets.

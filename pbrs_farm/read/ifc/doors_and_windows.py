@@ -36,6 +36,7 @@ _WINDOW_FAMILIES: Final = (
     "fixed", "casement", "awning", "hopper", "hung", "skylight", "sash", "transom", "archtop",
 )
 # fmt: on
+_BEFORE_M: Final = 0.1  # maximum distance of a window's middle from its hole
 _SLIDING: Final = frozenset({"sliding", "slider", "bifold", "fold", "bypass", "pocket"})
 _GARAGE: Final = frozenset({"overhead", "garage"})
 
@@ -88,23 +89,36 @@ def voids_of_walls(
     items: Mapping[str, Item],
     level_of: Callable[[float], str],
 ) -> Iterator[Void]:
-    """The holes in walls, each with the door or window that fills it, if any does.
+    """The holes in walls, each with the door or window that fills it, if any does; those of roof windows.
 
     model: of ifcopenshell; meshes: by rows' numbers, of openings too; world: (4, 4) from z up; items: by id,
     as the house has them.
     """
+    loose = _without_records(model, items)
     for relation in model.by_type("IfcRelVoidsElement"):
         opening = relation.RelatedOpeningElement
         mesh = meshes.get(opening.id())
-        walls = _walls(relation.RelatingBuildingElement, items)
-        if mesh is None or not walls:
-            continue
         fillings = [r.RelatedBuildingElement for r in opening.HasFillings or ()]
+        walls = _parts(relation.RelatingBuildingElement, items, ItemKind.WALL)
+        has_window = any(f.is_a("IfcWindow") for f in fillings)
+        roof = _parts(relation.RelatingBuildingElement, items, ItemKind.CEILING)
+        in_roof = not walls and has_window
+        if mesh is None or not (roof if in_roof else walls):
+            continue
         if not fillings and getattr(opening, "PredefinedType", None) == "RECESS":
             continue
-        drawn = [items[f.GlobalId] for f in fillings if f.GlobalId in items]
-        item = next((i for i in drawn if i.kind in (ItemKind.DOOR, ItemKind.WINDOW)), None)
         points = mesh.world @ world[:3, :3].T + world[:3, 3]
+        drawn = [items[f.GlobalId] for f in fillings if f.GlobalId in items]
+        drawn = (
+            drawn
+            if fillings
+            else [
+                i
+                for i in loose
+                if _holds(points, i) and any(_holds(items[w].bounds, i) for w in walls)
+            ]
+        )
+        item, *others = [i for i in drawn if i.kind in (ItemKind.DOOR, ItemKind.WINDOW)] or [None]
         undrawn = (
             [f for f in fillings if f.is_a("IfcDoor") or f.is_a("IfcWindow")]
             if item is None
@@ -113,20 +127,37 @@ def voids_of_walls(
         yield Void(
             id=str(opening.GlobalId),
             level_id=item.level_id if item is not None else level_of(float(points[:, 1].min())),
-            walls=walls,
+            walls=roof if in_roof else walls,
             points=points,
             item=item,
             is_window=item.kind is ItemKind.WINDOW
             if item is not None
             else any(f.is_a("IfcWindow") for f in undrawn),
             undrawn=str(undrawn[0].GlobalId) if undrawn else "",
+            in_roof=in_roof,
+            others=tuple(i.id for i in others if i is not None),
         )
+
+
+def _without_records(model: Any, items: Mapping[str, Item]) -> list[Item]:
+    """The doors and windows that no relation puts into a hole."""
+    rows = [*model.by_type("IfcDoor"), *model.by_type("IfcWindow")]
+    return [items[r.GlobalId] for r in rows if not r.FillsVoids and r.GlobalId in items]
+
+
+def _holds(points: F64, item: Item) -> bool:
+    """True if the middle of a door or window is between the bounds of a hole or wall, or just before them."""
+    middle = item.bounds.mean(0)
+    low, high = points.min(0) - _BEFORE_M, points.max(0) + _BEFORE_M
+    return bool(((middle > low) & (middle < high)).all())
 
 
 def hole_of_undrawn(opening: Opening, product: Any) -> Hole:
     """The hole to fill for a door or window without a shape."""
     normal = opening.normal
-    axes = np.stack([np.cross([0.0, 1.0, 0.0], normal), [0.0, 1.0, 0.0], normal], 1)
+    along = opening.quad[1] - opening.quad[0]
+    along /= np.linalg.norm(along)
+    axes = np.stack([along, np.cross(normal, along), normal], 1)
     corners = opening.quad @ axes
     depth = float(np.ptp(opening.cutter.positions @ normal))
     width, height = np.ptp(corners, axis=0)[:2].tolist()
@@ -141,11 +172,11 @@ def hole_of_undrawn(opening: Opening, product: Any) -> Hole:
     )
 
 
-def _walls(product: Any, items: Mapping[str, Item]) -> frozenset[str]:
-    """Ids of the wall that a product is, or of the walls that it is put together from."""
+def _parts(product: Any, items: Mapping[str, Item], kind: ItemKind) -> frozenset[str]:
+    """Ids of the wall or roof that a product is, or of those that it is put together from."""
     parts = [p for r in getattr(product, "IsDecomposedBy", ()) or () for p in r.RelatedObjects]
     ids = {str(p.GlobalId) for p in (product, *parts)}
-    return frozenset(i for i in ids if i in items and items[i].kind is ItemKind.WALL)
+    return frozenset(i for i in ids if i in items and items[i].kind is kind)
 
 
 def swing(product: Any) -> tuple[str, ...]:

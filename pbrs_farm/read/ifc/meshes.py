@@ -6,9 +6,9 @@ The library has cut openings and joined layers already.
 from __future__ import annotations
 
 import multiprocessing
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -90,6 +90,41 @@ def meshes_of_products(
             meshes[shape.id] = mesh
         if not iterator.next():
             return meshes
+
+
+class Whole(NamedTuple):
+    """A product without a shape that is made of others."""
+
+    world_from_product: F64  # (4, 4), z up, metres
+    parts: tuple[int, ...]  # numbers of their rows
+
+
+def with_wholes(
+    meshes: Mapping[int, ProductMesh], wholes: Mapping[int, Whole]
+) -> dict[int, ProductMesh]:
+    """The meshes by their rows' numbers, parts replaced by the products that they make."""
+    united = dict(meshes)
+    for number, whole in wholes.items():
+        parts = [united.pop(p) for p in whole.parts if p in united]
+        if not parts:
+            continue
+        own_from_world = np.linalg.inv(whole.world_from_product)
+        positions = [p.world @ own_from_world[:3, :3].T + own_from_world[:3, 3] for p in parts]
+        points = np.cumsum([0, *(len(p.positions) for p in parts)])
+        styles = np.cumsum([0, *(len(p.styles) for p in parts)])
+        united[number] = ProductMesh(
+            np.concatenate(positions),
+            np.concatenate([p.faces + k for p, k in zip(parts, points, strict=False)]),
+            np.concatenate(
+                [
+                    np.where(p.style_of_face < 0, -1, p.style_of_face + k)
+                    for p, k in zip(parts, styles, strict=False)
+                ]
+            ),
+            tuple(style for p in parts for style in p.styles),
+            whole.world_from_product,
+        )
+    return united
 
 
 def _mesh_of_shape(shape: Any) -> ProductMesh | None:

@@ -10,7 +10,7 @@ import shapely
 from pbrs_farm.core.arrays import Points2
 from pbrs_farm.core.classes import CEILING, FLOOR
 from pbrs_farm.core.house import Item, ItemKind, Room, Surface
-from pbrs_farm.geometry.doorways import door_line, doorways, parted_at_doorways
+from pbrs_farm.geometry.doorways import door_line, ground_between
 from pbrs_farm.geometry.plan_surfaces import counter_clockwise, horizontal
 from pbrs_farm.read.sweethome3d.ceiling_heights import CeilingHeights
 from pbrs_farm.read.sweethome3d.home_file.home_xml import (
@@ -27,8 +27,6 @@ from pbrs_farm.read.sweethome3d.wall_solids import picture_uvs
 MIN_AREA_M2 = 0.01  # smaller rooms are left out
 LEAST_ROOM_M2 = 1.0  # a smaller area between walls is a shaft
 LEAST_WALL_M = 1.8  # lower walls enclose no room
-GAP_M = 0.1  # maximum gap between walls meant to touch, metres
-ACROSS_M = 0.01  # half the width that a doorway is closed by
 DOOR_SILL_M = 0.3  # what begins higher is a window
 SLIVER_M2 = 1e-4  # smaller pieces come of rounding
 MAX_CORNERS = 300  # an outline of more corners is simplified: cost grows with their square
@@ -83,14 +81,6 @@ def rooms_between_walls(plan: HomePlan, outlines: dict[str, Outline]) -> tuple[H
             and wall.id in outlines
             and max(wall.height, wall.height_end or 0.0) >= LEAST_WALL_M
         ]
-        joined = shapely.union_all(feet).buffer(GAP_M / 2, join_style="mitre")
-        standing = shapely.union_all([joined.buffer(-GAP_M / 2, join_style="mitre"), *feet])
-        ways = [*doorways(standing), *_door_lines(plan, level_id)]
-        # The area within the outer edge of walls and doorways, minus the walls.
-        closed = shapely.union_all([standing, *(way.buffer(ACROSS_M) for way in ways)])
-        whole = shapely.union_all([shapely.Polygon(p.exterior) for p in _polygons(closed)])
-        pieces = _polygons(shapely.difference(whole, standing))
-        inside = [room for piece in pieces for room in parted_at_doorways(piece, ways)]
         home_rooms += [
             HomeRoom(
                 place=f"walls of level {level_id or '0'}",
@@ -103,7 +93,7 @@ def rooms_between_walls(plan: HomePlan, outlines: dict[str, Outline]) -> tuple[H
                 ceiling=Paint(),
                 is_ceiling_flat=False,
             )
-            for p in sorted(inside, key=lambda p: (p.bounds, p.area))
+            for p in ground_between(feet, _door_lines(plan, level_id))
             if p.area >= LEAST_ROOM_M2
         ]
     return tuple(home_rooms)

@@ -108,6 +108,11 @@ def _open_sides_of_room(
     floor = np.full(len(points), room.floor_y)
     ceiling = _ceiling_at(points, room, covers)
     bare = ~_walled(points + 0.01 * outward, floor, ceiling, walls)
+    for step in _PROBES_M[1:]:
+        # A roof that comes down to the middle of the wall closes the gap over its inner edge.
+        behind = points + step * outward
+        lower = _ceiling_at(behind, room, covers)
+        bare &= (lower >= ceiling) | ~_walled(behind, floor, lower, walls)
     linked = []
     for j in plan.near_to(areas[i], range(len(rooms)), areas.__getitem__, 2 * max(_PROBES_M)):
         neighbour = rooms[j]

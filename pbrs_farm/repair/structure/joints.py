@@ -6,7 +6,7 @@ of a joint shows, where they do not it fills the gap.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -16,10 +16,10 @@ from manifold3d import Manifold
 
 from pbrs_farm.repair.structure import plan_geometry as plan
 from pbrs_farm.repair.structure.booleans import TagTable
-from pbrs_farm.repair.structure.planar_surfaces import PlanarSurface
+from pbrs_farm.repair.structure.planar_surfaces import Cover, PlanarSurface
 from pbrs_farm.repair.structure.prisms import Plane, level_plane, polygons_of, solid_prisms
 from pbrs_farm.repair.structure.room_volumes import MARGIN_M
-from pbrs_farm.repair.structure.slabs import GAP_M
+from pbrs_farm.repair.structure.slabs import FOOT_M, GAP_M
 from pbrs_farm.repair.structure.walls import Wall
 
 _RECESS_M = 0.001  # joints stay this far behind the faces of their walls
@@ -111,7 +111,7 @@ def _run_on(wall: Wall) -> plan.Shape:
 
 
 def joints_with_surface(
-    surface: PlanarSurface,
+    surface: PlanarSurface | Cover,
     footprint: plan.Shape,
     walls: Sequence[Wall],
     doors: plan.Shape,
@@ -120,24 +120,25 @@ def joints_with_surface(
 ) -> list[tuple[Wall, Manifold]]:
     """Wall parts that reach half a slab into the floor below or the ceiling above, hidden in it.
 
-    Made where a wall ends within GAP_M of the surface's plane, so that a gap there is filled too, and
-    in the corner of two walls of which one ends visibly short: over its whole height where they
-    hardly touch.
-    doors: plan area of openings down to the floor, where a wall has no foot.
+    Made where a wall ends within GAP_M of the surface's plane, FOOT_M above a floor, so that a gap
+    there is filled too, and in the corner of two walls of which one ends visibly short: over its whole
+    height where they hardly touch.
+    surface: a solid floor is a Cover, to which joints are made across gaps only. doors: plan area of
+    openings down to the foot of their wall, where a wall has no foot; a gap below them is filled.
     """
     depth_m = 0.5 * thickness_m
     away = 1.0 if surface.is_ceiling else -1.0  # out of the room
+    most_gap = GAP_M if surface.is_ceiling else FOOT_M
     feet: list[_Foot] = []
     for wall in plan.near_to(footprint, walls, lambda w: w.footprint, 0.0):
         area = plan.common(plan.grown(wall.footprint, -_RECESS_M), footprint)
-        if not surface.is_ceiling:
-            area = plan.without(area, doors)
-        for polygon in polygons_of(area):
+        end = wall.top if surface.is_ceiling else level_plane(wall.bottom_y)
+        for polygon, is_sill in _feet_and_sills(area, doors, is_ceiling=surface.is_ceiling):
             corners = shapely.get_coordinates(polygon)
             # Compare the end of the wall with the plane of the floor or ceiling.
-            end = wall.top if surface.is_ceiling else level_plane(wall.bottom_y)
             gap = away * (surface.plane.at(corners) - end.at(corners))
-            if -depth_m <= gap.max() <= GAP_M:
+            least_gap = _GAP_SEEN_M if is_sill or isinstance(surface, Cover) else -depth_m
+            if least_gap <= gap.max() <= most_gap:
                 start = end.raised(-away * _OVERLAP_M)
                 feet.append(_Foot(wall, polygon, start, float(gap.max())))
     # Reach from inside the wall to the middle of the slab.
@@ -150,7 +151,21 @@ def joints_with_surface(
             continue
         tags = (foot.wall.tag("joint"),) * 3
         parts += [(foot.wall, s) for s in solid_prisms([foot.area], low, high, tags, table)]
+        if isinstance(surface, Cover):
+            # Reach into the solid floor beside the wall, below its face.
+            wider = polygons_of(plan.grown(foot.area, _OVERLAP_M))
+            below = surface.plane.raised(away * _OVERLAP_M)
+            parts += [(foot.wall, s) for s in solid_prisms(wider, far, below, tags, table)]
     return parts
+
+
+def _feet_and_sills(
+    area: plan.Shape, doors: plan.Shape, *, is_ceiling: bool
+) -> Iterator[tuple[shapely.Polygon, bool]]:
+    """The pieces of a wall's end, each with whether it is below a door."""
+    below = plan.union([]) if is_ceiling else plan.common(area, doors)
+    yield from ((polygon, False) for polygon in polygons_of(plan.without(area, below)))
+    yield from ((polygon, True) for polygon in polygons_of(below))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -11,7 +11,7 @@ import shapely
 from manifold3d import Manifold
 
 from pbrs_farm.core.arrays import F64, I32, I64
-from pbrs_farm.core.house import House, Item, ItemKind, Surface
+from pbrs_farm.core.house import House, Item, ItemKind, Opening, Surface
 from pbrs_farm.core.mesh import unit_normals
 from pbrs_farm.repair.structure import plan_geometry as plan
 from pbrs_farm.repair.structure.booleans import Patch, Tag, TagTable, bounds
@@ -34,6 +34,7 @@ _LEVEL_M = 0.01  # an underside that rises less is level
 _MOST_FACETS = (
     200  # of a ceiling's underside; of more (a vault in small faces) its lowest height counts
 )
+_JOINT_M = 0.01  # by which the pane of a roof window overlaps the roof
 _UP = 0.05  # y of the normal of a face that is not upright, at least
 
 
@@ -120,6 +121,20 @@ def _covers_of_solid(item: Item, solid: Manifold, patches: Sequence[Patch]) -> l
         return sloped
     area = plan.union(plan.polygon_of_triangles(p.positions, p.faces) for p in patches)
     return [Cover(is_ceiling, area, level_plane(float(low[1] if is_ceiling else high[1])))]
+
+
+def covers_of_roof_windows(openings: Sequence[Opening]) -> list[Cover]:
+    """The panes of windows in roofs, at the underside of the roof around them."""
+    covers = []
+    for opening in openings:
+        up = opening.normal * np.sign(opening.normal[1])
+        if up[1] > _UP:
+            depth = opening.cutter.positions.astype(np.float64) @ up
+            quad = opening.quad + (depth.min() - opening.quad[0] @ up) * up
+            plane = plane_of_points(quad)
+            area = shapely.Polygon(quad[:, [0, 2]]).buffer(_JOINT_M, join_style="mitre")
+            covers += [Cover(True, area, plane)] if plane is not None else []
+    return covers
 
 
 def _sloped_undersides(patches: Sequence[Patch]) -> list[Cover]:

@@ -14,7 +14,7 @@ from manifold3d import Manifold
 
 from pbrs_farm.repair.structure import plan_geometry as plan
 from pbrs_farm.repair.structure.booleans import TagTable
-from pbrs_farm.repair.structure.planar_surfaces import PlanarSurface
+from pbrs_farm.repair.structure.planar_surfaces import Cover, PlanarSurface
 from pbrs_farm.repair.structure.prisms import (
     BASE_BEHIND_M,
     FACE_M,
@@ -28,12 +28,15 @@ from pbrs_farm.repair.structure.walls import Wall
 GAP_M = 0.05
 """A gap narrower than this between rooms, walls and floors is a fault of the drawing, and closed."""
 
+FOOT_M = 3 * GAP_M
+"""A wall's foot may be so far above the floor: spaces_of_rooms accepts it, and the gap is closed."""
+
 SAME_HEIGHT_M = 0.01
 """Floors (or ceilings) nearer in height than this are one level, and separated in plan."""
 
 
 def footprints_of_surfaces(
-    surfaces: Sequence[PlanarSurface],
+    surfaces: Sequence[PlanarSurface | Cover],
     walls: Sequence[Wall],
     thresholds: plan.Shape,
     thickness_m: float,
@@ -61,7 +64,7 @@ def footprints_of_surfaces(
     return footprints
 
 
-def _is_level_with(a: PlanarSurface, b: PlanarSurface) -> bool:
+def _is_level_with(a: PlanarSurface | Cover, b: PlanarSurface | Cover) -> bool:
     if a.is_ceiling != b.is_ceiling:
         return False
     # Compare heights in the middle of the other one.
@@ -69,12 +72,14 @@ def _is_level_with(a: PlanarSurface, b: PlanarSurface) -> bool:
     return bool(abs(a.plane.at(middle)[0] - b.plane.at(middle)[0]) < 0.5)
 
 
-def _wall_meets_surface(surface: PlanarSurface, wall: Wall) -> bool:
-    # Ask whether the wall comes within GAP_M of the surface's plane.
+def _wall_meets_surface(surface: PlanarSurface | Cover, wall: Wall) -> bool:
+    # Ask whether the wall comes within GAP_M of the surface's plane, or FOOT_M above a floor.
+    below_m = GAP_M if surface.is_ceiling else FOOT_M
     corners = shapely.get_coordinates(wall.footprint)
     heights = surface.plane.at(corners)
     return bool(
-        (wall.bottom_y - GAP_M <= heights).any() and (heights <= wall.top.at(corners) + GAP_M).any()
+        (wall.bottom_y - below_m <= heights).any()
+        and (heights <= wall.top.at(corners) + GAP_M).any()
     )
 
 

@@ -21,6 +21,7 @@ from pbrs_farm.repair.structure.planar_surfaces import (
     Cover,
     FloorsAndCeilings,
     PlanarSurface,
+    covers_of_roof_windows,
     floors_and_ceilings_from_house,
 )
 from pbrs_farm.repair.structure.room_volumes import RoomVolume, volumes_of_rooms, without_volumes
@@ -62,7 +63,8 @@ def repaired_structure(house: House, thickness_m: float) -> Structure:
     horizontal = floors_and_ceilings_from_house(house, table)
     wells = stairwells_of_house(house, walls, horizontal.planar, _covers(horizontal))
     planar = [*horizontal.planar, *wells.surfaces]
-    covers = _covers(replace(horizontal, planar=planar))
+    in_roofs = covers_of_roof_windows(house.openings)
+    covers = [*_covers(replace(horizontal, planar=planar)), *in_roofs]
     lived = (*house.rooms, *wells.wells)
     doors = thresholds(house, walls)
 
@@ -74,6 +76,10 @@ def repaired_structure(house: House, thickness_m: float) -> Structure:
     joints, n_gaps = joints_between_walls(walls, rooms, table)
     for surface, footprint in zip(planar, footprints, strict=True):
         joints += joints_with_surface(surface, footprint, walls, doors, thickness_m, table)
+    solid_floors = [cover for cover in horizontal.covers if not cover.is_ceiling]
+    below = footprints_of_surfaces(solid_floors, walls, doors, thickness_m)
+    for floor, footprint in zip(solid_floors, below, strict=True):
+        joints += joints_with_surface(floor, footprint, walls, doors, thickness_m, table)
     parts = [WallPart(w, w.solid, is_joint=False) for w in wholes]
     parts += _parts_of_joints(joints, volumes, table)
 
@@ -100,7 +106,10 @@ def repaired_structure(house: House, thickness_m: float) -> Structure:
         plugs,
         report,
         spaces_of_rooms(house.rooms, wells.wells, standing, covers),
-        {r.id: interiors_of_room(r, wholes, planar, horizontal.covers) for r in lived},
+        {
+            r.id: interiors_of_room(r, wholes, planar, [*horizontal.covers, *in_roofs])
+            for r in lived
+        },
     )
 
 

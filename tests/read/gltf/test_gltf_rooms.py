@@ -36,6 +36,17 @@ def test_rooms_end_at_a_doorway_as_high_as_the_walls(thickness: float, gap: floa
         assert areas == pytest.approx([12.0, 6.0], abs=0.25)
 
 
+def test_an_open_door_in_a_wide_gap_parts_two_rooms() -> None:
+    s = two_rooms()
+    s.nodes.pop()
+    for k, (low, high) in enumerate([(0.0, 0.6), (2.2, 3.0)]):
+        s.node(f"Wall.{k}", mesh=s.box([3.92, 0, low], [4.08, 2.6, high]))
+    # Two leaves, each swung into the large room.
+    for k, z in enumerate((0.62, 2.14)):
+        s.node(f"Door.{k}", mesh=s.box([3.2, 0, z], [4.0, 2, z + 0.04]))
+    assert len(read(s).rooms) == 2
+
+
 def test_a_room_beside_a_ceiling_has_none_and_takes_its_height_from_the_walls() -> None:
     s = two_rooms()
     s.nodes[1]["mesh"] = s.mesh([[[0, 2.4, 0], [4.05, 2.4, 0], [4.05, 2.4, 3], [0, 2.4, 3]]])
