@@ -2,8 +2,7 @@
 
 A room is empty if furniture covers less than 3 % of its floor, and sparse below 20 %: for `sparse`, such
 a room keeps its furniture and gets the rest of its brief. Its use follows from its name and its furniture;
-if its name says nothing, the room gets the use that the home lacks. A garage, and a dark room of unknown
-use, remains unchanged, with a note.
+if its name says nothing, the room gets the use that the home lacks. A garage remains unchanged, with a note.
 """
 
 from __future__ import annotations
@@ -69,6 +68,7 @@ _STANDS_M: Final = 0.5  # minimum bottom height above the floor of a hanging ite
 _FLAT_M: Final = 0.12  # maximum height of an item to walk on
 _SMALL_BATH_M2: Final = 2.6
 _LEAST_M2: Final = 1.2
+_MOST_DARK_M2: Final = {RoomKind.BATHROOM: 14.0, RoomKind.KITCHEN: 20.0}  # of rooms without windows
 _LEAST_LIVING_M2, _LEAST_BEDROOM_M2 = 12.0, 7.0  # minimum floor areas of a room without a name
 
 
@@ -160,7 +160,7 @@ def _furnished(
 def _kinds_of_rooms(space: HouseSpace) -> dict[str, RoomKind]:
     """Room id -> use; rooms of unknown use get the uses that the home lacks, the largest room first.
 
-    A room without windows gets no use if other rooms of the home have windows.
+    A room without windows in a home with windows is a bathroom or a kitchen if the home has none, else a hall.
     """
     kinds = {room.room.id: room.kind for room in space.rooms}
     has_windows = any(room.windows for room in space.rooms)
@@ -172,6 +172,13 @@ def _kinds_of_rooms(space: HouseSpace) -> dict[str, RoomKind]:
             kinds[room.room.id] = RoomKind.LIVING
         elif room.area.area >= _LEAST_BEDROOM_M2:
             kinds[room.room.id] = RoomKind.BEDROOM
+    dark = [r for r in space.rooms if r.kind is RoomKind.OTHER and r not in unnamed]
+    for room in sorted(dark, key=lambda r: (r.area.area, r.room.id)):
+        kinds[room.room.id] = RoomKind.HALL
+        for kind, most_m2 in _MOST_DARK_M2.items():
+            if kind not in kinds.values() and room.area.area <= most_m2:
+                kinds[room.room.id] = kind
+                break
     return kinds
 
 

@@ -37,7 +37,7 @@ _MAX_ROUNDS: Final = (
     3  # maximum rounds of repairing a dressed house and rehanging items that lost their wall
 )
 _FURNISH_VERSION: Final = (
-    3  # version of furnish_rooms.py, in addition to that of furnishing generated homes
+    4  # version of furnish_rooms.py, in addition to that of furnishing generated homes
 )
 _DRESS_SHARE: Final = 0.7  # approximate share of dressing in the time of dressing and repair
 
@@ -321,8 +321,8 @@ def _edit(work: Preparation) -> Preparation:
 
 
 PASSES: Final = (
-    Pass("read", 8, _read, lambda _source, _recipe: True, _read_depends),
-    Pass("stand-ins", 3, _stand_in, _has_stand_ins, _stand_ins_depend),
+    Pass("read", 9, _read, lambda _source, _recipe: True, _read_depends),
+    Pass("stand-ins", 4, _stand_in, _has_stand_ins, _stand_ins_depend),
     Pass("furnish", GENERATE_VERSION + _FURNISH_VERSION, _furnish, _is_furnished, _furnish_depends),
     Pass("dress", 12, _dress, _is_dressed, _dress_depends),
     # Its version counts the generated ceiling lamps, too.

@@ -21,10 +21,13 @@ import shapely
 from shapely.geometry import Point, Polygon
 
 from pbrs_farm.core.arrays import F64
-from pbrs_farm.core.catalogue import Catalogue, Piece, Place, Shape
+from pbrs_farm.core.catalogue import EMPTY, Catalogue, Piece, Place, Shape
 from pbrs_farm.core.classes import NYU40_NAMES, SINK
 from pbrs_farm.core.house import BOX_ONLY, FRONT_GIVEN, Box, House, Item, Material, Note, Room
 from pbrs_farm.dress.mutable_house import MutableHouse
+from pbrs_farm.dress.style import Style, style_for
+from pbrs_farm.dress.walls.hung_things import frame_material, framed, mirror
+from pbrs_farm.dress.walls.pictures import Gallery
 from pbrs_farm.geometry.heights import highest_below
 from pbrs_farm.geometry.solids import box
 from pbrs_farm.geometry.surface_points import item_triangles
@@ -55,6 +58,8 @@ _FIXTURES: Final = frozenset({
 # fmt: on
 _OWN_SCALES: Final = (0.8, 1.25)  # range of scale of a fixture if no piece fits its box
 _FAR_SCALES: Final = (0.35, 2.6)  # range of the ratio of such a box to the piece
+_ON_WALLS: Final = frozenset({"picture_frame", "mirror"})
+"""Groups of flat things that are generated in any size where no piece fits."""
 _BASINS: Final = frozenset({"sink", "washbasin"})
 _TALLEST_BASIN_M: Final = 1.3  # taller ones have a mirror
 _RIMS_M: Final = (0.6, 1.1)  # heights of basins' rims above the floor
@@ -151,6 +156,7 @@ class _Scene:
     def __init__(self, house: House, catalogue: Catalogue | None) -> None:
         self.house = house
         self.catalogue = catalogue
+        self._gallery: Gallery | None = None
         self._places = [_place(room) for room in house.rooms]
         self._tables = [
             i.box.centre
@@ -262,6 +268,12 @@ class _Scene:
         y = float(highest_below(np.array(places), np.concatenate(near), low + _ON_TOP_M).max())
         return y if low - y < _MOST_DROP_M else None
 
+    def gallery(self, mutable: MutableHouse, style: Style) -> Gallery:
+        """The prints of the home, made on demand."""
+        if self._gallery is None:
+            self._gallery = Gallery(mutable, self.catalogue or EMPTY, style)
+        return self._gallery
+
     def remember(self, placed: Item) -> None:
         """Record a stand-in as a possible support."""
         (x0, _, z0), (x1, _, z1) = placed.bounds.tolist()
@@ -350,6 +362,11 @@ def _stand_in(mutable: MutableHouse, item: Item, scene: _Scene) -> None:
             scene.remember(placed)
             mutable.add(placed, "stand_ins", fit.piece)
             return
+    made = _made_for_wall(mutable, item, target, place, scene) if scene.catalogue else None
+    if made is not None:
+        scene.remember(made)
+        mutable.add(made, "stand_ins")
+        return
     if scene.catalogue is not None:
         scene.boxes[item.name] += 1
     plain = _plain_box(mutable, item, target, place)
@@ -374,6 +391,36 @@ def _chosen(
         if best is None or cost < best[0] - 1e-9:
             best = cost, turned, fit
     return best and (best[1], best[2])
+
+
+def _made_for_wall(
+    mutable: MutableHouse, item: Item, target: Box, place: _Place | None, scene: _Scene
+) -> Item | None:
+    """A generated picture or mirror of the box's size; None for any other or a thicker item."""
+    assert scene.catalogue is not None
+    group = _group_of(item)
+    flat = [b for b in _turned(target, is_front_given=FRONT_GIVEN in item.tags) if _is_flat(b)]
+    if group not in _ON_WALLS or not flat:
+        return None
+    turned = min(flat, key=lambda b: _front_cost(b, group, place, scene))
+    width, height = (float(2 * h) for h in turned.half[:2])
+    style = style_for(mutable.rng("style"))
+    rng = mutable.rng("stand-in", item.id)
+    frame = frame_material(rng, style)
+    if group == "mirror":
+        piece, shape = mirror(width, height, frame)
+    else:
+        shown = scene.gallery(mutable, style).print_for(width / height).texture
+        piece, shape = framed(rng, style, width, height, shown, frame)
+    # Its back is the box's, whatever its own depth.
+    deep = piece.size[1] / 2
+    centre = turned.centre + (deep - turned.half[2]) * turned.axes[:, 2]
+    at_back = Box(centre, np.array([*turned.half[:2], deep]), turned.axes)
+    return _placed(mutable, item, at_back, _Fit(piece, np.ones(3), 0.0), shape, place)
+
+
+def _is_flat(target: Box) -> bool:
+    return bool(2 * target.half[2] < _THIN_M and target.half[2] < target.half[:2].min())
 
 
 def _group_of(item: Item) -> str:

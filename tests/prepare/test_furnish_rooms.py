@@ -92,6 +92,17 @@ def test_a_room_whose_use_is_not_known_is_left_and_noted() -> None:
     assert not any("sink" in i.name for i in furnished.items)
 
 
+@pytest.mark.parametrize(("bathroom", "has"), [("Cellar", "toilet"), ("Bathroom", "")])
+def test_a_dark_room_without_a_name_gets_the_use_that_the_home_lacks(
+    bathroom: str, has: str
+) -> None:
+    house = renamed(renamed(empty_house(), "Hall", ""), "Bathroom", bathroom)
+    dark = next(r for r in house.rooms if not r.name)
+    furnished = furnish_rooms(house, boxes(), 1)
+    assert not [n for n in furnished.notes[len(house.notes) :] if dark.id in n.place]
+    assert ("toilet" in names_in(furnished, dark.id)) == bool(has)
+
+
 @pytest.mark.quick(1)
 @pytest.mark.parametrize(("use", "has"), [("Office", "desk"), ("Dining room", "dining_table")])
 def test_an_office_gets_a_desk_and_a_dining_room_a_table(use: str, has: str) -> None:

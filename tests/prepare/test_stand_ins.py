@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pbrs_farm.core.catalogue import Catalogue, Piece, Place, Shape
-from pbrs_farm.core.house import House, Item, ItemKind, Material
+from pbrs_farm.core.house import House, Item, ItemKind, Material, MaterialKind
 from pbrs_farm.geometry.solids import box_quads, quads_surface
 from pbrs_farm.prepare.stand_ins import STAND_IN, has_box_only_items, with_stand_ins
 from pbrs_farm.read.common.box_only_items import box_only_item
@@ -102,6 +102,20 @@ def test_a_back_at_a_wall_turns_the_front_into_the_room(
     points = np.concatenate([s.positions for s in item.surfaces])
     top = points[points[:, 1] > points[:, 1].max() - 1e-3].mean(0) - item.bounds.mean(0)
     assert top[[0, 2]] @ np.array(front) < -0.2
+
+
+@pytest.mark.parametrize(("name", "n_textures"), [("painting", 1), ("mirror", 0)])
+def test_a_picture_or_mirror_that_no_piece_fits_is_made_in_its_size(
+    name: str, n_textures: int
+) -> None:
+    house = furnished(box_only(name, (2.5, 1.4, 0.02), (1.1, 0.7, 0.04)))
+    item = of(house)
+    assert "piece:box" not in item.tags
+    np.testing.assert_allclose(np.ptp(item.bounds, axis=0)[:2], [1.1, 0.7], atol=2e-3)
+    assert item.bounds[0, 2] == pytest.approx(0.0, abs=2e-3)
+    materials = [house.materials[s.material] for s in item.surfaces]
+    assert len([m for m in materials if m.texture_id]) == n_textures
+    assert (MaterialKind.MIRROR in [m.kind for m in materials]) == (name == "mirror")
 
 
 @pytest.mark.parametrize("way", [(0.0, 1.0), (0.0, -1.0), (1.0, 0.0), (-1.0, 0.0)])
