@@ -97,7 +97,7 @@ test-slow: setup ## the tests that take minutes
 
 test-farm: export PBRS_SETUP_ALSO := faketime
 test-farm: setup ## the farm's tests that really kill processes
-	$(BIN)/pytest -m chaos
+	$(BIN)/pytest -n 4 -m chaos
 
 test-infra: setup ## real S3, Docker, Slurm: endpoints from the environment (docs/farm/settings.md)
 	$(BIN)/pytest -m infra -rs

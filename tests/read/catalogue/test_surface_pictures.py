@@ -57,7 +57,9 @@ def test_a_large_library_gives_some_of_each_kind(tmp_path: Path) -> None:
     assert len(catalogue_from([], given=[path]).pictures) == MOST_OF_A_GROUP
 
 
-@pytest.mark.parametrize("data", [b"", b"PK\3\4 damaged", library_bytes([])])
+@pytest.mark.parametrize(
+    "data", [b"", b"PK\3\4 damaged", library_bytes([])], ids=["empty", "damaged", "no texture"]
+)
 def test_a_damaged_texture_library_is_refused(tmp_path: Path, data: bytes) -> None:
     path = tmp_path / "bad.sh3t"
     path.write_bytes(data)
