@@ -192,7 +192,7 @@ def _questions() -> dict[str, Any]:
             with (out / "blind_scores.csv").open() as file:
                 for row in csv.DictReader(file):
                     n += int(row["questions"])
-                    scores[f"{name} {row['question_type']}"] = float(row["blind_score"])
+                    scores[f"{name} {row['question_type']}"] = float(row["constant_score"])
     best = [score for name, score in scores.items() if name.split()[1] in _CHOICES_OF_FOUR]
     return {
         "sets.questions": n, "sets.questions_wrong": n_wrong, "sets.blind_best": max(best),

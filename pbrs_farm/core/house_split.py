@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final
 
@@ -71,3 +72,13 @@ def split_of_house(house: str, shares: SplitShares | None = None) -> str:
     if position < shares.train:
         return "train"
     return "val" if position < shares.train + shares.val else "test"
+
+
+def empty_splits(houses: Iterable[str], shares: SplitShares) -> list[str]:
+    """The splits with a share above 0 that get none of the houses, as few houses leave some.
+
+    >>> empty_splits(["studio"], SplitShares(0.5, 0.5, 0))
+    ['val']
+    """
+    used = {split_of_house(house, shares) for house in houses}
+    return [name for name in SPLITS if getattr(shares, name) > 0 and name not in used]

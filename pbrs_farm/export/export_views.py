@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from pbrs_farm.core import keys
 from pbrs_farm.core.checked_calls import as_words, checked_call
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.core.house_split import SPLITS, SplitShares, split_of_house
+from pbrs_farm.core.house_split import SPLITS, SplitShares, empty_splits, split_of_house
 from pbrs_farm.export.chosen_view import Choice, ChosenView
 from pbrs_farm.export.form import LEFT_OUT, REMARKS, ViewForm, all_forms, form_of, options_from
 from pbrs_farm.formats.class_map import class_map
@@ -78,6 +78,9 @@ def export(
             form.write([ChosenView(v, choice) for v in split_entries], part, choice)
         if form.finish is not None:
             form.finish(scratch, tuple(filter(None, by_split)), choice)
+        if shares is not None and (empty := empty_splits((v.house.id for v in entries), shares)):
+            with (scratch / REMARKS).open("a", encoding="utf-8") as remarks:
+                remarks.write(f"no home falls into {' and '.join(empty)}: export more homes\n")
         return len(entries), len(files_below(scratch))
 
 

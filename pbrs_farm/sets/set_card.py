@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pbrs_farm
 from pbrs_farm.core import keys
-from pbrs_farm.core.house_split import SPLITS, home_of, split_of_house
+from pbrs_farm.core.house_split import SPLITS, empty_splits, home_of, split_of_house
 from pbrs_farm.curate.teaching_rules import RuleVerdict
 from pbrs_farm.sets.data_set import DataSet, SetPart
 
@@ -16,7 +16,7 @@ MadeViews = tuple[SetPart, Path, Sequence[RuleVerdict], Mapping[str, int]]
 """A part, its root, the views of its forms, and reason -> number of views left out."""
 
 _COMMAND = """```sh
-pbrs-farm make {file} --out {name}   # makes the same files again
+pbrs-farm make {file} --out {name}   # makes the same files again, from this file and those that it names
 sha256sum --check --quiet SHA256SUMS # prints nothing if no file has changed
 ```"""
 
@@ -32,7 +32,7 @@ def card_text(data_set: DataSet, made_views: Sequence[MadeViews]) -> str:
         _table(
             ("part", "split", "homes", "houses", "views"), list(_split_rows(data_set, made_views))
         ),
-        _split_text(data_set),
+        _split_text(data_set, made_views),
         *(_part_text(*of) for of in made_views),
         "## Forms",
         _forms_text(data_set),
@@ -64,14 +64,16 @@ def _split_rows(data_set: DataSet, made_views: Sequence[MadeViews]) -> Iterator[
                 yield part.name, split, len(homes), len(houses), len(split_rows)
 
 
-def _split_text(data_set: DataSet) -> str:
+def _split_text(data_set: DataSet, made_views: Sequence[MadeViews]) -> str:
     shares = data_set.shares
     if shares is None:
         return (
             "It is not split. Split it by home, not by view: rooms of a home share their furniture."
         )
     text = "/".join(f"{100 * share:g}" for share in (shares.train, shares.val, shares.test))
-    return f"Split {text} by home: all views of a home, however it is dressed, are in one part."
+    empty = empty_splits((v.house for _p, _r, verdicts, _n in made_views for v in verdicts), shares)
+    warning = f" No home falls into {' and '.join(empty)}: use more homes." if empty else ""
+    return f"Split {text} by home: all views of a home, however it is dressed, are in one part.{warning}"
 
 
 def _part_text(

@@ -345,6 +345,9 @@ def test_a_split_is_a_folder_of_its_own_for_each_form(root, tmp_path):
     assert (tmp_path / "coco/train/annotations.json").exists()
     export(root, tmp_path / "yolo", "yolo", shares=shares)
     assert "\ntrain: train/images\n" in (tmp_path / "yolo/data.yaml").read_text()
+    assert not any("no home falls" in line for line in remarks_of(tmp_path / "yolo"))
+    export(root, tmp_path / "empty", "coco", shares=SplitShares(0.98, 0.01, 0.01))
+    assert "no home falls into val and test: export more homes" in remarks_of(tmp_path / "empty")
 
 
 @pytest.mark.parametrize(

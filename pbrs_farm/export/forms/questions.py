@@ -173,11 +173,15 @@ def _write_blind_scores(questions: Sequence[Question], out: Path) -> list[str]:
     scores = blind_scores(questions)
     with (out / "blind_scores.csv").open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
-        writer.writerow(["question_type", "questions", "blind_score"])
-        writer.writerows([kind, n, f"{score:.3f}"] for kind, (n, score) in scores.items())
+        writer.writerow(["question_type", "questions", "constant_score", "words_score"])
+        writer.writerows(
+            [kind, n, f"{constant:.3f}", f"{words:.3f}"]
+            for kind, (n, constant, words) in scores.items()
+        )
     return [
-        f"{kind}: {n} questions, {score:.2f} for the best answer given blindly"
-        for kind, (n, score) in scores.items()
+        f"{kind}: {n} questions; without the picture, the best constant answer scores {constant:.2f}"
+        f" and the usual answer to the same words {words:.2f}"
+        for kind, (n, constant, words) in scores.items()
     ]
 
 

@@ -130,11 +130,13 @@ def mean_relative_accuracy(guess: float, truth: float) -> float:
     return float(np.mean([off < 1 - t for t in np.arange(0.5, 0.951, 0.05)]))
 
 
-def blind_scores(questions: Sequence[Question]) -> dict[str, tuple[int, float]]:
-    """Kind -> number of questions, and the score of the best constant answer.
+def blind_scores(questions: Sequence[Question]) -> dict[str, tuple[int, float, float]]:
+    """Kind -> number of questions, and the scores of two guessers that see no picture.
 
-    For choices, the larger of the most frequent letter's share and the most frequent answer's share; for
-    numbers, the best constant's mean relative accuracy.
+    The first gives the best constant answer: for choices, the larger of the most frequent letter's share
+    and the most frequent answer's share; for numbers, the best constant's mean relative accuracy. The
+    second reads the question: it gives the usual answer of the other questions with the same words,
+    the most frequent one or the median, and that of all others if there is none.
     """
     by_kind: dict[str, list[Question]] = defaultdict(list)
     for question in questions:
@@ -151,5 +153,26 @@ def blind_scores(questions: Sequence[Question]) -> dict[str, tuple[int, float]]:
                 float(np.mean([mean_relative_accuracy(guess, t) for t in truths]))
                 for guess in sorted(set(truths))
             )
-        scores[kind] = len(of_kind), best
+        scores[kind] = len(of_kind), best, _score_by_words(of_kind)
     return scores
+
+
+def _score_by_words(questions: Sequence[Question]) -> float:
+    """The mean score of the answer that other questions with the same words suggest."""
+    if len(questions) < 2:
+        return 0.0
+    by_words: dict[str, list[int]] = defaultdict(list)
+    for k, question in enumerate(questions):
+        by_words[question.text].append(k)
+    scores = []
+    for k, question in enumerate(questions):
+        others = [n for n in by_words[question.text] if n != k] or [
+            n for n in range(len(questions)) if n != k
+        ]
+        if question.options:
+            answers = Counter(questions[n].answer for n in others)
+            scores.append(float(answers.most_common(1)[0][0] == question.answer))
+        else:
+            guess = float(np.median([float(questions[n].ground_truth) for n in others]))
+            scores.append(mean_relative_accuracy(guess, float(question.ground_truth)))
+    return float(np.mean(scores))
