@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from pbrs_farm.core.errors import StoreFailed as StoreFailed
     from pbrs_farm.core.recipe import Recipe as Recipe
     from pbrs_farm.export.export_views import export as export_views
+    from pbrs_farm.scene.generated_models import generate_model as generate_model
     from pbrs_farm.scene.home import Home as Home
     from pbrs_farm.scene.home import load as load
     from pbrs_farm.scene.home import make as make
@@ -36,7 +37,6 @@ if TYPE_CHECKING:
     from pbrs_farm.scene.pictures import film as film
     from pbrs_farm.scene.pictures import render as render
     from pbrs_farm.scene.pictures import render_homes as render_homes
-    from pbrs_farm.scene.things import thing as thing
     from pbrs_farm.views.open_views import open_views as open
     from pbrs_farm.views.packing.pack_shards import pack as pack
     from pbrs_farm.views.packing.packing_plan import Packing as Packing
@@ -63,6 +63,7 @@ _PUBLIC: Final = {
     "SampleRequest": "pbrs_farm.views.view_sample:SampleRequest",
     "export_views": "pbrs_farm.export.export_views:export",
     "film": "pbrs_farm.scene.pictures:film",
+    "generate_model": "pbrs_farm.scene.generated_models:generate_model",
     "load": "pbrs_farm.scene.home:load",
     "make": "pbrs_farm.scene.home:make",
     "model": "pbrs_farm.scene.models:model",
@@ -71,7 +72,6 @@ _PUBLIC: Final = {
     "open": "pbrs_farm.views.open_views:open_views",
     "render": "pbrs_farm.scene.pictures:render",
     "render_homes": "pbrs_farm.scene.pictures:render_homes",
-    "thing": "pbrs_farm.scene.things:thing",
 }
 
 __all__ = [
@@ -92,6 +92,7 @@ __all__ = [
     "__version__",
     "export_views",
     "film",
+    "generate_model",
     "load",
     "make",
     "model",
@@ -100,7 +101,6 @@ __all__ = [
     "pack",
     "render",
     "render_homes",
-    "thing",
 ]
 
 

@@ -64,7 +64,7 @@ def changed(drawn: P, given: Mapping[str, object], name: str) -> P:
     checked = {}
     for key, value in given.items():
         if key not in hints:
-            raise BadInput("thing", name, f"has no parameter {key!r}", hint=_near(key, hints))
+            raise BadInput(name, "", f"has no parameter {key!r}", hint=_near(key, hints))
         checked[key] = _checked(value, hints[key], getattr(drawn, key), f"{name}, {key}")
     return replace(drawn, **checked)  # type: ignore[type-var]
 
@@ -92,7 +92,7 @@ def _checked(value: Any, hint: Any, drawn: Any, place: str) -> Any:
         if isinstance(limits, Choice):
             if value not in limits.words:
                 hint = hint_of_choice(str(value), limits.words)
-                raise BadInput("thing", place, f"{value!r} is not a choice", hint=hint)
+                raise BadInput(place, "", f"{value!r} is not a choice", hint=hint)
             return value
         is_whole = kind is not int or (isinstance(value, int) and not isinstance(value, bool))
         return (
@@ -131,4 +131,4 @@ def colour(value: Any, place: str) -> tuple[float, float, float]:
 
 
 def _refuse(value: Any, place: str, expected: str) -> NoReturn:
-    raise BadInput("thing", place, f"{value!r} does not fit, expected {expected}")
+    raise BadInput(place, "", f"{value!r} does not fit, expected {expected}")

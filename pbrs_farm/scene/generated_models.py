@@ -1,4 +1,4 @@
-"""Furniture and small items generated on request, by pf.thing. Effects: writes a GLB into the cache."""
+"""Furniture and small items generated on request, by pf.generate_model. Effects: writes a GLB into the cache."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ _WORDS: Final = {
 
 
 @checked_call
-def thing(name: str, *, seed: Whole = 0, style: str = "", **parameters: object) -> Model:
+def generate_model(name: str, *, seed: Whole = 0, style: str = "", **parameters: object) -> Model:
     """A piece of furniture or a small item of the generated catalogue, as a model to place.
 
     name: "bed", "sofa", "cup"; docs/dress/catalogue.md lists all. seed: of all values that are not
@@ -55,7 +55,7 @@ def thing(name: str, *, seed: Whole = 0, style: str = "", **parameters: object) 
     Raises BadInput for an unknown name or parameter, with the near names, and for a value that does
     not fit.
 
-        >>> bed = pf.thing("bed", width_m=1.6, slats=True)
+        >>> bed = pf.generate_model("bed", width_m=1.6, slats=True)
         >>> round(bed.size_m[0], 3)
         1.6
     """
@@ -65,7 +65,7 @@ def thing(name: str, *, seed: Whole = 0, style: str = "", **parameters: object) 
     if item_name in THINGS:
         if parameters:
             raise BadInput(
-                "thing", name, f"has no parameter {next(iter(parameters))!r}", hint="of seed, style"
+                name, "", f"has no parameter {next(iter(parameters))!r}", hint="of seed, style"
             )
         piece, shape = THINGS[item_name].make(rng, taste)
     else:
@@ -99,7 +99,7 @@ def _own_name(name: str) -> str:
     kind = kind if kind in families() or kind in THINGS else called.get(kind, kind)
     if kind not in families() and kind not in THINGS:
         names = {*families(), *THINGS, *_WORDS, *called}
-        raise BadInput("thing", name, "no such object to generate", hint=did_you_mean(name, names))
+        raise BadInput(name, "", "no such object to generate", hint=did_you_mean(name, names))
     return kind
 
 
@@ -128,7 +128,7 @@ def _change(family: Family, name: str, chosen: Mapping[str, object]) -> Callable
         return lambda drawn: changed(drawn, chosen, name)
     if chosen:
         text = f"has no parameter {next(iter(chosen))!r}"
-        raise BadInput("thing", name, text, hint=f"of {', '.join((*_SIZES, 'seed', 'style'))}")
+        raise BadInput(name, "", text, hint=f"of {', '.join((*_SIZES, 'seed', 'style'))}")
     return None
 
 

@@ -1,4 +1,4 @@
-"""pf.thing makes generated furniture with the parameters that it is given."""
+"""pf.generate_model generates furniture with given parameters."""
 
 from __future__ import annotations
 
@@ -27,28 +27,28 @@ def _own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_bed_has_the_width_and_the_slats_that_are_asked_for() -> None:
-    bed = pf.thing("bed", width_m=1.6, slats=True, mattress=False, seed=3)
-    board = pf.thing("bed", width_m=1.6, mattress=False, seed=3)
+    bed = pf.generate_model("bed", width_m=1.6, slats=True, mattress=False, seed=3)
+    board = pf.generate_model("bed", width_m=1.6, mattress=False, seed=3)
     assert bed.size_m[0] == pytest.approx(1.6, abs=1e-5)
     assert len(bed.shape.triangles) > len(board.shape.triangles)
     assert bed.ref.nyu40 == BED
 
 
 def test_the_seed_decides_what_is_not_given() -> None:
-    one, same, other = (pf.thing("sofa", seed=seed) for seed in (1, 1, 2))
+    one, same, other = (pf.generate_model("sofa", seed=seed) for seed in (1, 1, 2))
     assert one.ref == same.ref
     assert one.ref.sha256 != other.ref.sha256
 
 
 def test_a_colour_stands_for_a_material() -> None:
-    bed = pf.thing("bed", head="panel", frame="#ff0000")
+    bed = pf.generate_model("bed", head="panel", frame="#ff0000")
     assert any(
         m.diffuse == pytest.approx((0.95, 0.02, 0.02), abs=0.01) for m in bed.shape.materials
     )
 
 
 def test_a_thing_stands_in_a_home() -> None:
-    cup = pf.thing("cup", seed=4)
+    cup = pf.generate_model("cup", seed=4)
     home = pf.load("builtin").place(cup, on="dining table", seed=1)
     assert home.items["cup 1"].name == "cup"
 
@@ -69,7 +69,7 @@ def test_a_thing_stands_in_a_home() -> None:
 )
 def test_what_does_not_fit_is_one_clear_error(call: dict[str, Any], error: str) -> None:
     with pytest.raises(pf.BadInput, match=error):
-        pf.thing(**call)
+        pf.generate_model(**call)
 
 
 @pytest.mark.quick(4)
@@ -90,7 +90,7 @@ def test_every_choice_of_a_family_makes_a_closed_piece(name: str) -> None:
             choice.words if isinstance(choice, Choice) else (True, False) if hint is bool else ()
         )
         for value in values:
-            model = pf.thing(name, seed=4, **{field: value})
+            model = pf.generate_model(name, seed=4, **{field: value})
             assert closed_edge_share(np.round(model.shape.triangles, 5)) > 0.999, (field, value)
 
 
