@@ -84,7 +84,7 @@ class DressFields(FieldGroup):
     surfaces: Share = field(1.0, "share of rooms with new floors and walls")
     parts: Share = field(1.0, "share of furniture with new wood, cloth and metal")
     swap: Share = field(0.7, "share of furniture replaced by another model of its class")
-    own_share: Share = field(
+    library_share: Share = field(
         0.5,
         "probability of a piece from your own libraries where one fits; 0 = as likely as any other",
     )
@@ -148,7 +148,7 @@ class RepairFields(FieldGroup):
     shade_transmission: float = field(
         0.4, "diffuse transmission of shades that enclose their bulb", 0, 1
     )
-    min_escape: float = field(
+    min_light_output_ratio: float = field(
         0.2, "lamps with a lower light output ratio get a translucent shade", 0, 1
     )
     bulb_radius_m: float = field(

@@ -140,7 +140,7 @@ _TWIN_MOST: Final = 0.8
 RULES: Final = (
     TeachingRule("black", "black", 0.5, darkness),
     TeachingRule("plane", "one-plane", 0.8, plane_share),
-    TeachingRule("cut", "cut-things", 0.9, cut_share),
+    TeachingRule("cut", "cropped-objects", 0.9, cut_share),
 )
 REASONS: Final = {**{rule.name: rule.reason for rule in RULES}, _TWINS: "twin"}
 """Values of --by -> reason for the rejection, in the order of the checks."""

@@ -96,7 +96,7 @@ def dressed_house(
 ) -> Dressed:
     """Like dress, with the data for refit_after_repair. on_progress: called with the finished share of the passes."""
     bank = PaintedBank(catalogue.painted_folder)
-    with closing(MutableHouse(house, seed, fields.mess, bank, fields.own_share)) as mutable:
+    with closing(MutableHouse(house, seed, fields.mess, bank, fields.library_share)) as mutable:
         return Dressed(
             *_dressed(mutable, catalogue, fields, on_progress), mutable.used, len(house.items)
         )

@@ -184,7 +184,7 @@ def _dress_depends(source: SourceRef, recipe: Recipe) -> list[object]:
     plugins = filter(None, recipe.dress.passes.split(":"))
     catalogue, marks = catalogue_of(recipe.dress), marks_in_digest("passes", plugins)
     if not catalogue.own:
-        del fields["own_share"]
+        del fields["library_share"]
     return [dress_seed(source, recipe), fields, catalogue.digest, marks]
 
 

@@ -219,7 +219,7 @@ def test_dressing_hands_the_recipe_s_share_on(monkeypatch: pytest.MonkeyPatch) -
         return mutable.source, None
 
     monkeypatch.setattr(dressing, "_dressed", seen)
-    fields = DressFields(own_share=0.3)
+    fields = DressFields(library_share=0.3)
     dressing.dressed_house(house(_item("d", DRESSER, [2, 0, 1.1], 17)), EMPTY, fields, 1)
     assert shares == [0.3]
 

@@ -109,7 +109,7 @@ def test_the_share_of_one_s_own_library_counts_where_there_is_one(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     (source,) = variants(resolve("builtin"), [1])
-    recipes = [with_settings(Recipe(), {"dress.own_share": share}) for share in (0.5, 0.2)]
+    recipes = [with_settings(Recipe(), {"dress.library_share": share}) for share in (0.5, 0.2)]
     for own, n_digests in ((frozenset(), 1), (frozenset({"mine#chair"}), 2)):
         library = replace(EMPTY, own=own)
         monkeypatch.setattr(passes_module, "catalogue_of", lambda _fields, held=library: held)

@@ -32,7 +32,7 @@ OF_A_CANDIDATE: Final = {
 OF_A_SELECTION: Final = {
     "black": "the picture is black",
     "one-plane": "one plane fills the picture",
-    "cut-things": "the edge of the picture crops nearly all objects",
+    "cropped-objects": "the edge of the picture crops nearly all objects",
     "twin": "a kept view of the room is almost the same",
     "failed": "the view was not rendered",
     "unscored": "the view has no score",

@@ -32,7 +32,7 @@ def with_shades(
     fields: RepairFields,
     occluder_from: Callable[[House], Occluder],
 ) -> tuple[House, list[SourceRepair]]:
-    """The light output ratio of every source; shades where it is below fields.min_escape.
+    """The light output ratio of every source; shades where it is below fields.min_light_output_ratio.
 
     The ratio is what share of a bulb's light leaves the lamp. sources: of `with_bulbs`, in whose
     report the ratios go. Only whole connected parts of a surface become shades; LightPart.escape
@@ -95,7 +95,7 @@ def _with_more_shades(
         # Stop once enough light escapes, or no part blocks much of the remainder.
         worst = int(np.argmax(output.blocked)) if len(output.blocked) else -1
         mine = sum(scene.parts[p][0] == item for p in shades)
-        if output.ratio >= fields.min_escape or mine >= _MOST_SHADES:
+        if output.ratio >= fields.min_light_output_ratio or mine >= _MOST_SHADES:
             return output
         if worst < 0 or output.blocked[worst] < _LEAST_BLOCKED:
             return output
