@@ -83,7 +83,7 @@ def _fill(house: MutableHouse, air: FreeAir, room: Room, share: float) -> None:
         hidden += mean_shadow_m2(corners_of_surfaces(item.surfaces))
         if hidden >= target:
             return
-    text = f"things in the air hide {hidden:.1f} of {target:.1f} m2: there is no more place"
+    text = f"floating items hide {hidden:.1f} of {target:.1f} m2: no more free space"
     house.notes.append(Note(FEW, room.id, text))
 
 

@@ -62,13 +62,13 @@ def summary_of_dressing(report: DressReport) -> str:
 
 
 _GATE_TEXT = {
-    "penetration": "no two things share more than 1 cm",
-    "support": "nothing floats or sinks by more than 2 mm",
-    "doors": "every door swings free, with 0.8 m before it",
-    "windows": "no window is covered by furniture by more than a fifth",
-    "path": "a way 0.6 m wide joins the doors that it joined before",
-    "fronts": "doors and drawers of furniture open, but for chairs that one pushes aside",
-    "must_haves": "every room has the beds, seats and fittings that it had",
+    "penetration": "no two items overlap by more than 1 cm",
+    "support": "no item floats or sinks by more than 2 mm",
+    "doors": "every door opens, with 0.8 m of free floor",
+    "windows": "furniture covers at most a fifth of a window",
+    "path": "doors stay connected by a path 0.6 m wide",
+    "fronts": "doors and drawers of furniture open, except behind movable chairs",
+    "must_haves": "every room keeps its beds, seats and fittings",
 }
 
 
@@ -80,7 +80,7 @@ def _sentences(report: DressReport) -> Iterator[str]:
         named = ", ".join(f"{n} {group.replace('_', ' ')}" for group, n in groups)
         yield f"{part}: {sum(n for _group, n in groups)} added: {named}."
     for part, n in sorted(report.changed.items()):
-        yield f"{part}: {n} things of the home changed."
+        yield f"{part}: {n} items of the home changed."
     # Say what did not, and why.
     for part, reasons in _by_part(report.refused).items():
         named = ", ".join(f"{n} {reason}" for reason, n in reasons)
@@ -88,12 +88,12 @@ def _sentences(report: DressReport) -> Iterator[str]:
     for gate in report.gates:
         text = _GATE_TEXT.get(gate.name, gate.name)
         if gate.n_left:
-            yield f"GATE BROKEN: {text}: {gate.n_left} still do."
+            yield f"GATE BROKEN: {text}: {gate.n_left} violations."
         else:
-            out = f"; {gate.n_taken_out} taken out or put back for it" if gate.n_taken_out else ""
+            out = f"; {gate.n_taken_out} removed or put back" if gate.n_taken_out else ""
             yield f"{text}: holds ({gate.n_checked} measured{out})."
     if report.moved_after_repair:
-        yield f"{report.moved_after_repair} things hang on the wall that repair left of two."
+        yield f"{report.moved_after_repair} items moved to the wall that repair kept of two."
     owed = [c for c in report.credits if is_owed(c)]
     if report.credits:
         yield f"{len(report.credits)} models and pictures of libraries used, {len(owed)} of them CC-BY."

@@ -74,8 +74,8 @@ def _reach(house: House, index: int, part: str, share: float) -> tuple[float, tu
     value, stopped_by = free_value(SceneTriangles(house.items), index, part, target)
     if target - value <= _NEAR:
         return value, ()
-    text = f"stands open by {_amount(joint, value)} of {_amount(joint, target)}"
-    return value, (Note(STOPPED, f"{item.id}/{part}", f"{text}: {stopped_by} is in its way"),)
+    text = f"is open by {_amount(joint, value)} of {_amount(joint, target)}"
+    return value, (Note(STOPPED, f"{item.id}/{part}", f"{text}: {stopped_by} blocks it"),)
 
 
 def _value(joint: Joint, share: float) -> float:

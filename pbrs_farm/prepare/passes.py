@@ -327,8 +327,8 @@ PASSES: Final = (
     Pass("dress", 12, _dress, _is_dressed, _dress_depends),
     # Its version counts the generated ceiling lamps, too.
     Pass("repair", 5, _repair, _is_home),
-    Pass("open", 1, _leave_open, _stands_open, _open_depends),
-    Pass("float", 1, _float, _has_floating_things, _float_depends),
+    Pass("open", 2, _leave_open, _stands_open, _open_depends),
+    Pass("float", 2, _float, _has_floating_things, _float_depends),
     Pass(
         "surroundings",
         3,

@@ -47,9 +47,7 @@ def house_of_plan(given: GivenFile, fields: ReadFields) -> House:
     n_lost = sum(len(s.things) for s in file.storeys) - len(items)
     if n_lost:
         notes.add(
-            "box-only-left-out",
-            "",
-            f"{n_lost} named things are not drawn: by their class, or no box",
+            "box-only-left-out", "", f"{n_lost} named items are dropped, by class or without a box"
         )
     its_source = Source(PLAN, path.name, digest_of_regular(path))
     return replace(

@@ -58,5 +58,5 @@ def _with_far_noted(house: House, fields: ReadFields) -> House:
         bounds = item.bounds[:, [0, 2]]
         away = float(np.maximum(bounds[0] - high, low - bounds[1]).max())
         if away > _FAR_M:
-            notes.add("far-away", item.id, f"{item.name!r} stands {away:.0f} m from the rooms")
+            notes.add("far-away", item.id, f"{item.name!r} is {away:.0f} m from the rooms")
     return replace(house, notes=(*house.notes, *notes.all())) if notes.all() else house

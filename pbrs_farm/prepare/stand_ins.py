@@ -109,7 +109,7 @@ def with_stand_ins(house: House, catalogue: Catalogue, how: How) -> House:
         return house
     other_items = replace(house, items=tuple(i for i in house.items if BOX_ONLY not in i.tags))
     if how == "none":
-        text = f"{len(box_only)} things that are given by their boxes alone are left out"
+        text = f"{len(box_only)} items given only as boxes are left out"
         return replace(
             other_items, notes=(*house.notes, Note("box-only-left-out", house.source.file, text))
         )
@@ -183,7 +183,7 @@ class _Scene:
         ):
             if names:
                 most = ", ".join(f"{n} {name}" for name, n in names.most_common(5))
-                text = f"{names.total()} things {text}: {most}"
+                text = f"{names.total()} items {text}: {most}"
                 notes.append(Note(kind, self.house.source.file, text))
         return notes
 

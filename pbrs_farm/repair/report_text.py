@@ -18,7 +18,7 @@ def summary_of_report(report: RepairReport) -> str:
     Programs read the report's fields instead.
     """
     if report.was_repaired:
-        return f"{report.house_id} was repaired before; nothing was changed."
+        return f"{report.house_id} was repaired before; no changes."
     lines = [
         *_lines_of_structure(report),
         *_lines_of_lamps(report),
@@ -36,14 +36,14 @@ def _lines_of_structure(report: RepairReport) -> Iterator[str]:
         yield f"{_n(len(living), 'person or plant', 'persons and plants')} taken out."
     gone = [r.item_id for r in report.removed if r.reason not in ("person", "plant")]
     if gone:
-        yield f"{_n(len(gone), 'wall')} lay wholly inside others or in an opening: {_some(gone)}."
+        yield f"{_n(len(gone), 'wall')} were inside others or in an opening, and removed: {_some(gone)}."
     faces = report.faces
     if faces.n_degenerate_dropped:
         yield f"{_n(faces.n_degenerate_dropped, 'face')} without area dropped."
     if faces.n_turned:
-        yield f"{_n(faces.n_turned, 'face')} looked against their own normals and were turned."
+        yield f"{_n(faces.n_turned, 'face')} faced against their normals and were turned."
     if report.mirrors:
-        yield f"{_n(len(report.mirrors), 'mirror')} that did not mirror got a mirror's surface."
+        yield f"{_n(len(report.mirrors), 'mirror')} without a mirror's surface got one."
     s = report.structure
     if s.n_walls_thickened:
         yield f"{_n(s.n_walls_thickened, 'wall')} had no thickness and got one."
@@ -57,22 +57,22 @@ def _lines_of_structure(report: RepairReport) -> Iterator[str]:
     if s.n_joints_closed:
         yield f"{_n(s.n_joints_closed, 'place')} where walls missed each other closed."
     if s.n_stairwells_closed:
-        yield f"{_n(s.n_stairwells_closed, 'floor or ceiling', 'floors or ceilings')} carried on over stairwells without a room."
+        yield f"{_n(s.n_stairwells_closed, 'floor or ceiling', 'floors or ceilings')} extended over stairwells without a room."
     if report.added_ceilings:
         yield f"{_n(len(report.added_ceilings), 'room')} had walls and no ceiling and got one at the walls' height: {_some(report.added_ceilings)}."
     if s.n_openings:
         yield f"{s.n_openings_cut} of {_n(s.n_openings, 'opening')} cut through the walls."
     if s.n_frames_moved:
-        yield f"{_n(s.n_frames_moved, 'piece')} lay in the faces of walls: moved 0.5 mm out."
+        yield f"{_n(s.n_frames_moved, 'piece')} coincided with faces of walls: moved out by 0.5 mm."
     if s.n_parts_moved:
-        yield f"{_n(s.n_parts_moved, 'part')} lay in the faces of others: moved 0.5 mm out."
+        yield f"{_n(s.n_parts_moved, 'part')} coincided with other faces: moved out by 0.5 mm."
     for wall in s.walls_lost:
         yield (
-            f"WALL LOST: of wall {wall.item_id} repair left {wall.after_m2:.1f} of "
+            f"WALL LOST: of wall {wall.item_id} repair kept {wall.after_m2:.1f} of "
             f"{wall.before_m2:.1f} m2."
         )
     for thing in s.left_as_is:
-        yield f"{thing.what} {thing.id} left as it is: {thing.reason}."
+        yield f"{thing.what} {thing.id} not repaired: {thing.reason}."
 
 
 def _lines_of_lamps(report: RepairReport) -> Iterator[str]:
@@ -81,19 +81,19 @@ def _lines_of_lamps(report: RepairReport) -> Iterator[str]:
         # A radius that only rounding changed is not smaller.
         smaller = sum(s.radius_m < 0.999 * s.radius_given_m for s in added)
         moved = sum(s.moved_m > 0 for s in added)
-        more = f", {smaller} of them smaller than given to fit" if smaller else ""
-        more += f", {moved} moved out of the lamp's own mesh" if moved else ""
-        yield f"{_n(len(added), 'lamp')} had no part that shines and got a bulb{more}."
+        more = f", {smaller} of them reduced to fit" if smaller else ""
+        more += f", {moved} moved out of the lamp's mesh" if moved else ""
+        yield f"{_n(len(added), 'lamp')} had no emitter and got a bulb{more}."
     shaded = sorted({s.item_id for s in report.sources if s.shades})
     if shaded:
-        yield f"{_n(len(shaded), 'lamp')} kept their light in; what encloses it is a shade now: {_some(shaded)}."
+        yield f"{_n(len(shaded), 'lamp')} were closed; the enclosing surface became a shade: {_some(shaded)}."
     if report.fallback_lights:
         yield f"{_n(len(report.fallback_lights), 'room')} had neither lamp nor window and got a ceiling light: {_some(report.fallback_lights)}."
     if report.added_lamps:
-        yield f"{_n(len(report.added_lamps), 'room')} where people live had no lamp, or too weak ones; a ceiling light was added for the evening: {_some(report.added_lamps)}."
+        yield f"{_n(len(report.added_lamps), 'room')} where people live had no lamp, or a weak one, and got a ceiling light: {_some(report.added_lamps)}."
 
     if report.brightened_lamps:
-        yield f"{_n(len(report.brightened_lamps), 'room')} had too weak ceiling lamps, which are brighter now: {_some(report.brightened_lamps)}."
+        yield f"{_n(len(report.brightened_lamps), 'room')} had weak ceiling lamps, which were made brighter: {_some(report.brightened_lamps)}."
 
 
 def _lines_of_rooms(report: RepairReport) -> Iterator[str]:
@@ -127,8 +127,8 @@ def _lines_of_leaks(report: RepairReport) -> Iterator[str]:
 def _lines_of_furniture(report: RepairReport) -> Iterator[str]:
     f = report.furniture
     if f.n_unaudited or f.n_unmeasured:
-        more = f", {_n(f.n_unaudited, 'piece')} not looked at" if f.n_unaudited else ""
-        yield f"Too much furniture stands in one place: the audit is of a part of it{more}."
+        more = f", {_n(f.n_unaudited, 'piece')} not checked" if f.n_unaudited else ""
+        yield f"Too much furniture in one place: only a part of it was checked{more}."
     if f.overlaps:
         # Name the pair that shares most.
         worst = max(f.overlaps, key=lambda o: o.volume_m3)
@@ -140,7 +140,7 @@ def _lines_of_furniture(report: RepairReport) -> Iterator[str]:
         yield f"{_n(len(f.floating), 'piece')} touch nothing: {_some([p.item_id for p in f.floating])}."
     if f.duplicates:
         pairs = [f"{a} and {b}" for a, b in f.duplicates]
-        yield f"{_n(len(pairs), 'piece')} stand twice in one place: {_some(pairs)}."
+        yield f"{_n(len(pairs), 'piece')} are duplicates in one place: {_some(pairs)}."
 
 
 def _n(count: int, one: str, many: str = "") -> str:

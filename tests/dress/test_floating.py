@@ -103,4 +103,4 @@ def test_a_room_without_place_is_told() -> None:
     after = with_floating_things(house(FLOOR, *blocks), 0.3, 1)
     (note,) = [n for n in after.notes if n.kind == FEW]
     assert note.place == "0_0"
-    assert "there is no more place" in note.text
+    assert "no more free space" in note.text

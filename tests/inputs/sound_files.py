@@ -37,7 +37,7 @@ def sound_files(n_triangles: int = N_TRIANGLES) -> dict[str, SoundFile]:
     )
 
     plans = {
-        "plan of one's own": plan_files.write_own,
+        "custom plan": plan_files.write_own,
         "Swiss Dwellings": plan_files.write_swiss,
         "ProcTHOR and Holodeck": plan_files.write_procthor,
         "SpatialLM": plan_files.write_spatial_lm,

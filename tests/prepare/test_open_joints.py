@@ -62,7 +62,7 @@ def test_what_is_in_the_way_is_told() -> None:
     assert values(after)[0] == pytest.approx(0.18 - 0.004, abs=0.002)
     (note,) = [n for n in after.notes if n.kind == STOPPED]
     assert note.place == "cupboard/front"
-    assert note.text == "stands open by 0.18 m of 0.40 m: chair is in its way"
+    assert note.text == "is open by 0.18 m of 0.40 m: chair blocks it"
 
 
 def test_two_fronts_that_meet_in_a_corner_do_not_pass_through_each_other() -> None:

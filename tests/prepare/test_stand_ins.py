@@ -176,7 +176,7 @@ def test_a_box_that_reaches_into_a_wall_moves_inwards_by_the_overlap() -> None:
 def test_a_box_that_lies_mostly_in_a_wall_is_left_out_with_a_note() -> None:
     house = furnished(box_only("bed", (-0.1, 0.4, 2.0), (0.95, 0.8, 2.05)))
     assert not any(STAND_IN in i.tags for i in house.items)
-    assert [n.text for n in house.notes] == ["1 things reach into walls and are left out: 1 bed"]
+    assert [n.text for n in house.notes] == ["1 items reach into walls and are left out: 1 bed"]
 
 
 def test_what_no_piece_fits_is_a_plain_box_of_its_size_with_a_note() -> None:

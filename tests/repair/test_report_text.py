@@ -64,7 +64,7 @@ def test_a_crowd_is_audited_in_part_and_the_rest_is_told(monkeypatch: pytest.Mon
     assert len(audit.overlaps) == 2
     assert (audit.n_unaudited, audit.n_unmeasured) == (5, 1)
     text = summary_of_report(RepairReport(house_id="h", furniture=audit))
-    assert "the audit is of a part of it, 5 pieces not looked at." in text
+    assert "only a part of it was checked, 5 pieces not checked." in text
 
 
 def test_leaks_of_no_ray_are_not_measured_rather_than_none() -> None:
@@ -77,7 +77,7 @@ def test_the_words_say_what_was_wrong(repaired: tuple[House, RepairReport]) -> N
     text = summary_of_report(repaired[1])
     assert "1 person or plant taken out." in text
     assert "2 floors and 2 ceilings had no thickness" in text
-    assert "1 lamp had no part that shines and got a bulb." in text
+    assert "1 lamp had no emitter and got a bulb." in text
     assert "none reached the sky; 100 % of the floor area is in closed rooms" in text
     leaks = repaired[1].leaks
     assert leaks is not None

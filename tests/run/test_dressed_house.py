@@ -155,7 +155,7 @@ def test_the_report_tells_in_plain_words_what_came_in_and_which_gate_broke():
     text = summary_of_dressing(report)
     assert "walls: 3 added: 3 picture." in text
     assert "clutter: not done: 2 no room." in text
-    assert "GATE BROKEN: every door swings free" in text
+    assert "GATE BROKEN: every door opens" in text
     assert not report.is_sound
 
 

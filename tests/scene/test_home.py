@@ -234,7 +234,7 @@ def test_a_door_stops_before_what_stands_there_and_says_so(home: pf.Home, tmp_pa
     (joint,) = item(home, "door_inner").joints
     matrix = joint.motion(0.8)
     x, _y, z = matrix[:3, :3] @ far + matrix[:3, 3]
-    with pytest.warns(UserWarning, match="crate 1 is in its way"):
+    with pytest.warns(UserWarning, match="crate 1 blocks it"):
         opened = home.place(crate(tmp_path), at=(x, 0.0, z)).open("door_inner")
     assert 0.4 < joint_row(opened)["value"] < 0.85
 

@@ -93,9 +93,9 @@ def _blocked(space: FurnishSpace, pieces: list[PlacedPiece]) -> list[str]:
     for piece in pieces:
         ground = _ground_rect(piece)
         if piece.elevation < 1.9 and any(_meet(ground, d) for d in space.doors.tolist()):
-            faults.append(f"{piece.piece.name} stands before a door")
+            faults.append(f"{piece.piece.name} blocks a door")
         if any(_meet(ground, o) for o in space.outside.tolist()):
-            faults.append(f"{piece.piece.name} stands in a wall")
+            faults.append(f"{piece.piece.name} is in a wall")
         top = piece.elevation + piece.height
         if piece.piece.group == "sink":
             top = 0.9

@@ -116,7 +116,7 @@ def _of_machine(path: Path, parsed: ParsedPlan, part: Part) -> PlanFile:
         things = [t._replace(x=t.x - x, z=t.z - z) for t in storey.things if _is_sound(t)]
         n_lost = len(storey.things) - len(things[:MAX_THINGS])
         for _ in range(min(n_lost, 1)):
-            left_out.add(f"{n_lost} things have no sound box, or are beyond {MAX_THINGS}")
+            left_out.add(f"{n_lost} items have no valid box, or exceed {MAX_THINGS}")
         storeys.append(PlanStorey(plan, tuple(things[:MAX_THINGS]), storey.name))
     return _choose_storeys(path, tuple(storeys), (*parsed.left_out, *left_out.lines()), part)
 

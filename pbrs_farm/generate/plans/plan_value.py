@@ -338,7 +338,7 @@ class _Openings:
 
 
 FORMAT = PlanFormat(
-    title="plan of one's own",
+    title="custom plan",
     files=".json or .geojson",
     order=180,
     brings="rooms, doors, windows",

@@ -164,7 +164,7 @@ def _thing(
     )
     size = assets.get(str(thing.assetId)) or usual_size(name)
     if size is None:
-        left_out.add(f"an object has no size: {ASSETS} does not lie beside the file, or lacks it")
+        left_out.add(f"an object has no size: {ASSETS} is not beside the file, or lacks it")
         return None
     width, height, depth = size
     p = thing.position

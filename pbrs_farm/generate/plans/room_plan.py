@@ -123,7 +123,7 @@ def _storey_of_scan(path: Path, scan: _Scan, left_out: LeftOut, *, is_top: bool)
             left_out.add(f"a wall over {_SPURIOUS_M:g} m with fewer than two edges is not a wall")
             continue
         if abs(pose[1, 1]) < _UPRIGHT:
-            left_out.add("a wall that leans stands upright")
+            left_out.add("a leaning wall is made upright")
         walls.append((surface, pose))
         top = _upper_edge_of(surface, pose)
         tops.append(top)
@@ -215,7 +215,7 @@ def _note_heights(tops: list[WallTop], height: float, left_out: LeftOut) -> None
     if max(heights, default=0.0) - min(heights, default=0.0) > _SAME_HEIGHT_M:
         low, high = min(heights), max(heights)
         text = f"walls of {low:.2f} to {high:.2f} m have one ceiling, at {height:.2f} m"
-        left_out.add(f"{text}: the scan tells of no slope between them")
+        left_out.add(f"{text}: the scan has no slope between them")
 
 
 def _floor_height(path: Path, scan: _Scan, walls: list[tuple[_Surface, F64]]) -> float:

@@ -126,9 +126,7 @@ def read_front3d(given: GivenFile, fields: ReadFields) -> House:
         if (item := pieces.item(p, f"piece_{k}")) is not None
     ]
     if pieces.n_missing:
-        text = (
-            f"{pieces.n_missing} pieces have no model: what their box and class tell stands there"
-        )
+        text = f"{pieces.n_missing} pieces have no model and are replaced by stand-ins"
         notes.add("missing-model", "furniture", f"{text}; --models DIR names 3D-FUTURE-model")
     items = [*walls, *parts, *structure.trim(), *furniture]
     areas = {r.id: float(shapely.Polygon(r.polygon).area) for r in rooms}
@@ -174,7 +172,7 @@ class _Paints:
         self._house, self._folder, self._notes = house, folder, notes
         self._known: dict[str, int] = {}
         if folder is None and any(m.get("jid") for m in house.materials.values()):
-            text = "3D-FRONT-texture does not lie beside or above the file: surfaces are painted"
+            text = "no 3D-FRONT-texture beside or above the file: surfaces are painted"
             notes.add("missing-texture", "material", text)
 
     def index(self, uid: str) -> int:

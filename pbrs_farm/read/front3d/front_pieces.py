@@ -140,7 +140,7 @@ class FrontModels:
             model = self._cache.model(f"{piece.jid}/raw_model.obj", f"{piece.jid}/model.mtl")
         except DamagedModel as error:
             self._notes.add(
-                "unreadable-model", piece.place, f"{error.message}; a stand-in is there"
+                "unreadable-model", piece.place, f"{error.message}; replaced by a stand-in"
             )
             return None
         return None if model is None else _without_shadow(model)

@@ -514,7 +514,7 @@ def note_unread(gltf: Gltf, notes: Notes) -> None:
     used = gltf.document.get("extensionsUsed")
     for name in used if isinstance(used, list) else []:
         if name not in UNDERSTOOD and name not in _UNSEEN:
-            notes.add(UNREAD, "extensionsUsed", f"{name} is not read: what it adds is not shown")
+            notes.add(UNREAD, "extensionsUsed", f"{name} is not supported: its content is missing")
     primitives = [
         _object_rows(mesh.get("primitives")) for mesh in _object_rows(gltf.document.get("meshes"))
     ]
@@ -524,7 +524,7 @@ def note_unread(gltf: Gltf, notes: Notes) -> None:
             notes.add(UNREAD, "meshes", f"{n} of {len(primitives)} have {part}, which are not read")
     n = sum("skin" in node for node in _object_rows(gltf.document.get("nodes")))
     if n:
-        notes.add(UNREAD, "nodes", f"{n} have a skin, which is not read: they stand as modelled")
+        notes.add(UNREAD, "nodes", f"{n} have a skin, which is not read: shown as modelled")
 
 
 def _object_rows(value: Any) -> list[_Row]:

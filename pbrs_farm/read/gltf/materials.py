@@ -234,7 +234,7 @@ class SceneMaterials:
             if key in ("baseColorTexture", "diffuseTexture"):
                 continue
             if layouts[key] != next(iter(layouts.values())):
-                text = f"{key} lies on the surface otherwise than the first texture: left out"
+                text = f"{key} has another mapping than the first texture: left out"
                 self._notes.add("texture-layout", place, text)
                 continue
             loaded = self._texture(info, f"{place}: {key}")

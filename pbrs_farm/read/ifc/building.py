@@ -402,7 +402,7 @@ class _Building:
             above = overheads.over(room)
             near_y = room.ceiling_y + NEAR_M
             if _is_called_attic(room.name) and above.share(near_y) < _COVERED:
-                self._notes.add("degenerate-room", room.name, "lies under no roof; left out")
+                self._notes.add("degenerate-room", room.name, "is under no roof; left out")
             elif above.share(near_y, of_ceilings=True) > _COVERED:
                 y = above.height(near_y, of_ceilings=True)
                 limited.append((replace(room, ceiling_y=y or room.ceiling_y), top))

@@ -343,9 +343,7 @@ class _Shell:
         u0, v0 = max(hole[0], 0.0), max(hole[1], 0.0)
         u1, v1 = min(hole[2], frame.length), min(hole[3], e.height_m)
         if u1 - u0 < LEAST_HOLE_M or v1 - v0 < LEAST_HOLE_M:
-            self._notes.add(
-                "hole-outside", f"{wall.id} hole {k}", "lies outside its wall; left out"
-            )
+            self._notes.add("hole-outside", f"{wall.id} hole {k}", "is outside its wall; left out")
             return None
         word = kind.lower()
         is_window = word == "window" if word in ("door", "window") else v0 > _LEAST_SILL_M

@@ -171,7 +171,7 @@ def _tags(
     # Believe the transform: it is what places the mesh.
     mirrored = bool(np.linalg.det(node.house_from_model[:3, :3]) < 0)
     if node.is_mirrored is not None and node.is_mirrored != mirrored:
-        text = f"isMirrored says {node.is_mirrored}, the transform says {mirrored}; it is believed"
+        text = f"isMirrored says {node.is_mirrored}, the transform says {mirrored}, which is used"
         context.notes.add("mirrored-differs", node.place, text)
     tags = ["mirrored"] if mirrored else []
     tags += [] if is_known else ["unmapped"]

@@ -214,7 +214,7 @@ def opened_doors(
         leaves = shut_leaves(meshes, matrix, piece.joints)
         if not leaves:
             if _fills_its_hole(meshes, matrix) and not any(HINGE in m.group for m in meshes):
-                text = "its model names no hinge: stays as it is drawn"
+                text = "its model has no hinge: left as drawn"
                 materials.notes.add("door-without-hinge", piece.place, text)
             continue
         # Ask of each leaf how far it can go, and move it, or leave it out.
@@ -223,7 +223,7 @@ def opened_doors(
         turns = [(leaf.joint, swung(leaf, angle)) for leaf, angle in angles if angle is not None]
         out = frozenset(leaf.joint for leaf, angle in angles if angle is None)
         if out:
-            text = "something stands where its leaf would: left out"
+            text = "an obstacle blocks its leaf: left out"
             materials.notes.add("door-leaf-left-out", piece.place, text)
         moves = models.add_opened(piece.model, model_moves(turns, matrix), out)
         opened = replace(door, piece=replace(piece, transformations=moves))

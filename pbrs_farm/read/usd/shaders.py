@@ -266,7 +266,7 @@ class Shaders:
         k = "rgba".index(channel)
         scale, bias = picture.scale[k], picture.bias[k]
         if colour is not None and info.get("extensions") != colour.get("extensions"):
-            text = "the picture of its opacity lies otherwise than that of its colour: left out"
+            text = "its opacity picture has another mapping than its colour: left out"
             self._notes.add("texture-layout", place, text)
             return 1.0, colour, False
         # The alpha of the colour's own picture is there already.
@@ -414,7 +414,7 @@ class Shaders:
         asset = self._asset(picture.info)
         if asset.resolvedPath:
             return False
-        text = f"{asset.path[:120]} does not exist: its fallback stands for it"
+        text = f"{asset.path[:120]} does not exist: replaced by its fallback"
         self._notes.add("missing-texture", asset.path[:80], text)
         return True
 

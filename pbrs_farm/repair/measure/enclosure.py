@@ -53,7 +53,7 @@ class Space:
         if reason_of_room is not None or not self.reasons:
             return reason_of_room or ""
         room, reason = self.reasons[0]
-        return f"it opens into {room}, of which {reason}"
+        return f"it opens into {room}: {reason}"
 
 
 def spaces_of_rooms(

@@ -127,7 +127,7 @@ def walls_from_house(
         # Thicken planar items, and leave the others.
         thick = _thickened(item, index, table, rooms, thickness_m)
         if thick is None:
-            unchanged[index] = "its surfaces bound no closed solid and lie in no one plane"
+            unchanged[index] = "its surfaces are neither a closed solid nor in one plane"
         else:
             walls.append(thick)
     return walls, unchanged

@@ -123,7 +123,7 @@ def _views_of_walk(
 
 def _why_none(spaces: tuple[WalkSpace, ...]) -> str:
     shut = [name for space in spaces for name in shut_doors(space)]
-    text = "nowhere to walk: no way 0.6 m wide between things"
+    text = "nowhere to walk: no path 0.6 m wide between obstacles"
     return f"{text}; doors that are shut: {', '.join(shut)}" if shut else text
 
 
@@ -134,5 +134,5 @@ def _notes(
     names = ", ".join(house.room(r).name or r for r in rooms if r != OUTSIDE)
     notes = [f"a walk of {length_m:.1f} m through {names}"]
     if shut := shut_doors(space):
-        notes.append(f"doors that are shut: {', '.join(shut)}")
+        notes.append(f"closed doors: {', '.join(shut)}")
     return tuple(notes)

@@ -191,9 +191,7 @@ def test_channel_scale_bias_space_and_fallback_of_a_picture_are_read(tmp_path: P
     expected = np.rint(255 * np.array([0.484, 0.665, 0.906]))
     assert values_of(house, look(house, "raw").texture_id) == pytest.approx(expected, abs=1)
     assert look(house, "lost").diffuse == pytest.approx((0.854, 0.248, 0.248), abs=1e-3)
-    assert [n.text for n in house.notes] == [
-        "./none.png does not exist: its fallback stands for it"
-    ]
+    assert [n.text for n in house.notes] == ["./none.png does not exist: replaced by its fallback"]
 
 
 def test_a_mesh_has_the_texture_coordinates_that_its_picture_names(tmp_path: Path) -> None:

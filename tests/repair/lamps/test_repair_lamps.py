@@ -254,7 +254,7 @@ def test_too_weak_lamps_at_the_ceiling_become_brighter_and_others_get_one_beside
     assert sum(bool(i.lights) for i in house.items) == n_lamps + 1
     area = polygon_of_room(home.rooms[1].polygon).area
     assert _flux_by_room(house)["0_1"] == pytest.approx(150 * area / 0.3, rel=1e-3)
-    assert "1 room had too weak ceiling lamps" in summary_of_report(report)
+    assert "1 room had weak ceiling lamps" in summary_of_report(report)
     _, report = repair(home, RepairFields(lamp_in_every_room=True, lamp_lx=5))
     assert (report.added_lamps, report.brightened_lamps) == ((), ())
 

@@ -24,7 +24,7 @@ def test_a_frame_as_thick_as_its_wall_is_moved_out_on_both_sides() -> None:
     assert low[2] == pytest.approx(-0.2 - MOVED_M, abs=1e-6)
     assert (high - low)[:2] == pytest.approx([1.2, 1.2], abs=1e-6)
     assert report.structure.n_frames_moved == 1
-    assert "1 piece lay in the faces of walls" in summary_of_report(report)
+    assert "1 piece coincided with faces of walls" in summary_of_report(report)
 
 
 @pytest.mark.parametrize("depth_m", [0.1, 0.1996, 0.21])

@@ -108,7 +108,7 @@ def test_a_wall_that_is_lost_is_told_in_report_note_and_words(
     after, report = _repaired(bath_in_living())
     assert {w.item_id for w in report.structure.walls_lost} == {"bath0", "bath3"}
     assert [n.place for n in after.notes if n.kind == "wall-lost"] == ["bath0", "bath3"]
-    assert "WALL LOST: of wall bath0 repair left 0." in summary_of_report(report)
+    assert "WALL LOST: of wall bath0 repair kept 0." in summary_of_report(report)
 
 
 def test_every_structure_item_is_measured_before_and_after() -> None:
