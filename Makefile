@@ -8,7 +8,7 @@ HOME_NAME ?= Studio
 # Processes of ours find their modules compiled: without that each takes a second of CPU more.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help setup demo lint check check-fast test test-all test-long test-oldest test-newest test-farm test-infra test-kube test-slow test-web test-sweethome3d test-study test-manual test-notebooks test-cuda gpu-check bench bench-light bench-light-tables bench-cycles bench-farm dist image docs format clean
+.PHONY: help setup demo lint check check-fast test test-all test-long test-oldest test-newest test-farm test-infra test-kube test-slow test-web test-sweethome3d test-study test-manual test-notebooks test-cuda gpu-check bench bench-all bench-cycles bench-farm dist image docs format clean
 
 # Markers of the tests that need more than a CPU and the packages of `make setup` and `make test-all`.
 APART := not gpu and not infra and not kube and not sweethome3d and not notebooks and not pages
@@ -135,25 +135,22 @@ test-cuda: setup ## the tests marked gpu without a GPU: what one would run is tr
 gpu-check: ## what an NVIDIA GPU does here, end to end: out/bench/gpu_tests.txt, gpu.json; NAME=tests or NAME=views for one of two calls below 285 s
 	@bash scripts/gpu_check.sh $(if $(NAME),--only $(NAME))
 
-bench: setup ## the short benches, under 25 minutes; NAME=hostile, or any of `python -m benchmarks --list`, for one
-	@$(if $(filter study lived_in loading,$(NAME)),$(study-packages))
+bench: setup ## the short benches, five minutes; NAME=homes, or any of `python -m benchmarks --claims`, for one
+	@$(if $(filter study,$(NAME)),$(study-packages))
 	@$(if $(filter release,$(NAME)),$(call extra,build twine cyclonedx_py,release))
 	@$(if $(filter docs,$(NAME)),$(call extra,mkdocstrings material,docs))
-	@$(if $(filter denoised,$(NAME)),$(call extra,flip_evaluator,bench))
+	@$(if $(filter light,$(NAME)),$(call extra,flip_evaluator,bench))
 	@$(if $(filter cycles,$(NAME)),$(cycles-packages))
 	$(BIN)/python -m benchmarks $(NAME)
 
-bench-light: setup ## path and Metropolis at equal CPU in ten scenes: 5 quiet minutes (python -m benchmarks light_pictures draws)
-	$(BIN)/python -m benchmarks light
-
-bench-light-tables: setup ## every bench of docs/lab/light.md, one after another, then its tables: under an hour
+bench-all: export PBRS_SETUP_ALSO := redis-server valgrind
+bench-all: setup ## every bench of the lab book on this machine, then its tables: an hour on two quiet cores
+	@$(study-packages)
 	@$(call extra,flip_evaluator,bench)
 	@$(cycles-packages)
-	@failed=; for name in view demo light guided growth denoised presets lux cycles; do $(BIN)/python -m benchmarks $$name || failed="$$failed $$name"; done; \
-	$(BIN)/python -m benchmarks lab_tables; \
-	test -z "$$failed" || { echo "bench-light-tables: failed, tables as before:$$failed" >&2; exit 1; }
+	$(BIN)/python -m benchmarks all
 
-bench-cycles: setup ## three homes against Blender's Cycles, in a Python of its own: under 20 quiet minutes
+bench-cycles: setup ## six homes against Blender's Cycles, in a Python of its own: 12 quiet minutes
 	@$(cycles-packages)
 	$(BIN)/python -m benchmarks cycles
 

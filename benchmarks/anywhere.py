@@ -1,7 +1,7 @@
-"""Where it runs: pip alone, as on a university machine (bare_machine.py), from an empty environment to labelled pictures.
+"""From an empty environment to labelled pictures by pip alone, as on a university machine (tests/anywhere/bare_machine.py).
 
-Effects: builds the wheel, asks the package index, renders, and writes out/bench/anywhere.json. A figure is a
-part below with its unit; `python -m benchmarks.anywhere PART` measures that one alone and keeps the others.
+Effects: builds the wheel, asks the package index, renders, and writes out/bench/anywhere.json.
+`python -m benchmarks.anywhere PART` measures one part again and keeps the figures of the others.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from benchmarks import startup
-from benchmarks.bare_machine import REPO, BareMachine, built_wheel, can_be_made
 from benchmarks.figures import FOLDER, write_report
+from tests.anywhere.bare_machine import REPO, BareMachine, built_wheel, can_be_made
 from tests.anywhere.without_posix import pbrs_farm
 
 UNITS: Final = startup.UNITS | {
@@ -33,13 +33,12 @@ UNITS: Final = startup.UNITS | {
     "anywhere.install_s": "s of that for pip",
     "anywhere.installed_mb": "MB of that environment",
     "anywhere.posix_free": "1: import, help, demo, a run and its resumption end well where our modules lack POSIX, a view with the same bytes",
-    "anywhere.validators": "1: SkyPilot, Open Job Description and botocore find nothing wrong with any file of deploy/cloud",
 }
 NOTEBOOK: Final = REPO / "docs/notebooks/first_picture.ipynb"
 
 
 class Bare:
-    """A bare machine with the wheel, and an environment in which it was installed."""
+    """A bare machine with the wheel, and an environment with the installed wheel."""
 
     def __init__(self, folder: Path) -> None:
         self.machine = BareMachine(folder)
@@ -48,14 +47,14 @@ class Bare:
 
     @cached_property
     def variables(self) -> dict[str, str]:
-        """Where commands find what was fetched, and the wheel for who asks pip for the package's name."""
+        """Environment variables for the download cache and for pip, which must find the wheel by the package's name."""
         return self.machine.seed_cache() | {
             "PIP_FIND_LINKS": str(self.wheel.parent), "PIP_CACHE_DIR": str(self.machine.folder / "pip"),
         }  # fmt: skip
 
     @cached_property
     def python(self) -> Path:
-        """Its Python, once pip has installed the wheel twice: to fill pip's cache, and by the clock."""
+        """Its Python, after two installations: one to fill pip's cache, one timed."""
         install = ["-m", "pip", "install", "--quiet", f"{self.wheel}[llvm]"]
         apart = self.machine.environment("apart")
         self.machine.run([apart, *install], self.variables).check_returncode()
@@ -94,7 +93,7 @@ def pip_only(bare: Bare) -> dict[str, Any]:
 
 
 def first_picture(bare: Bare) -> dict[str, Any]:
-    """From nothing to a picture: the environment, then the built-in home, its kernels compiled first."""
+    """Environment, then one view of the built-in home with an empty kernel cache."""
     python = bare.python
     files = [p for p in python.parents[1].rglob("*") if p.is_file() and not p.is_symlink()]
     n_bytes = sum(p.stat().st_size for p in files)
@@ -111,7 +110,7 @@ def first_picture(bare: Bare) -> dict[str, Any]:
 
 
 def posix_free(bare: Bare) -> dict[str, Any]:
-    """What our modules do without the names that only POSIX has (tests/anywhere), beside what they do with them."""
+    """Runs without POSIX-only names (tests/anywhere) give the same files as runs with them."""
     folder = bare.machine.folder
     words = ["run", "builtin", "--recipe", "preview", "--views", "1", "--out"]
     with_posix = [sys.executable, "-m", "pbrs_farm.cli", *words, str(folder / "with")]
@@ -124,19 +123,6 @@ def posix_free(bare: Bare) -> dict[str, Any]:
     return {"anywhere.posix_free": int(is_well and bool(files[0]) and files[0] == files[1])}
 
 
-def validators(bare: Bare) -> dict[str, Any]:
-    """What their own validators say of the files of deploy/cloud."""
-    python = bare.machine.environment("cloud")
-    install = [python, "-m", "pip", "install", "--quiet", "skypilot", "openjd-cli", "botocore"]
-    bare.machine.run(install, bare.variables).check_returncode()
-    script = REPO / "benchmarks/cloud_validators.py"
-    done = bare.machine.run([python, script, REPO / "deploy/cloud"], bare.variables)
-    said: dict[str, str] = json.loads(done.stdout.splitlines()[-1])
-    print(*(f"{file}: {wrong}" for file, wrong in said.items() if wrong), sep="\n")
-    n_files = sum(p.suffix in (".json", ".yaml") for p in (REPO / "deploy/cloud").rglob("*"))
-    return {"anywhere.validators": int(len(said) == n_files and not any(said.values()))}
-
-
 def _files_of_views(root: Path) -> dict[str, bytes]:
     """Bytes by path of the files of every view below a root."""
     found = [p for p in root.glob("houses/*/views/**/*") if p.is_file()]
@@ -144,21 +130,20 @@ def _files_of_views(root: Path) -> dict[str, bytes]:
 
 
 def first_minute(_bare: Bare) -> dict[str, Any]:
-    """What startup.py measures, of this checkout."""
+    """The figures of startup.py, for this checkout."""
     return startup.startup_figures([sys.executable])
 
 
-# The first picture comes first: its kernels are not compiled yet.
+# first_picture is first because its kernels must not be compiled yet.
 PARTS: Final[dict[str, Callable[[Bare], dict[str, Any]]]] = {
     "first_picture": first_picture, "pip_only": pip_only, "startup": first_minute,
     "posix_free": posix_free,
-    "validators": validators,
 }  # fmt: skip
-"""What is measured, by name; each gives figures of UNITS."""
+"""Name -> part; each returns figures of UNITS."""
 
 
 def main(names: Sequence[str] = ()) -> None:
-    """Measure the parts named, or all, and write out/bench/anywhere.json; figures of other parts stay."""
+    """Measure the named parts, or all, and write out/bench/anywhere.json; other parts keep their figures."""
     if not can_be_made():
         raise SystemExit(
             "anywhere: a bare machine needs Linux, unshare and setpriv, and root or user namespaces"

@@ -1,7 +1,7 @@
-"""How many files that were read wrongly once still are: `make bench NAME=cases` -> out/bench/cases.json.
+"""Files that were read wrongly once, every format end to end, and hostile inputs: `make bench NAME=cases` -> out/bench/cases.json.
 
-The cases are those of tests/cases. With them stand the formats that run from end to end, how far cloths
-are stretched in dressed homes, and what hostile inputs do.
+The builders are those of tests/cases, tests/inputs and tests/hostile. `python -m benchmarks.cases NAME...` runs the cases
+whose names contain one of the words and writes nothing.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ from typing import Any, Final
 from xml.etree import ElementTree
 
 from benchmarks import hostile
-from benchmarks.dress import cloths
 from benchmarks.figures import write_report
 from pbrs_farm.export.export_homes import export_house
 from pbrs_farm.read.builtin.builtin_home import builtin_home
@@ -25,14 +24,13 @@ from tests.inputs.sound_files import every_format
 
 UNITS: Final = {
     "cases": "files that were read wrongly once",
-    "cases.wrong": "of them still wrong",
-    "cases.wrong_names": "their names",
+    "cases.wrong": "of them, still read wrongly",
+    "cases.wrong_names": "names of these",
     "inputs": "formats that are read",
-    "inputs.run": "of them that `run`, a farm's worker and, where one is written, `run` of our own export make a home of",
-    "inputs.not_run": "the others",
-    "cloth.stretch_p99": cloths.UNITS["cloth.stretch_p99"],
+    "inputs.run": "of them, rendered by `run`, made equally by a farm's worker, and our own export rendered again",
+    "inputs.not_run": "names of the other formats",
     "hostile.inputs": "hostile files and words",
-    "hostile.failures": "of them that did harm",
+    "hostile.failures": "of them, with a fault",
 }
 _EXPORTS: Final = {"glTF": "gltf", "Habitat": "habitat", "OpenUSD": "usd"}
 _HOME_FILES: Final = {"gltf": "*.glb", "habitat": "scenes/*.json", "usd": "*.usdc"}
@@ -42,11 +40,11 @@ _BY_WORKERS: Final = (
 
 
 def main() -> None:
-    """Run every case and every format, then cloths and hostile inputs; write the report."""
-    wrong = _faults({one.name: _asked(one) for one in CASES.values()})
+    """Run every case, every format and the hostile inputs; write the report."""
+    wrong = _faults({name: _asked(question) for name, question in CASES.items()})
     not_run = _faults(_trials_of_formats())
-    for title, said in _not_made_by_workers().items():
-        not_run.setdefault(title, said)
+    for title, message in _not_made_by_workers().items():
+        not_run.setdefault(title, message)
     n_formats = len(every_format())
     hostile_inputs, hostile_failures = hostile.counted(())
     figures: dict[str, Any] = {
@@ -56,19 +54,18 @@ def main() -> None:
         "inputs": n_formats,
         "inputs.run": n_formats - len(not_run),
         "inputs.not_run": sorted(not_run),
-        "cloth.stretch_p99": cloths.figures()["cloth.stretch_p99"],
         "hostile.inputs": hostile_inputs,
         "hostile.failures": hostile_failures,
     }
     write_report("cases", figures, UNITS)
 
 
-def _asked(one: case.Case) -> Callable[[Path], None]:
-    return lambda folder: one.ask(one.write(folder))
+def _asked(question: case.Case) -> Callable[[Path], None]:
+    return lambda folder: question.ask(question.write(folder))
 
 
 def _trials_of_formats() -> dict[str, Callable[[Path], None]]:
-    """Title of a format -> `run` of its small house, and of the built-in home as we export it."""
+    """Title of a format -> `run` of its small house and of our export of the built-in home."""
 
     def trial(title: str, write: Callable[[Path], Path]) -> Callable[[Path], None]:
         def ran(folder: Path) -> None:
@@ -84,30 +81,36 @@ def _trials_of_formats() -> dict[str, Callable[[Path], None]]:
 
 
 def _faults(trials: dict[str, Callable[[Path], None]]) -> dict[str, str]:
-    """Name -> what is wrong, of those that fail; each in a folder of its own."""
+    """Name -> error message of each failed trial; each has its own folder."""
 
     def fault(name: str) -> str:
         with tempfile.TemporaryDirectory(prefix="case-") as folder:
             try:
                 trials[name](Path(folder))
-            except Exception as error:  # noqa: BLE001  whatever it raises, the case is wrong
-                said = " ".join(str(error).split()) or type(error).__name__
-                print(f"   wrong {name:24} {said[:200]}", flush=True)
-                return said
+            except Exception as error:  # noqa: BLE001  any error makes the case wrong
+                message = " ".join(str(error).split()) or type(error).__name__
+                print(f"   wrong {name:24} {message[:200]}", flush=True)
+                return message
             print(f"   right {name}", flush=True)
             return ""
 
-    return {name: said for name in trials if (said := fault(name))}
+    return {name: message for name in trials if (message := fault(name))}
 
 
 def _not_made_by_workers() -> dict[str, str]:
-    """Title -> fault, of the formats that a farm's worker makes another house of than `run`."""
+    """Title -> message of each format whose house differs between `run` and a farm's worker."""
     with tempfile.TemporaryDirectory() as folder:
         report = Path(folder) / "junit.xml"
         command = [sys.executable, "-m", "pytest", "-q", _BY_WORKERS, f"--junit-xml={report}"]
         subprocess.run(command, capture_output=True, check=False)
         rows = list(ElementTree.parse(report).iter("testcase")) if report.is_file() else []
-    found = {row.get("name", "").partition("[")[2].rstrip("]"): len(row) for row in rows}
+    n_faults = {row.get("name", "").partition("[")[2].rstrip("]"): len(row) for row in rows}
     return {
-        title: "a worker makes another house" for title in every_format() if found.get(title, 1)
+        title: "a worker makes another house" for title in every_format() if n_faults.get(title, 1)
     }
+
+
+if __name__ == "__main__":
+    words = sys.argv[1:]
+    chosen = {n: _asked(q) for n, q in CASES.items() if any(word in n for word in words)}
+    sys.exit(bool(_faults(chosen)) if words else main())

@@ -1,6 +1,6 @@
 """How the docs read: commits, dates, sentences, links, how-to pages.
 
-Effects: reads README.md and docs/, asks git which numbers name a commit, builds the site into a folder of its own,
+Effects: reads README.md and docs/, asks git which numbers name a commit, builds the site into a temporary folder,
 and writes out/bench/docs.json. `python -m benchmarks.docs_figures --pages` lists the sentences' mean length by page
 and writes nothing.
 """
@@ -18,10 +18,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Final
 
-from benchmarks.api_examples import faults, public_names
 from benchmarks.figures import write_report
 from benchmarks.manual_pages import REPO, manual_pages, without_code
 from benchmarks.quoted_figures import faults_of_pages
+from tests.docs.api_examples import faults, public_names
 
 UNITS: Final = {
     "docs.hashes": "commits named in README.md and docs/ outside docs/lab",
@@ -40,7 +40,7 @@ _COMMENT: Final = re.compile(r"<!--.*?-->", re.DOTALL)
 _HASH: Final = re.compile(r"(?<![\w/.-])(?=[a-f]*[0-9])[0-9a-f]{7,40}(?![\w.-]*\w)")
 _DATE: Final = re.compile(r"\b20[0-9]{2}-[01][0-9]-[0-3][0-9]\b")
 _LINK: Final = re.compile(r"!?\[([^\]]*)\]\(([^)\s]+)\)")
-# A line that is no prose: a table's, a heading, code by indent, a picture, a form of the site's.
+# A line without prose: of a table, a heading, indented code, a picture, a directive of the site.
 _NO_PROSE: Final = re.compile(r"^(\||#|    |!\[|---|\[!\[|\*?!\[)")
 _ITEM: Final = re.compile(r"^\s*(?:[-*]|[0-9]+\.)\s+")
 _END: Final = re.compile(r"[.!?](?:[)*\"”]*)\s+(?=[A-Z`*(\[0-9\"])")
@@ -107,12 +107,12 @@ def _split(paragraph: str) -> Iterator[str]:
 
 
 def word_count(sentence: str) -> int:
-    """Words; what stands between backticks is one."""
+    """Number of words; a span between backticks is one word."""
     return len(re.findall(r"[^\s]*\w[^\s]*", re.sub(r"`[^`]*`", "code", sentence)))
 
 
 def dead_links() -> int:
-    """What the site's builder warns of."""
+    """Warnings of the site's builder."""
     environment = {**os.environ, "NO_MKDOCS_2_WARNING": "1"}
     with tempfile.TemporaryDirectory() as folder:
         done = subprocess.run(

@@ -1,7 +1,6 @@
-"""Time and memory of hostile inputs, and how many do harm: `make bench NAME=hostile` -> out/bench/hostile.json.
+"""Time, memory and faults of hostile inputs: `make bench NAME=hostile` -> out/bench/hostile.json.
 
-The cases and what is a fault of one are those of tests/hostile; some of every family are run, all
-where FULL=1 is set (more than 800, about an hour).
+Cases and faults are those of tests/hostile. Some of every family are run, all with FULL=1 (more than 800, about an hour).
 """
 
 from __future__ import annotations
@@ -48,13 +47,13 @@ def main() -> None:
 
 
 def counted(parts: Sequence[str]) -> tuple[int, int]:
-    """How many cases whose names hold one of the parts there are, and how many have a fault."""
+    """(number of cases with one of the parts in their names, number of these with a fault)."""
     verdicts, _alone_s = verdicts_of(parts)
     return len(verdicts), sum(bool(v.what) for v in verdicts)
 
 
 def verdicts_of(parts: Sequence[str]) -> tuple[list[Verdict], float]:
-    """The verdicts on the cases whose names hold one of the parts; what the sound home alone takes, s."""
+    """(verdicts on the cases with one of the parts in their names, seconds of the sound home alone)."""
     cases = chosen_cases(parts)
     with tempfile.TemporaryDirectory(prefix="hostile-") as folder:
         trials = Trials(Path(folder))
@@ -70,10 +69,10 @@ def verdicts_of(parts: Sequence[str]) -> tuple[list[Verdict], float]:
 
 
 def _judged(trials: Trials, case: Case) -> Verdict:
-    """The verdict on a case, printed where it has faults; what cannot be built is one."""
+    """The verdict on a case; its faults are printed, and a failed builder is one."""
     try:
         verdict = trials.judged(case)
-    except Exception as error:  # noqa: BLE001  a builder's own fault costs its case only
+    except Exception as error:  # noqa: BLE001  a failed builder fails only its case
         traceback.print_exc()
         verdict = Verdict(case, what={"unbuilt": repr(error)})
     for name, line in verdict.what.items():

@@ -1,9 +1,9 @@
 """Write the measured tables of the lab book: `python -m benchmarks lab_tables`.
 
-A table stands in a page between `<!-- bench:NAME -->` and `<!-- /bench -->`, NAME a table of lab_rows.csv or, where rows
-need code, of light/table_rows.py. Below it stands the command that measures it; in the lab book, docs/lab, also the commit,
-the machine and its load. A table whose JSON is missing or damaged, or lacks a figure, stays as it is and is named; so are tables of
-different commits, and those that a program of WRITTEN_ELSEWHERE writes. Effects: writes docs/*.md.
+A table is between `<!-- bench:NAME -->` and `<!-- /bench -->` of a page. NAME is a table of lab_rows.csv or of
+renderers/cycles_tables.py. Below the table is the command that measures it and, in docs/lab, commit, machine and load.
+A table without its report, or with a figure missing, is left unchanged and named. Reports of different commits or
+machines are named too. Effects: writes docs/*.md.
 """
 
 from __future__ import annotations
@@ -15,21 +15,19 @@ from pathlib import Path
 from typing import Any, Final
 
 from benchmarks.figures import FOLDER
-from benchmarks.light import table_rows
-from benchmarks.light.table_rows import Figures, Table, row
+from benchmarks.lab_rows import Figures, Table, head, row
+from benchmarks.renderers.cycles_tables import compare_lines, cycles_lines
 from pbrs_farm.core.record import Record, Several, read_csv
 
 DOCS: Final = Path("docs")
 ROWS: Final = Path(__file__).with_name("lab_rows.csv")
-WRITTEN_ELSEWHERE: Final = {"sweep": "python -m benchmarks.study.sweep table --write"}
-"""Mark -> the program that writes what stands there."""
 
 _BLOCK: Final = re.compile(r"<!-- bench:(\w+) -->\n(.*?)<!-- /bench -->", re.DOTALL)
 _FIGURE: Final = re.compile(r"\{([\w.]+)(?:/(\d+))?(?::([^}]*))?\}")
 
 
 class LabRow(Record):
-    """A row of a table; one without a bench is the table's head. lab_rows.csv says what cells hold."""
+    """A row of a table; the row without a bench is the table's head."""
 
     table: str
     what: str
@@ -39,25 +37,25 @@ class LabRow(Record):
 
 
 def filled(cell: str, figures: Figures) -> str:
-    """A cell with its figures. Raises KeyError with the name of one that there is not.
+    """Fill a cell's figures in. Raises KeyError with the name of a missing figure.
 
     Example:
         >>> filled("{a.mb/1000:.1f} GB, {a.same:yes}", {"a.mb": 1234, "a.same": 1})
         '1.2 GB, yes'
     """
 
-    def told(match: re.Match[str]) -> str:
+    def value_of(match: re.Match[str]) -> str:
         name, divisor, form = match.groups()
         value = figures[name]
         if form == "yes":
             return "yes" if value else "no"
         return format(value / int(divisor) if divisor else value, form or "")
 
-    return _FIGURE.sub(told, cell)
+    return _FIGURE.sub(value_of, cell)
 
 
 def simple_table(rows: Sequence[LabRow]) -> Table:
-    """The table of these rows, of which the first is the head."""
+    """The table of these rows; the first is the head."""
     benches = tuple(dict.fromkeys(r.bench for r in rows if r.bench))
 
     def lines(figures: Figures) -> list[str]:
@@ -69,68 +67,68 @@ def simple_table(rows: Sequence[LabRow]) -> Table:
             ]
             for r in rows
         ]
-        return [row(written[0]), "|---" * len(written[0]) + "|", *map(row, written[1:])]
+        return [*head(*written[0]), *map(row, written[1:])]
 
     return Table(benches, f"python -m benchmarks {' '.join(benches)}", lines)
 
 
 def _simple_tables() -> dict[str, Table]:
     by_table: dict[str, list[LabRow]] = {}
-    for one in read_csv(ROWS, LabRow):
-        by_table.setdefault(one.table, []).append(one)
+    for table_row in read_csv(ROWS, LabRow):
+        by_table.setdefault(table_row.table, []).append(table_row)
     return {name: simple_table(rows) for name, rows in by_table.items()}
 
 
-TABLES: Final = table_rows.TABLES | _simple_tables()
-"""Mark -> its table."""
+TABLES: Final = _simple_tables() | {
+    "cycles": Table(("cycles",), "make bench-cycles", cycles_lines),
+    "compare": Table(("cycles",), "make bench-cycles", compare_lines),
+}
+"""Name in a page -> its table."""
 
 
 def main() -> None:
-    """Write all tables and say which ones stay as they are."""
+    """Write all tables and print which ones were left unchanged."""
     for line in written_tables(DOCS, FOLDER):
         print(line)
 
 
 def written_tables(docs: Path, reports: Path) -> list[str]:
-    """Write each table of the pages below docs from reports/*.json; what there is to say of them.
+    """Write each table of the pages below docs from reports/*.json; a message for each table.
 
-    Raises ValueError when a page names a table that there is not.
+    Raises ValueError for a page with an unknown table.
     """
-    said: list[str] = []
-    commits: dict[str, set[str]] = {}
+    messages: list[str] = []
+    sources: dict[str, set[str]] = {}
     for page in sorted(docs.rglob("*.md")):
         text = page.read_text(encoding="utf-8")
 
         def replaced(block: re.Match[str], page: Path = page) -> str:
             name = block[1]
-            if name in WRITTEN_ELSEWHERE:
-                said.append(f"{page}: {name} stays as it is: `{WRITTEN_ELSEWHERE[name]}` writes it")
-                return block[0]
             if name not in TABLES:
                 raise ValueError(f"{page}: no table {name!r}; of {', '.join(TABLES)}")
             lines, problem = table_lines(TABLES[name], reports, in_lab=page.parent.name == "lab")
             if problem:
-                said.append(f"{page}: {name} stays as it is: {problem} ({TABLES[name].command})")
+                messages.append(f"{page}: {name} is unchanged: {problem} ({TABLES[name].command})")
                 return block[0]
             for bench in TABLES[name].benches:
-                commits.setdefault(_report(bench, reports)["commit"], set()).add(bench)
+                sources.setdefault(_commit_and_machine(_report(bench, reports)), set()).add(bench)
             body = "\n".join(lines)
-            said.append(f"{page}: {name} written")
+            messages.append(f"{page}: {name} written")
             return f"<!-- bench:{name} -->\n\n{body}\n\n<!-- /bench -->"
 
         new = _BLOCK.sub(replaced, text)
         if new != text:
             page.write_text(new, encoding="utf-8")
-    if len(commits) > 1:
-        of_each = "; ".join(f"{c}: {', '.join(sorted(b))}" for c, b in sorted(commits.items()))
-        said.append(f"tables are of {len(commits)} commits: {of_each}")
-    return said
+    if len(sources) > 1:
+        benches = "; ".join(f"{s}: {', '.join(sorted(b))}" for s, b in sorted(sources.items()))
+        messages.append(f"tables are of {len(sources)} commits or machines: {benches}")
+    return messages
 
 
 def table_lines(table: Table, reports: Path, *, in_lab: bool) -> tuple[list[str], str]:
-    """(lines of a table and the line of its making, ""), or ([], what is missing)."""
+    """(lines of a table and of its source, ""), or ([], reason)."""
     figures: dict[str, Any] = {}
-    makings: dict[str, list[str]] = {}
+    sources_of_table: dict[str, list[str]] = {}
     for bench in table.benches:
         if not (reports / f"{bench}.json").exists():
             return [], f"there is no {reports / bench}.json"
@@ -139,7 +137,7 @@ def table_lines(table: Table, reports: Path, *, in_lab: bool) -> tuple[list[str]
         except ValueError:
             return [], f"{reports / bench}.json is damaged"
         figures |= report["figures"]
-        makings.setdefault(_commit_and_machine(report), []).append(
+        sources_of_table.setdefault(_commit_and_machine(report), []).append(
             f"{report['machine']['load_1min']:.1f}"
         )
     try:
@@ -151,12 +149,13 @@ def table_lines(table: Table, reports: Path, *, in_lab: bool) -> tuple[list[str]
     if not in_lab:
         where = "commit and machine: the [lab book](lab/light.md)"
         return [*lines, "", f"*`{table.command}`; {where}.*"], ""
-    made = "; ".join(f"{where}, load {', '.join(loads)}" for where, loads in makings.items())
-    return [*lines, "", f"*`{table.command}` ({made}, the bench's own included).*"], ""
+    source = "; ".join(
+        f"{where}, load {', '.join(loads)}" for where, loads in sources_of_table.items()
+    )
+    return [*lines, "", f"*`{table.command}` ({source}, the bench's own included).*"], ""
 
 
 def _report(bench: str, reports: Path) -> dict[str, Any]:
-    """What write_report wrote."""
     report: dict[str, Any] = json.loads((reports / f"{bench}.json").read_text(encoding="utf-8"))
     return report
 

@@ -1,7 +1,7 @@
-"""What Python costs and can do -> out/bench/python.json.
+"""Time, equality with `run`, physics and length of the examples in Python: `make bench NAME=python` -> out/bench/python.json.
 
 `python -m benchmarks python`: import, the first picture, equality with `run`, a warm view, physics over
-PBRS_SCATTERINGS scatterings (default 40; the gate is of 200), what people ask for, examples.
+PBRS_SCATTERINGS scatterings (default 10), what people ask for, examples.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from pbrs_farm.scene import physics
 REPO: Final = Path(__file__).parents[1]
 EXAMPLES: Final = REPO / "examples"
 
-# What people ask of such tools, and the example that answers; "" where there is none.
+# Question of users -> the example that answers it; "" without one.
 ASKED: Final = {
     "load a home, list rooms and things": "first_picture",
     "move, remove, turn a thing": "move_and_remove",
@@ -88,12 +88,12 @@ def main() -> None:
         "python.shorter": shorter(),
     }
     figures |= against_run()
-    figures |= of_physics(int(os.environ.get("PBRS_SCATTERINGS", "40")))
+    figures |= of_physics(int(os.environ.get("PBRS_SCATTERINGS", "10")))
     write_report("python", figures, UNITS)
 
 
 def import_ms() -> float:
-    """What importing the package adds to a process."""
+    """Milliseconds that importing the package adds to a process."""
 
     def seconds(code: str) -> float:
         started = time.perf_counter()
@@ -170,7 +170,7 @@ def _files(root: Path) -> dict[str, bytes]:
 
 
 def of_physics(n: int) -> dict[str, Any]:
-    """Scatterings of 20 things: who comes to rest, and how deep contacts are."""
+    """Share of scatterings of 20 items that come to rest, and their deepest contact."""
     home = pf.load("builtin", recipe="preview")
     house, table = home.house, home.items.named("dining table")
     depths, times, n_settled = [], [], 0

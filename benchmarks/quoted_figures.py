@@ -45,7 +45,7 @@ class Stated(Record):
 
 
 def main() -> None:
-    """Print each figure that is in no line of the lab book."""
+    """Print each figure without a line in the lab book."""
     print("\n".join(faults_of_pages()))
 
 
@@ -60,7 +60,7 @@ def faults_of_pages() -> list[str]:
 
 
 def faults(page: Path) -> list[str]:
-    """The figures of a page that are in no line of the lab book, as "page:line: what"."""
+    """The figures of a page without a line in the lab book, as "page:line: message"."""
     name = str(page.relative_to(REPO))
     stated = {n for row in read_csv(STATED, Stated) if row.page == name for n in row.numbers}
     text = page.read_text(encoding="utf-8")

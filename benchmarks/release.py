@@ -1,6 +1,6 @@
-"""What a stranger gets: the wheel builds twice alike, installs into an empty environment, and renders there.
+"""Wheel and sdist built twice, installed into an empty environment, and the demo rendered there: `make bench NAME=release`.
 
-Effects: builds in a folder of its own, asks the package index for the dependencies, renders the built-in
+Effects: builds in a temporary folder, asks the package index for the dependencies, renders the built-in
 home, and writes out/bench/release.json and the bill of materials, out/release/sbom.cdx.json.
 """
 
@@ -96,7 +96,7 @@ def of_empty_environment(wheel: Path, folder: Path) -> dict[str, Any]:
 
 
 def write_bill(python: Path, bill: Path) -> int:
-    """Write what is installed beside that Python as CycloneDX, the same bytes each time; the number of parts.
+    """Write the packages of that Python's environment as CycloneDX, the same bytes each time; returns their number.
 
     Needs cyclonedx-bom of the extra release. A part has name, version, licence and package URL.
     """

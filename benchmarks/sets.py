@@ -1,10 +1,9 @@
-"""Forms of export read back, light summed again, answers recomputed, a set made four ways: `make bench NAME=sets` -> out/bench/sets.json.
+"""Exports read back, questions answered again, a set made three ways: `make bench NAME=sets` -> out/bench/sets.json.
 
-The loaders are those of tests/export, written from each form's documentation: they share nothing with
-the writers. A form is equal where labels differ in no pixel, depth within the form's step, and K and
-poses are the view's own. Questions are of pictures and walks through dressed homes that nobody tunes on;
-benchmarks/question_check.py answers them again from the stored files. A set of two homes has the same
-bytes with one process and two, killed in its middle, and of two shards in one folder.
+The loaders are those of tests/export, written from each form's documentation; they share no code with the writers. A form is
+equal if no label differs in any pixel, depth is within the form's step, and K and poses are the view's. Questions are about
+pictures and walks of dressed homes that nobody tunes on; tests/export/question_check.py answers them again from the stored
+files. A set of two homes must have the same bytes from one process, from two killed ones, and from two shards.
 """
 
 from __future__ import annotations
@@ -21,26 +20,23 @@ from typing import Any, Final
 from xml.etree import ElementTree
 
 from benchmarks.figures import write_report
-from benchmarks.intrinsic_check import intrinsic_errors
-from benchmarks.question_check import wrong_answers
 from pbrs_farm.curate.teaching_rules import REASONS, judged_by
 from pbrs_farm.export.export_views import finished_entries
+from tests.export.question_check import wrong_answers
 
 UNITS: Final = {
-    "sets.forms": "forms of views read back equal by code that shares nothing with the writers",
+    "sets.forms": "forms of views read back equal by code of its own",
     "sets.forms_written": "forms of views",
-    "sets.forms_wrong": "names of the others",
+    "sets.forms_wrong": "names of the other forms",
     "sets.same_bytes": "1: one set's file gave the same bytes in each of three folders",
-    "sets.intrinsic_error": "largest median of the error of albedo x shading + residual over the light, by light group and in Hypersim's layout",
     "sets.questions": "questions of pictures and walks",
-    "sets.questions_wrong": "of them whose answer a checker that shares no code denies",
-    "sets.blind_best": "largest share that one letter or answer gets right of choices of four",
+    "sets.questions_wrong": "questions with another answer by a checker of its own",
+    "sets.blind_best": "largest share of right answers by always giving the same one of four",
     "sets.blind": "score of the best blind answer, by type",
     "sets.curated": "views that each rule of `select --by` leaves out of the pictures and walks of the questions",
 }
-_LIT: Final = "made:70118..70119"
-_PICTURES: Final = "made:70101..70114"
-_WALKS: Final = "made:70115..70117"
+_PICTURES: Final = "made:70101..70104"
+_WALKS: Final = "made:70115"
 _CHOICES_OF_FOUR: Final = (
     "object_rel_distance",
     "object_rel_direction_hard",
@@ -69,19 +65,15 @@ READ_BACK: Final[dict[str, tuple[str, tuple[str, ...]]]] = {
     "yolo-seg": ("export", ("polygons",)),
     "yolo-semantic": ("training_forms", ("yolos_masks",)),
 }
-"""Form of views -> what reads it back: tests/export/test_<name>.py, and words of its tests, () for all."""
+"""Form of views -> tests/export/test_<name>.py that reads it back, and words of the names of its tests; () for all."""
 
 
 def main() -> None:
     """Read every form back, ask and answer, make a set, and write the report."""
-    # The forms' tests run in a process of their own, beside what takes one core.
+    # The forms' tests run in another process, beside the other parts.
     with ThreadPoolExecutor(1) as beside:
         passing = beside.submit(_passed)
-        others = {
-            "sets.same_bytes": int(_is_made_alike()),
-            "sets.intrinsic_error": _intrinsic_error(),
-            **_questions(),
-        }
+        others = {"sets.same_bytes": int(_is_made_alike()), **_questions()}
         passed = passing.result()
     wrong = [form for form in READ_BACK if not _is_equal(form, passed)]
     figures: dict[str, Any] = {
@@ -123,7 +115,7 @@ size = "48x36"
 
 
 def _is_made_alike() -> bool:
-    """Whether a set has the same bytes made by one process, by two that were killed, and in two shards."""
+    """True if one process, two killed processes and two shards make the same bytes."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder, "two-homes.toml")
         file.write_text(_SET)
@@ -144,28 +136,13 @@ def _is_made_alike() -> bool:
 
 
 def _killed(*words: str) -> None:
-    """Start a command that makes a set, and kill it by SIGKILL once a view is there."""
+    """Start a command that makes a set, and send SIGKILL after the first view."""
     out = Path(words[words.index("--out") + 1])
     command = [sys.executable, "-m", "pbrs_farm.cli", *words]
     with subprocess.Popen(command, stdout=subprocess.DEVNULL) as process:
         while process.poll() is None and not list(out.glob("parts/*/houses/*/done/view.*")):
             time.sleep(0.05)
         process.kill()
-
-
-def _intrinsic_error() -> float:
-    """Of small views of two dressed homes by day, with their lamps lit."""
-    with tempfile.TemporaryDirectory() as folder:
-        root, out = Path(folder, "lit"), Path(folder, "hypersim")
-        _pbrs_farm(
-            "run", _LIT, "--dress", "1", "--recipe", "preview", "--size", "160x120",
-            "--modes", "mlt_ol", "mlt_il_ol", "--views", "2", "--out", str(root),
-            "--layers", "residual", "residual_outdoor", "residual_indoor",
-        )  # fmt: skip
-        _pbrs_farm("export", str(root), "--to", "hypersim", "--out", str(out))
-        errors = intrinsic_errors(root, out)
-    print(*(f"   {error:.1e} {name}" for name, error in errors.items()), sep="\n", flush=True)
-    return max(errors.values())
 
 
 def _questions() -> dict[str, Any]:
@@ -221,7 +198,7 @@ def _passed() -> dict[tuple[str, str], bool]:
 
 
 def _is_equal(form: str, passed: dict[tuple[str, str], bool]) -> bool:
-    """Whether all of a form's tests passed, and there is one."""
+    """True if the form has a test and all of them passed."""
     file, words = READ_BACK[form]
     own = [
         is_right

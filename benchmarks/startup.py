@@ -1,7 +1,6 @@
-"""The first minute: what it takes to import the package, to print the help and to see a first view.
+"""Time of `import pbrs_farm`, of `--help` and of a first view: `make bench NAME=startup` -> out/bench/startup.json.
 
-Effects: starts processes, with a kernel cache and a cache of downloads of their own, and writes
-out/bench/startup.json. A kernel cache is cold where no program of Dr.Jit was compiled on the machine before.
+Effects: starts processes with a temporary kernel cache. The cache is cold if Dr.Jit has compiled nothing on the machine before.
 """
 
 from __future__ import annotations

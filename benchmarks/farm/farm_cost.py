@@ -41,13 +41,13 @@ from workers.job import HouseEntry, lines_from_houses
 from workers.ledger.task_ledger import HouseState
 
 FULL = os.environ.get("FULL") == "1"
-N_TASKS = 410_000 if FULL else 100_000
-N_RECOVERED = 100_000
+N_TASKS = 410_000 if FULL else 50_000
+N_RECOVERED = 50_000
 # A busy or slow machine runs fewer tasks rather than for longer; farm.tasks says how many.
-MOST_S = 150.0
-SIMULATED_S = 600.0 if FULL else 80.0
-# The bench as a whole ends within nine minutes, unless FULL.
-WHOLE_S = float("inf") if FULL else 530.0
+MOST_S = 60.0
+SIMULATED_S = 600.0 if FULL else 40.0
+# The bench as a whole ends within five minutes, unless FULL.
+WHOLE_S = float("inf") if FULL else 300.0
 SLOTS = int(os.environ.get("SLOTS", "2"))
 UNITS = {
     "farm.task_overhead_ms": "ms of CPU a task, all processes",
@@ -60,7 +60,7 @@ UNITS = {
     "farm.status_read_s": "s, slowest during the job",
     "farm.status_command_s": "s, slowest during the job",
     "farm.load_s": "s to enter 45,622 houses",
-    "farm.recover_s": "s, 100,000 tasks from a folder store",
+    "farm.recover_s": "s, 50,000 tasks from a folder store",
     "farm.lost_worker_s": "s until a killed worker's task runs again, default settings",
     "farm.tasks": "tasks run",
     "farm.vs_local": "farm seconds / local seconds",

@@ -1,129 +1,106 @@
-"""CPU of a dressed home before its first picture, by step: `make bench NAME=house_cost`.
+"""CPU and memory of a home and of a further view: `make bench NAME=house_cost` -> out/bench/house_cost.json.
 
-`python -m benchmarks.homes.house_cost --against FOLDER [HOME...]` measures another checkout beside
-this one, each home in both one after another, and says whether they made the same.
+Every home is run twice by `preview` at 160x120 in all modes, with one view and with N_VIEWS: the first run is the cost of the
+home, the difference that of a further view. CPU is of all processes. `python -m benchmarks.homes.house_cost --against FOLDER
+[HOME...]` measures another checkout beside this one, each home in both one after another: machines differ too much for
+absolute times.
 """
 
 from __future__ import annotations
 
 import argparse
-import hashlib
 import json
 import os
+import resource
 import subprocess
 import sys
-import time
-from collections.abc import Callable
-from dataclasses import replace
+import tempfile
+from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
-from unittest import mock
 
-HOMES: Final = (
-    *(f"made:{seed}" for seed in range(1, 11)), "Studio", "3BedroomApartment", "4BedroomHouse",
-)  # fmt: skip
-STEPS: Final = ("house", "cameras", "illuminance")
+from benchmarks.figures import write_report
+
+HOMES: Final = ("Studio", *(f"made:{seed}" for seed in range(5, 15)))
+IN_ALL: Final = HOMES[:3]
+N_VIEWS: Final = 3
 TREE: Final = Path(__file__).parents[2]
+UNITS: Final = {
+    "house_cost.homes": "homes",
+    "house_cost.cpu_s": "CPU-s of a run with one view, mean of the homes",
+    "house_cost.view_cpu_s": "CPU-s of a further view, mean of the homes",
+    "house_cost.peak_mb": "MB of the largest process of any run",
+    "house_cost.ratio": "CPU of a run with one view over that of the other checkout",
+    "house_cost.view_ratio": "CPU of a further view over that of the other checkout",
+}
 
 
-def main(homes: tuple[str, ...] = HOMES, against: str = "") -> None:
-    """Measure each home in a process of its own and write out/bench/house_cost.json."""
-    from benchmarks.figures import write_report
-
+def main(homes: Sequence[str] = IN_ALL, against: str = "") -> None:
+    """Measure and write out/bench/house_cost.json."""
     trees = [Path(against).resolve(), TREE] if against else [TREE]
-    total = dict.fromkeys(trees, 0.0)
-    n_same_house, kept_views, n_views, scores = 0, 0, 0, dict.fromkeys(trees, 0.0)
+    sums = {tree: Counter[str]() for tree in trees}
+    peak_mb = 0.0
     for home in homes:
-        rows = [_in_a_process(tree, home) for tree in trees]
-        for tree, row in zip(trees, rows, strict=True):
-            total[tree] += sum(row["cpu_s"][step] for step in STEPS)
-            scores[tree] += sum(row["scores"])
-            parts = ", ".join(f"{name} {s:.2f}" for name, s in row["cpu_s"].items())
-            print(f"{home:<20} {tree.name}: CPU s {parts}; {len(row['views'])} views", flush=True)
-        n_same_house += rows[0]["house"] == rows[-1]["house"]
-        n_views += len(rows[0]["views"])
-        kept_views += len(set(rows[0]["views"]) & set(rows[-1]["views"]))
-    figures: dict[str, Any] = {"house_cost.cpu_s": round(total[TREE] / len(homes), 2)}
-    if against:
-        old = trees[0]
-        figures |= {
-            "house_cost.ratio": round(total[TREE] / total[old], 3),
-            "house_cost.same_houses": round(n_same_house / len(homes), 3),
-            "house_cost.same_views": round(kept_views / max(n_views, 1), 3),
-            "house_cost.score_ratio": round(scores[TREE] / scores[old], 4),
-        }
-    units = {
-        "house_cost.cpu_s": "s of CPU a home: house, cameras and illuminance",
-        "house_cost.ratio": "of the other checkout's CPU",
-        "house_cost.same_houses": "share of homes with the same house.glb",
-        "house_cost.same_views": "share of the other checkout's cameras that are chosen here, too",
-        "house_cost.score_ratio": "sum of the scores of all views, of the other checkout's",
+        for tree in trees:
+            row = cost(tree, home)
+            sums[tree].update(home=row["cpu_s"], view=row["view_cpu_s"])
+            peak_mb = max(peak_mb, row["peak_mb"] if tree == TREE else 0.0)
+            print(f"{home:<12}{tree.name:<12}", *(f"{k} {v}" for k, v in row.items()), flush=True)
+    figures: dict[str, Any] = {
+        "house_cost.homes": len(homes),
+        "house_cost.cpu_s": round(sums[TREE]["home"] / len(homes), 2),
+        "house_cost.view_cpu_s": round(sums[TREE]["view"] / len(homes), 2),
+        "house_cost.peak_mb": peak_mb,
     }
-    write_report("house_cost", figures, {name: units[name] for name in figures})
+    if against:
+        figures["house_cost.ratio"] = round(sums[TREE]["home"] / sums[trees[0]]["home"], 3)
+        figures["house_cost.view_ratio"] = round(sums[TREE]["view"] / sums[trees[0]]["view"], 3)
+    write_report("house_cost", figures, UNITS)
 
 
-def _in_a_process(tree: Path, home: str) -> dict[str, Any]:
-    done = subprocess.run(
-        [sys.executable, __file__, "--one", home], capture_output=True, text=True, check=False,
-        env=os.environ | {"PYTHONPATH": str(tree)}, cwd=tree,
-    )  # fmt: skip
+def cost(tree: Path, home: str) -> dict[str, Any]:
+    """CPU seconds of a home with one view and of a further view, and MB of the largest process."""
+    cpu_s, peak_mb, steps = _run(tree, home, 1)
+    many_cpu_s, many_peak_mb, _steps = _run(tree, home, N_VIEWS)
+    return {
+        "cpu_s": round(cpu_s, 2),
+        "view_cpu_s": round((many_cpu_s - cpu_s) / (N_VIEWS - 1), 2),
+        "peak_mb": max(peak_mb, many_peak_mb),
+        "wall_s": steps,
+    }
+
+
+def _run(tree: Path, home: str, n_views: int) -> tuple[float, float, dict[str, float]]:
+    """(CPU seconds, MB of the largest process, seconds of each step) of a run into an empty folder."""
+    before = _children_cpu_s()
+    with tempfile.TemporaryDirectory() as out:
+        words = ["run", home, "--dress", "1", "--recipe", "preview", "--size", "160x120"]
+        words += ["--views", str(n_views), "--out", out, "--json"]
+        done = subprocess.run(
+            [sys.executable, "-m", "pbrs_farm.cli", *words], capture_output=True, text=True,
+            env=os.environ | {"PYTHONPATH": str(tree)}, cwd=tree, check=False,
+        )  # fmt: skip
     if done.returncode:
         raise RuntimeError(f"{tree}: {home}: {done.stderr.strip().splitlines()[-1:]}")
-    row: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
-    return row
+    events = [json.loads(line) for line in done.stdout.splitlines() if line.startswith("{")]
+    summary = next(event for event in events if event["event"] == "summary")
+    steps: Counter[str] = Counter()
+    for event in events:
+        if event["event"] == "done":
+            steps[event["step"]] += event["seconds"]
+    seconds = {step: round(value, 1) for step, value in steps.items()}
+    return _children_cpu_s() - before, summary["peak_mb"], seconds
 
 
-def _cost(home: str) -> dict[str, Any]:
-    """CPU seconds of the steps and of the passes of `house`; what they made, as digests."""
-    from pbrs_farm.core import keys
-    from pbrs_farm.core.recipe import recipe_from_name
-    from pbrs_farm.formats.cameras_json import views_from_json
-    from pbrs_farm.prepare import finished_house
-    from pbrs_farm.prepare.passes import PASSES
-    from pbrs_farm.prepare.source import resolve, variants
-    from pbrs_farm.run.house_cache import HouseCache
-    from pbrs_farm.run.step_cache import Work
-    from pbrs_farm.run.steps import run_step
-    from pbrs_farm.store import MemoryStore
-
-    cpu_s: dict[str, float] = {}
-
-    def timed(name: str, do: Callable[..., Any]) -> Callable[..., Any]:
-        def run(*arguments: Any) -> Any:
-            began = time.process_time()
-            try:
-                return do(*arguments)
-            finally:
-                cpu_s[name] = round(cpu_s.get(name, 0.0) + time.process_time() - began, 3)
-
-        return run
-
-    passes = tuple(replace(one, run=timed(f"house {one.name}", one.run)) for one in PASSES)
-    (source,) = variants(resolve(home), [1])
-    store, house_id = MemoryStore(), source.house_id
-    work = Work(store, recipe_from_name("preview"), house_id, HouseCache(), source=source)
-    with mock.patch.object(finished_house, "PASSES", passes):
-        for step in STEPS:
-            timed(step, run_step)(step, work)
-    glb, cameras = (
-        store.get(keys.house_key(house_id, name)) for name in ("house.glb", "cameras.json")
-    )
-    views = views_from_json(cameras, home).values()
-    return {
-        "cpu_s": cpu_s,
-        "house": hashlib.sha256(glb).hexdigest(),
-        "views": [f"{v.id} {v.camera.world_from_camera.round(4).tolist()}" for v in views],
-        "scores": [v.score for v in views],
-    }
+def _children_cpu_s() -> float:
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("homes", nargs="*", default=HOMES)
-    parser.add_argument("--against", default="", metavar="FOLDER")
-    parser.add_argument("--one", default="", help=argparse.SUPPRESS)
+    parser.add_argument("--against", default="", metavar="FOLDER", help="another checkout")
     given = parser.parse_args()
-    if given.one:
-        print(json.dumps(_cost(given.one)))
-    else:
-        main(tuple(given.homes), given.against)
+    main(given.homes, given.against)

@@ -1,7 +1,7 @@
-"""What the formats that people have cost to read, and what becomes of them -> out/bench/inputs.json.
+"""Reading and repair of a realistic house of every format: `make bench NAME=inputs` -> out/bench/inputs.json.
 
-`python -m benchmarks inputs`: one realistic house of each format, written by tests/inputs, is read, furnished,
-repaired and looked at, each in a process of its own; then hostile ones of the same formats.
+tests/inputs writes the houses of about 300,000 triangles; each is measured in a new process (`python -m benchmarks.inputs TITLE`).
+Then hostile files of the same formats are run.
 """
 
 from __future__ import annotations
@@ -62,10 +62,10 @@ def _measured(title: str) -> dict[str, Any]:
 
 
 def class_agreement() -> float:
-    """Share of the names of given_classes.csv that a thing so called is read with the class of.
+    """Share of the names of given_classes.csv that give an item of that name their class.
 
-    Each name becomes a thing told by its box, as plans, scans and scenes without their models tell
-    it; names of structure and of what is not drawn have no such thing.
+    Each name becomes an item with only a box, as in plans, scans and scenes without models. Names of structure and of
+    items that are not drawn are skipped.
     """
     import csv
     from importlib.resources import files

@@ -1,4 +1,4 @@
-"""What a GPU (or whatever Dr.Jit finds) does here, part by part: light, denoiser, OpenGL, two slots, a large home, a trainer.
+"""Light, denoiser, OpenGL, two processes, a large home and training on a GPU: `make gpu-check` -> out/bench/gpu.json.
 
 Run by scripts/gpu_check.sh (`make gpu-check`). Each preset renders one view to compile, then a second one that
 counts; `paper` with a sixteenth of its samples and mutations, its time taken sixteen times. Launches are those
@@ -110,7 +110,7 @@ def opengl() -> dict[str, Any]:
 
 
 def two_slots() -> dict[str, Any]:
-    """Two processes on one card, both with a house of their own, as the slots of a worker."""
+    """Two processes on one card, each with its house, as the slots of a worker."""
     command = [sys.executable, "-m", "benchmarks.light.gpu", "slot"]
     slots = [subprocess.Popen(command, stdout=subprocess.PIPE, text=True) for _ in range(2)]
     rates = []
@@ -256,7 +256,7 @@ def _split(house: House) -> House:
 def _split_surface(surface: Surface) -> Surface:
     a, b, c = (surface.faces[:, k] for k in range(3))
     columns = [surface.positions, surface.uvs, surface.normals]
-    # Every triangle gets six vertices of its own: its corners and the middles of its edges.
+    # Triangles share no vertices: each has its corners and the middles of its edges.
     given: list[Any] = []
     for column in columns:
         if column is None:
@@ -272,7 +272,7 @@ def _split_surface(surface: Surface) -> Surface:
 
 
 def _used_mb() -> float:
-    """MB in use on the first card; of this process where there is none."""
+    """MB in use on the first card, or of this process without a card."""
     if choose_variant().startswith("cuda") and shutil.which("nvidia-smi"):
         query = [
             "nvidia-smi",

@@ -1,9 +1,8 @@
-"""Renders an exported scene with Blender's Cycles: run by benchmarks/renderers/cycles.py, in its own Python.
+"""Render an exported scene with Blender's Cycles; benchmarks/renderers/cycles.py runs it in another Python.
 
-`bpy` is GPL: this file is a program of its own. It imports nothing of pbrs_farm and nothing
-imports it; both sides meet in files: scene.npz, scene.json, dome.exr, textures as PNG. For every
-job of jobs.json it renders a picture (float32 EXR, linear) and prints one line of JSON with the
-processor time of all threads.
+`bpy` is GPL, so this is a separate program: it imports nothing of pbrs_farm and nothing imports it. Both sides share
+files: scene.npz, scene.json, dome.exr, textures as PNG. For each job of jobs.json it renders a picture (float32 EXR,
+linear) and prints a line of JSON with the CPU time of all threads.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ BLENDER_FROM_WORLD = Matrix(((1, 0, 0, 0), (0, 0, -1, 0), (0, 1, 0, 0), (0, 0, 0
 
 
 def main(folder: Path) -> None:
-    """Load the scene of folder and do its jobs."""
+    """Load the scene in folder and render its jobs."""
     described = json.loads((folder / "scene.json").read_text())
     bpy.ops.wm.read_factory_settings(use_empty=True)
     add_mesh(folder, described)
@@ -47,7 +46,7 @@ def main(folder: Path) -> None:
 
 
 def set_up(scene, job):  # type: ignore[no-untyped-def]
-    """Cycles as it comes, but for what would bias it or clean it: clamping, denoising, filters."""
+    """Set Cycles' defaults without clamping, denoising and filters."""
     scene.render.engine = "CYCLES"
     scene.render.resolution_x, scene.render.resolution_y = job["size"]
     scene.render.resolution_percentage = 100
@@ -56,7 +55,7 @@ def set_up(scene, job):  # type: ignore[no-untyped-def]
     scene.render.image_settings.color_depth = "32"
     scene.render.image_settings.exr_codec = "ZIP"
     scene.render.film_transparent = False
-    scene.render.use_persistent_data = True  # the next picture finds the scene loaded
+    scene.render.use_persistent_data = True  # keep the scene loaded between pictures
     c = scene.cycles
     c.device = "CPU"
     c.samples, c.seed = job["samples"], job["seed"]
@@ -70,12 +69,11 @@ def set_up(scene, job):  # type: ignore[no-untyped-def]
     c.max_bounces = c.diffuse_bounces = c.glossy_bounces = c.transmission_bounces = bounces
     c.transparent_max_bounces = 64
     c.pixel_filter_type = "BOX"
-    c.use_light_tree = job["light_tree"]
-    c.use_guiding = job["guiding"]  # of surfaces, direct light counted; trained by 128 samples
+    c.use_light_tree, c.use_guiding = True, False
 
 
 def camera_of(job):  # type: ignore[no-untyped-def]
-    """A camera of the exported pose: OpenGL axes, as Blender's own."""
+    """The camera at the exported pose (OpenGL axes, like Blender's)."""
     held = bpy.data.objects.get("camera")
     if held is None:
         held = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
@@ -133,7 +131,7 @@ def add_sky(folder: Path, sun) -> None:  # type: ignore[no-untyped-def]
 
 
 def add_portal(portal):  # type: ignore[no-untyped-def]
-    """An opening that the dome is sampled through, seen from the room that it looks into."""
+    """A portal in an opening, facing the room."""
     light = bpy.data.lights.new("portal", "AREA")
     light.cycles.is_portal = True
     corners = [BLENDER_FROM_WORLD.to_3x3() @ Vector(c) for c in portal["corners"]]
@@ -164,7 +162,7 @@ def material_of(folder: Path, part):  # type: ignore[no-untyped-def]
         picture.image.alpha_mode = "CHANNEL_PACKED"
 
     def colour(node, rgb):  # type: ignore[no-untyped-def]
-        """Set a colour, times the texture where there is one."""
+        """Set a colour, multiplied by the texture if there is one."""
         if picture is None:
             node.inputs["Color"].default_value = (*rgb, 1)
             return node
@@ -231,8 +229,8 @@ def _mixed(nodes, links, share, a, b):  # type: ignore[no-untyped-def]
 
 
 def _pane_fresnel(nodes, links):  # type: ignore[no-untyped-def]
-    """2 r / (1 + r): what a thin pane of index 1.5 reflects, from either side."""
-    # The Fresnel node turns its index over on back faces: 1 / 1.5 there undoes it.
+    """Reflectance of a thin pane of index 1.5 from either side: 2 r / (1 + r)."""
+    # The Fresnel node inverts its index on back faces; 1 / 1.5 there undoes it.
     side, index = nodes.new("ShaderNodeNewGeometry"), nodes.new("ShaderNodeMapRange")
     index.inputs["To Min"].default_value, index.inputs["To Max"].default_value = 1.5, 1 / 1.5
     links.new(side.outputs["Backfacing"], index.inputs["Value"])

@@ -41,7 +41,7 @@ from pbrs_farm.transport.scene_tables.scene_tables import (
 )
 from pbrs_farm.transport.scene_tables.sky import Sky, sky_for_house
 
-BESIDE_M = 0.4  # from an opening's middle plane to a point that surely lies in the room beside it
+BESIDE_M = 0.4  # distance from an opening's middle plane to a point inside the room beside it
 
 
 def home_without_coats(name: str) -> tuple[House, LightScene, dict[str, NDArray[np.uint8]]]:

@@ -1,1 +1,1 @@
-"""What the study's parts cost and reach."""
+"""Costs and results of the study."""

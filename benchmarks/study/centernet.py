@@ -35,7 +35,7 @@ _FOLDER: Final = cache_folder() / "centernet"
 _SIZE: Final = 512  # of the picture it looks at, wide and high
 _STRIDE: Final = 4  # of its map of centres
 _MOST: Final = 100  # detections
-_OVERLAP: Final = 0.5  # from which on a weaker detection of a class is the same thing
+_OVERLAP: Final = 0.5  # overlap from which a weaker detection of a class is a duplicate
 
 COCO: Final = (
     "person", "bicycle", "car", "motorcycle", "airplane", "bus", "train", "truck", "boat", "traffic light",
@@ -52,7 +52,7 @@ COCO: Final = (
 
 @dataclass(frozen=True, slots=True)
 class Detection:
-    """A thing in a picture."""
+    """An object in a picture."""
 
     name: str  # of COCO
     score: float  # 0 to 1
@@ -60,7 +60,7 @@ class Detection:
 
 
 def detect(colour: NDArray[np.uint8], least: float = 0.1) -> list[Detection]:
-    """What it finds in (H, W, 3) sRGB, from the surest on; at least so sure, 0 to 1."""
+    """Objects in (H, W, 3) sRGB with at least this score, 0 to 1, highest first."""
     height, width = colour.shape[:2]
     squeezed = Image.fromarray(colour).resize((_SIZE, _SIZE), Image.Resampling.BILINEAR)
     scores, reach = _maps(np.asarray(squeezed, np.float32))
@@ -115,7 +115,7 @@ def _maps(picture: NDArray[np.float32]) -> tuple[Tensor, Tensor]:
 
 
 def _run(op: str, inputs: list[Tensor], attributes: dict[str, Any]) -> Tensor:
-    """What a node gives; pictures are (B, C, H, W), constants as stored."""
+    """Result of a node; pictures are (B, C, H, W), constants as stored."""
     x = inputs[0]
     if op in ("_FusedConv2D", "Conv2D", "FusedDepthwiseConv2dNative", "DepthwiseConv2dNative"):
         return _convolved(op, inputs, attributes)
@@ -153,7 +153,7 @@ def _convolved(op: str, inputs: list[Tensor], attributes: dict[str, Any]) -> Ten
 
 
 def _enlarged(x: Tensor, size: int) -> Tensor:
-    """As TensorFlow's first resize: a new pixel k lies at the old one's k / 2, not between."""
+    """As TensorFlow's first resize: the new pixel k samples the old position k / 2, without half-pixel offset."""
     for axis in (2, 3):
         at = torch.arange(size) * (x.shape[axis] / size)
         low = at.floor().long()

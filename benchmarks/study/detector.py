@@ -1,7 +1,7 @@
-"""A detector that learned photographs, as a judge of our things: which does it find, by class and size?
+"""Recall of a detector trained on photographs on our views, by class and size.
 
-Effects: reads views, writes out/study/detector. `--coco` and `--pictures` ask the same of photographs
-with boxes, as COCO's instances_val2017.json has them: a thing that photographs lose, too, is no fault of ours.
+Effects: reads views, writes out/study/detector. `--coco` and `--pictures` measure photographs with boxes in the form of COCO's
+instances_val2017.json: objects that the detector also misses there are no fault of the views.
 """
 
 from __future__ import annotations
@@ -19,17 +19,17 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from benchmarks.study.centernet import Detection, detect, overlap
-from benchmarks.study.rendered import FOLDER
+from benchmarks.study.shipped import FOLDER
 from pbrs_farm.views.open_views import open_views
 
 RESULTS: Final = FOLDER / "detector/results.json"
 _LEAST_SCORE: Final = 0.2
 _LEAST_OVERLAP: Final = 0.5
-_LEAST_SEEN: Final = 0.7  # share of a thing that nothing hides
+_LEAST_SEEN: Final = 0.7  # visible share of an object
 _EDGES: Final = (0.0, 0.03, 0.06, 0.12, 0.25, 1.0)  # of sizes
 SMALL: Final = (0.06, 0.12)  # "about .08 of the picture"
 
-# Words of an instance's name -> what it is called here, and what COCO may call it.
+# Name of an instance -> our class; our class -> accepted classes of COCO.
 _NAMES: Final = {
     "cup": "cup", "mug": "cup", "tumbler": "cup", "wine glass": "cup", "bowl": "bowl", "bottle": "bottle",
     "vase": "vase", "chair": "chair", "armchair": "chair", "sofa": "couch", "single bed": "bed", "bed": "bed",
@@ -44,7 +44,7 @@ VESSELS: Final = ("cup", "bowl", "bottle", "vase")
 
 @dataclass(frozen=True, slots=True)
 class Thing:
-    """Something a detector should find."""
+    """An object that a detector should find."""
 
     picture: str
     name: str  # of _ACCEPTED
@@ -80,7 +80,7 @@ Picture = tuple[str, NDArray[np.uint8], list[Thing]]
 
 
 def pictures_of_root(root: str, mode: str = "") -> Iterator[Picture]:
-    """Each view, and of its instances those that are whole, in sight and named."""
+    """Each view with its whole, visible and named instances."""
     for frame in open_views(root):
         width, height = frame.size
         things = [
@@ -94,7 +94,7 @@ def pictures_of_root(root: str, mode: str = "") -> Iterator[Picture]:
 
 
 def pictures_of_coco(path: Path, folder: Path) -> Iterator[Picture]:
-    """Each photograph of a COCO file that has a thing of ours."""
+    """Each photograph of a COCO file with an object of our classes."""
     found = json.loads(path.read_bytes())
     names = {row["id"]: row["name"] for row in found["categories"]}
     boxes: dict[int, list[tuple[str, Any]]] = {}
@@ -120,7 +120,7 @@ def _thing(picture: str, name: str, box: Sequence[float], width: int, height: in
 
 
 def judged(pictures: Iterator[Picture]) -> list[Thing]:
-    """The things, each with whether it was found."""
+    """The objects, each marked as found or not."""
     return [
         Thing(thing.picture, thing.name, thing.size, thing.box, is_found(thing, detections))
         for _, colour, things in pictures
@@ -130,7 +130,7 @@ def judged(pictures: Iterator[Picture]) -> list[Thing]:
 
 
 def is_found(thing: Thing, detections: Sequence[Detection]) -> bool:
-    """Some detection of what it may be called overlaps it by half."""
+    """True if a detection with an accepted name overlaps it by half."""
     return any(
         one.name in _ACCEPTED[thing.name] and overlap(one.box, thing.box) >= _LEAST_OVERLAP
         for one in detections
@@ -140,7 +140,7 @@ def is_found(thing: Thing, detections: Sequence[Detection]) -> bool:
 def recall(
     things: Sequence[Thing], names: Sequence[str], low: float = 0, high: float = 1
 ) -> tuple[int, int]:
-    """How many of these names and sizes were found, of how many."""
+    """(number found, number of objects) of these names and sizes."""
     chosen = [t for t in things if t.name in names and low <= t.size < high]
     return sum(t.found for t in chosen), len(chosen)
 
@@ -169,7 +169,7 @@ def _cell(found: int, n: int) -> str:
 
 
 def as_row(thing: Thing) -> dict[str, Any]:
-    """A thing as JSON has it."""
+    """A JSON row of an object."""
     return {"picture": thing.picture, "name": thing.name, "size": thing.size, "box": list(thing.box), "found": thing.found}  # fmt: skip
 
 

@@ -1,10 +1,8 @@
-"""How near our pictures' tones are to photographs of rooms, looked at where people look.
+"""Tones of our pictures beside those of photographs of rooms: `make bench NAME=tone` -> out/bench/tone.json.
 
-Effects: renders below out/tone; writes out/bench/tone.json and the sheet of the six worst views, out/tone/worst.png.
-
-Views of made homes that nobody looked at while the tone was set, 320x240, recipe fast. Pixels of windows
-and of what is seen through them are left out where highlights are counted: a photograph of a room burns
-its windows too.
+Views of generated homes that nobody saw while the tone was set, 320x240, recipe fast. Highlights are counted without windows
+and the view through them, which photographs of rooms overexpose too. Effects: renders below out/tone; writes a sheet of the
+six worst views, out/tone/worst.png.
 
     python -m benchmarks.study.picture_tone             those homes
     python -m benchmarks.study.picture_tone ROOT...     finished views of other output folders
@@ -53,7 +51,7 @@ UNITS: Final = {
 
 
 def main(places: Sequence[str] = ()) -> None:
-    """Render what is not there yet, measure, write the figures and the sheet."""
+    """Render missing views, measure, write the figures and the sheet."""
     views = [frame for place in places or [_rendered()] for frame in open_views(place)]
     rows = np.array(
         [picture_row(frame.picture("mlt_il_ol"), window_mask(frame)) for frame in views]
@@ -87,7 +85,7 @@ def _rendered() -> str:
 
 
 def window_mask(frame: Frame) -> F64:
-    """(H, W) True where a pane, what lies behind it, or nothing is seen."""
+    """(H, W) True for panes, pixels behind them, and pixels without a surface."""
     glass = (
         frame.layer("glass") > 0 if "glass" in frame.layers else np.zeros(frame.depth.shape, bool)
     )
@@ -107,7 +105,7 @@ def picture_row(picture: Srgb8Image, is_window: F64) -> F64:
 
 
 def halo_of_a_step() -> float:
-    """How far local contrast overshoots beside steps of one to six stops, as a share of the step that is left.
+    """Largest overshoot of local contrast beside steps of one to six stops, as a share of the remaining step.
 
     The neutral response is one curve for all pixels and cannot make a halo; of the cameras `phone` alone
     acts locally, with a local_contrast of .4.

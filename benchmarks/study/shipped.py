@@ -1,164 +1,169 @@
-"""The weights that come with the package: trained, judged and packed; and what they are worth.
+"""Make the networks that ship with the package: render the homes, train, judge, pack.
 
-    python -m benchmarks.study.start_curve render --homes 100   homes, with their labels
-    python -m benchmarks.study.shipped                          trainings, cards: an hour of a core
-    python -m benchmarks.study.shipped --tasks boundaries       one of them
+    python -m benchmarks.study.shipped render --homes 160    training homes and held-out homes
+    python -m benchmarks.study.shipped train                 all tasks; hours of a core without a GPU
+    python -m benchmarks.study.shipped train normals --on photos=/my/rgbd
+    python -m benchmarks.study.shipped install               the best seed of each task
 
-Normals come from start_curve.py's own trainings; classes and boundaries are trained here on the same homes.
-Effects: out/study/curve (drawn homes that judge, rendered where they are missing), out/study/shipped/<task>,
-and with --install pbrs_farm/study/weights/<task>. What is trained is kept.
+Every command resumes: finished homes and judged runs are skipped. Effects: out/study/shipped (or
+PBRS_STUDY_FOLDER/shipped); `install` writes pbrs_farm/study/weights.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import os
 import shutil
-import statistics
 import sys
-import tempfile
-import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Final
-
-import numpy as np
+from typing import Any, Final
 
 import pbrs_farm.cli
-from benchmarks.study.curve import rendered
-from benchmarks.study.kept_rows import Figures
-from benchmarks.study.rendered import FOLDER
-from benchmarks.study.start_curve import HOMES, held_out
 
-RUNS: Final = FOLDER / "shipped"
-PLANS: Final = {
+FOLDER: Final = Path(os.environ.get("PBRS_STUDY_FOLDER", "out/study"))
+HOMES: Final = FOLDER / "shipped/homes"
+DRAWN: Final = FOLDER / "shipped/drawn"
+RUNS: Final = FOLDER / "shipped/runs"
+FIRST_HELD_OUT: Final = 60101
+"""First seed of the generated homes that are never trained on."""
+N_HELD_OUT: Final = 12
+_SMALL: Final = (
+    "--size", "160x120", "--recipe", "fast", "--modes", "mlt_il_ol",
+    "--set", "cameras.score_width_px=160", "--set", "cameras.score_height_px=120",
+)  # fmt: skip
+_DRAWN_HOMES: Final = ("Studio", "2BedroomApartment", "3BedroomHouseWithAttic")
+_PHONE: Final = (
+    "tone.camera=phone", "tone.white_balance=0.9", "tone.glare=0.04",
+    "cameras.tilt_deg=4", "cameras.hfov_rad=1.15",
+)  # fmt: skip
+"""Camera of the drawn homes: another response and lens than those of the training views."""
+_EVERY_TASK: Final = ("judge_every=0", "threads=1")
+TASKS: Final[dict[str, tuple[int, int, tuple[str, ...]]]] = {
+    "normals": (1600, 2, ("steps=3000", "batch=16", "final_views=200", "checkpoint_every=500")),
     "segmentation": (
-        "steps=1200",
-        "batch=16",
-        "n_classes=13",
-        "average=0.99",
-        "zoom=1.3",
-        "hue=0.5",
-        "threads=1",
-        "judge_every=0",
-        "final_views=100",
+        1000, 1,
+        ("steps=1200", "batch=16", "n_classes=13", "average=0.99", "zoom=1.3", "hue=0.5", "final_views=100"),
     ),
-    "boundaries": (
-        "steps=700",
-        "batch=8",
-        "average=0.99",
-        "hue=0.5",
-        "threads=1",
-        "judge_every=0",
-        "final_views=32",
-    ),
-}
-"""Task -> what its plan `lite` is changed by."""
-VIEWS: Final = {"segmentation": 1000, "boundaries": 600}
-"""Task -> views it trains on, spread over the homes."""
-_MEASURES: Final = "made"
-_DRAWN: Final = "drawn"
+    "boundaries": (600, 1, ("steps=700", "batch=8", "average=0.99", "hue=0.5", "final_views=32")),
+}  # fmt: skip
+"""Task -> training views, seeds, and changes to plan `lite`."""
+_BEST: Final = {"normals": ("mean_deg", min), "segmentation": ("mean_iou", max), "boundaries": ("ods", max)}  # fmt: skip
 MADE_BY: Final = (
-    "python -m benchmarks.study.start_curve render --homes 100",
-    "python -m benchmarks.study.shipped",
+    "python -m benchmarks.study.shipped render",
+    "python -m benchmarks.study.shipped train",
 )
-_N_PHOTOGRAPHS: Final = 4
-
-UNITS: Final = {
-    "study.weights_mb": "MB, the largest of the weights that come with the package",
-    "study.weights_deg": "degrees, mean, of the shipped normals on made homes that never trained; of two seeds they chose the better",
-    "study.predict_s": "CPU-s a 640x480 picture, shipped normals; <= 1",
-    "study.onnx_equal": "1 = ONNX says what the shipped normals say, within 1e-4",
-}
 
 
-def main(words: Sequence[str] = ()) -> None:
-    """Train, judge, pack; install where that is asked for."""
-    parser = argparse.ArgumentParser(prog="benchmarks.study.shipped")
-    parser.add_argument("--tasks", nargs="+", choices=list(PLANS), default=list(PLANS))
-    parser.add_argument("--jobs", type=int, default=1, help="processes that render")
-    parser.add_argument("--install", action="store_true", help="into pbrs_farm/study/weights")
+def main(words: Sequence[str]) -> None:
+    """Run one of the three commands."""
+    args = _arguments(words)
+    if args.command == "render":
+        render(args.homes, args.jobs)
+    elif args.command == "train":
+        for task in args.tasks or TASKS:
+            for seed in range(args.seeds or TASKS[task][1]):
+                train(task, seed, args.on)
+    else:
+        install()
+
+
+def _arguments(words: Sequence[str]) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.study.shipped")
+    commands = parser.add_subparsers(dest="command", required=True)
+    rendering = commands.add_parser("render")
+    rendering.add_argument("--homes", type=int, default=160, help="training homes")
+    rendering.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="processes")
+    training = commands.add_parser("train")
+    training.add_argument("tasks", nargs="*", metavar="TASK", help=f"of {', '.join(TASKS)}")
+    training.add_argument("--seeds", type=int, default=0, help="trainings of each task")
+    training.add_argument("--on", nargs="+", default=[], metavar="NAME=PLACE", help="more judges")
+    commands.add_parser("install")
     args = parser.parse_args(words)
-    place = str(HOMES)
-    held, _ = held_out(place)
-    judges = {_MEASURES: place, _DRAWN: rendered(_DRAWN, args.jobs)}
-    for task in args.tasks:
-        run = RUNS / task
-        for line in (_training(task, run, place, held), _judging(run, judges)):
-            if pbrs_farm.cli.main(line):
-                raise RuntimeError(f"{' '.join(line[:2])} failed; what is done is kept")
-        from pbrs_farm.study.judging.packed_weights import SHIPPED, pack_weights
-
-        packed = pack_weights(run, run / "packed", made_by=MADE_BY)
-        if args.install:
-            shutil.copytree(packed.root, SHIPPED / task, dirs_exist_ok=True)
+    unknown = set(getattr(args, "tasks", ())) - set(TASKS)
+    if unknown:
+        parser.error(f"no task {min(unknown)!r}; expected {', '.join(TASKS)}")
+    return args
 
 
-def _training(task: str, run: Path, place: str, held: Sequence[str]) -> list[str]:
-    return [
-        "train", task, place, "--plan", "lite", "--init", "imagenet", "--hold-out", *held,
-        "--views", str(VIEWS[task]), "--out", str(run),
-        *(word for field in PLANS[task] for word in ("--set", field)),
-    ]  # fmt: skip
+def render(n_homes: int, n_jobs: int) -> None:
+    """Render the generated homes, ten views each, and the drawn homes."""
+    held_out = f"made:{FIRST_HELD_OUT}..{FIRST_HELD_OUT + N_HELD_OUT - 1}"
+    jobs = ("--jobs", str(n_jobs))
+    phone = [word for field in _PHONE for word in ("--set", field)]
+    _render(
+        held_out, f"made:1..{n_homes}", *_SMALL, *jobs,
+        "--dress", "1", "--views", "10", "--out", str(HOMES),
+    )  # fmt: skip
+    _render(
+        *_DRAWN_HOMES, *_SMALL, *jobs, *phone,
+        "--dress", "7", "--views", "16", "--out", str(DRAWN),
+    )  # fmt: skip
 
 
-def _judging(run: Path, judges: dict[str, str]) -> list[str]:
-    on = [word for name, root in judges.items() for word in ("--on", f"{name}={root}")]
-    return ["evaluate", str(run), *on]
+def _render(*words: str) -> None:
+    # A failed view is skipped; the others are used.
+    if pbrs_farm.cli.main(["run", *words]):
+        print("some steps failed, the finished views are used", file=sys.stderr)
 
 
-def shipped_figures() -> Figures:
-    """What the weights in the package are: size, error as their card says, seconds, ONNX."""
-    from pbrs_farm.study.judging.evaluation import open_run
-    from pbrs_farm.study.judging.packed_weights import SHIPPED, shipped_run
-
-    sizes = [path.stat().st_size / 1e6 for path in SHIPPED.glob("*/weights.safetensors")]
-    run = open_run(shipped_run("normals"))
-    judged = {row["on"]: row for row in json.loads((run.folder.root / "judged.json").read_text())}
-    return {
-        "study.weights_mb": round(max(sizes), 2),
-        "study.weights_deg": judged[_MEASURES]["figures"]["network"]["mean_deg"],
-        "study.predict_s": _seconds_a_photograph(run.folder.root),
-        "study.onnx_equal": float(_is_equal_in_onnx(run.folder.root)),
-    }
-
-
-def _seconds_a_photograph(root: Path) -> float:
-    from pbrs_farm.images import jpeg_from_array
-    from pbrs_farm.study.judging.evaluation import open_run
-    from pbrs_farm.study.judging.photo_predictions import predict_photographs
-
-    run = open_run(root)
-    with tempfile.TemporaryDirectory() as folder:
-        files = [Path(folder) / f"{k}.jpg" for k in range(_N_PHOTOGRAPHS)]
-        for k, path in enumerate(files):
-            noise = np.random.default_rng(k).integers(0, 256, (480, 640, 3)).astype(np.uint8)
-            path.write_bytes(jpeg_from_array(noise))
-        times = []
-        for path in files:
-            began = time.process_time()
-            list(predict_photographs(run, [path], Path(folder) / "seen"))
-            times.append(time.process_time() - began)
-    return round(statistics.median(times), 3)
+def train(task: str, seed: int, judges: Sequence[str] = ()) -> None:
+    """Train and judge one seed of a task, unless its evaluation exists."""
+    run = RUNS / f"{task}_seed{seed}"
+    if (run / "evaluation/evaluation.json").exists():
+        return
+    n_views, _n_seeds, fields = TASKS[task]
+    changes = [word for field in (*fields, *_EVERY_TASK) for word in ("--set", field)]
+    _program(
+        "train", task, str(HOMES), "--plan", "lite", "--init", "imagenet", "--seed", str(seed),
+        "--views", str(n_views), "--hold-out", *held_out_homes(), *changes, "--out", str(run),
+    )  # fmt: skip
+    places = (f"made={HOMES}", f"drawn={DRAWN}", *judges)
+    _program("evaluate", str(run), *(word for place in places for word in ("--on", place)))
 
 
-def _is_equal_in_onnx(root: Path) -> bool:
-    import onnxruntime
-    import torch
+def held_out_homes() -> list[str]:
+    """Names of the rendered homes that judge."""
+    from pbrs_farm.core.house_split import home_of
+    from pbrs_farm.views.open_views import open_views
 
-    from pbrs_farm.study.judging.evaluation import open_run
-    from pbrs_farm.study.training.prediction import network_output, write_onnx
+    homes = {home_of(ref.house) for ref in open_views(str(HOMES)).refs}
+    held_out = sorted(h for h in homes if int(h.rpartition("-")[2]) >= FIRST_HELD_OUT)
+    if not held_out or len(held_out) == len(homes):
+        raise RuntimeError(f"{HOMES}: no training homes or no held-out homes; run `render` first")
+    return held_out
 
-    run = open_run(root)
-    shape = (1, 3, run.plan.height_px, run.plan.width_px)
-    colour = torch.rand(shape, generator=torch.Generator().manual_seed(1))
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "model.onnx"
-        with torch.no_grad():
-            said = network_output(run.network.eval(), colour, run.plan).numpy()
-        write_onnx(run.network, run.plan, path)
-        found = onnxruntime.InferenceSession(path).run(["map"], {"colour": colour.numpy()})[0]
-    return bool(np.abs(found - said).max() <= 1e-4 * max(1.0, float(np.abs(said).max())))
+
+def install() -> None:
+    """Pack the best seed of each task and copy it into the package."""
+    from pbrs_farm.study.judging.packed_weights import SHIPPED, pack_weights
+
+    for task in TASKS:
+        reports = sorted(RUNS.glob(f"{task}_seed*/evaluation/evaluation.json"))
+        if not reports:
+            print(f"{task}: no judged run, left as it is")
+            continue
+        run = best_run(task, {path.parents[1]: json.loads(path.read_text()) for path in reports})
+        packed = pack_weights(run, RUNS / "packed" / task, made_by=MADE_BY)
+        shutil.copytree(packed.root, SHIPPED / task, dirs_exist_ok=True)
+        print(f"{task}: {run.name} installed")
+
+
+def best_run(task: str, reports: dict[Path, dict[str, Any]]) -> Path:
+    """The run with the best figure of the task on held-out generated homes."""
+    figure, best = _BEST[task]
+
+    def score(run: Path) -> float:
+        (row,) = (row for row in reports[run]["evaluations"] if row["on"] == "made")
+        return float(row["figures"]["network"][figure])
+
+    return best(reports, key=score)
+
+
+def _program(*words: str) -> None:
+    if pbrs_farm.cli.main(list(words)):
+        raise RuntimeError(f"{' '.join(words[:2])} failed; finished parts are kept")
 
 
 if __name__ == "__main__":

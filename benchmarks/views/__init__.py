@@ -1,1 +1,1 @@
-"""What a view costs: cameras, OpenGL, labels, the whole of it."""
+"""Costs of a view and of the demo."""

@@ -8,8 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks import __main__ as benches
 from benchmarks import figures
-from benchmarks.__main__ import DEFAULT, OWN_TARGET, main
+from benchmarks.__main__ import BENCHES, Bench, main
 
 
 def test_a_report_holds_figures_units_machine_versions_and_commit(
@@ -37,13 +38,35 @@ def test_a_figure_without_a_unit_is_refused_and_nothing_is_written(
     assert not (tmp_path / "bench").exists()
 
 
-@pytest.mark.parametrize(("name", "module"), (DEFAULT | OWN_TARGET).items())
-def test_every_bench_has_its_module(name: str, module: str) -> None:
-    assert find_spec(f"benchmarks.{module}") is not None, name
+@pytest.mark.parametrize("name", BENCHES)
+def test_every_bench_has_its_module_and_its_claim(name: str) -> None:
+    assert find_spec(f"benchmarks.{BENCHES[name].module}") is not None
+    assert BENCHES[name].claim
+
+
+def test_all_benches_of_the_lab_book_take_at_most_an_hour() -> None:
+    assert sum(bench.minutes for bench in BENCHES.values() if bench.in_all) <= 60
+
+
+def test_all_runs_every_bench_then_writes_the_tables(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(figures, "FOLDER", tmp_path)
+    modules = {"first": "figures", "second": "memory", "not_in_all": "memory"}
+    some = {name: Bench(module, "a claim", 1, in_all=name != "not_in_all") for name, module in modules.items()}  # fmt: skip
+    calls: list[str] = []
+    monkeypatch.setattr(benches, "BENCHES", some)
+    monkeypatch.setattr("benchmarks.figures.main", lambda: calls.append("first"), raising=False)
+    monkeypatch.setattr("benchmarks.lab_tables.main", lambda: calls.append("tables"))
+    assert main(["all"]) == 1  # memory has no main()
+    assert calls == ["first", "tables"]
+    report = json.loads((tmp_path / "bench_all.json").read_text(encoding="utf-8"))["figures"]
+    assert report["bench_all.failed"] == ["second"]
+    assert report["bench_all.minutes"] == 0.0
 
 
 def test_an_unknown_bench_is_rejected_by_name(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["nothing"]) == 2
     assert "no bench 'nothing'; of demo" in capsys.readouterr().err
     assert main(["--list"]) == 0
-    assert capsys.readouterr().out.split() == [*DEFAULT, *OWN_TARGET]
+    assert capsys.readouterr().out.split() == [*BENCHES]

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import json
 import re
+from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
 
 from benchmarks import lab_tables
-from benchmarks.__main__ import DEFAULT, OWN_TARGET
-from benchmarks.lab_tables import ROWS, TABLES, WRITTEN_ELSEWHERE, LabRow, filled, written_tables
+from benchmarks.__main__ import BENCHES
+from benchmarks.lab_tables import ROWS, TABLES, LabRow, filled, written_tables
 from benchmarks.manual_pages import REPO
 from pbrs_farm.core.record import read_csv
 
@@ -80,7 +82,7 @@ def test_a_table_without_its_report_or_a_figure_stays_and_is_named(
     before = page.read_text()
     _report(tmp_path, "one", {"one.s": 6.84})
     (said,) = written_tables(tmp_path / "docs", tmp_path)
-    assert "ours stays as it is: there is no " in said
+    assert "ours is unchanged: there is no " in said
     assert said.endswith("(python -m benchmarks one two)")
     _report(tmp_path, "two", {})
     (said,) = written_tables(tmp_path / "docs", tmp_path)
@@ -96,14 +98,6 @@ def test_a_table_without_its_report_or_a_figure_stays_and_is_named(
     assert page.read_text() == before
 
 
-def test_a_table_that_another_program_writes_is_left_alone(page: Path, tmp_path: Path) -> None:
-    text = "<!-- bench:sweep -->\ntheirs\n<!-- /bench -->\n"
-    page.write_text(text)
-    (said,) = written_tables(tmp_path / "docs", tmp_path)
-    assert WRITTEN_ELSEWHERE["sweep"] in said
-    assert page.read_text() == text
-
-
 def test_a_mark_that_is_no_table_is_told(page: Path, tmp_path: Path) -> None:
     page.write_text("<!-- bench:other -->\n<!-- /bench -->\n")
     with pytest.raises(ValueError, match="no table 'other'"):
@@ -113,7 +107,7 @@ def test_a_mark_that_is_no_table_is_told(page: Path, tmp_path: Path) -> None:
 def test_each_simple_table_stands_once_in_the_lab_book_with_its_rows() -> None:
     """A page has the first cells of the table, whoever wrote it, so that figures elsewhere find them."""
     text = "\n".join(p.read_text("utf-8") for p in (REPO / "docs/lab").glob("*.md"))
-    found = [(name, body) for name, body in _BLOCK.findall(text) if name not in WRITTEN_ELSEWHERE]
+    found = _BLOCK.findall(text)
     simple = {row.table for row in ROWS_OF_BOOK}
     assert sorted(name for name, _ in found if name in simple) == sorted(simple)
     for name, body in found:
@@ -128,14 +122,12 @@ def test_each_simple_table_stands_once_in_the_lab_book_with_its_rows() -> None:
 
 @pytest.mark.parametrize("row", [row for row in ROWS_OF_BOOK if row.bench], ids=lambda r: r.what)
 def test_the_figures_of_a_row_are_some_that_its_bench_writes(row: LabRow) -> None:
-    """Each name, or what follows its prefix, stands quoted in the bench's module or folder."""
-    module = (
-        REPO / "benchmarks" / (DEFAULT | OWN_TARGET)[row.bench].replace(".", "/")
-    ).with_suffix("")
-    files = [module / "__init__.py", module.with_suffix(".py"), *(module.parent.glob("*.py"))]
-    source = "\n".join(f.read_text("utf-8") for f in files if f.is_file())
-    names = [name for cell in row.cells for name in _NAME.findall(cell)]
-    assert names
-    for name in names:
-        parts = (name, name.partition(".")[2], name.partition(".")[2].partition("_")[2])
-        assert any(f'"{part}"' in source for part in parts if part), name
+    """Each is in the module's UNITS; without that table the name or its end is quoted in the module."""
+    name = f"benchmarks.{BENCHES[row.bench].module}"
+    units = getattr(import_module(name), "UNITS", None)
+    source = Path(find_spec(name).origin).read_text("utf-8")
+    figures = [figure for cell in row.cells for figure in _NAME.findall(cell)]
+    assert figures
+    for figure in figures:
+        end = figure.partition(".")[2]
+        assert figure in units if units else f'"{figure}"' in source or f'"{end}"' in source, figure

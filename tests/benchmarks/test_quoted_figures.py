@@ -6,9 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.light.table_rows import CYCLES_WAYS, RENDERED_HOMES, compare_lines, cycles_lines
 from benchmarks.manual_pages import REPO, manual_pages
 from benchmarks.quoted_figures import faults_of_pages, stale
+from benchmarks.renderers.cycles import HOMES
+from benchmarks.renderers.cycles_tables import compare_lines, cycles_lines
 
 LAB = """# Lab book: views
 
@@ -83,16 +84,16 @@ def test_a_figure_that_the_lab_book_does_not_have_is_told_with_its_line(
 def test_the_table_of_other_renderers_names_rows_of_the_lab_book_that_have_its_figures(
     tmp_path: Path,
 ) -> None:
-    figures = {"light.vs_cycles": 4.25, "light.vs_cycles_median": 3.5, "light.vs_cycles_metropolis": 18}  # fmt: skip
-    for number, home in enumerate(f"{home}_{k}" for home in RENDERED_HOMES for k in (0, 1)):
-        of_view = {"ratio": 3.5 + number, "ratio_median": 2.5, "ratio_metropolis": 7, "relmse": 0.1,
-                   "median": 0.1, "cpu_s": 2.0, "mean_luminance": 1.0, "block_ratio_median": 1.0,
-                   "mean_luminance_cycles": 1 - 0.003 * number}  # fmt: skip
-        for way in CYCLES_WAYS:
-            of_view |= {f"relmse_{way}": 0.2, f"median_{way}": 0.2, f"cpu_s_{way}": 3.0}
-        figures |= {f"light.cycles_{home}_{name}": value for name, value in of_view.items()}
+    figures = {"light.cycles_luminance_apart": 0.012}
+    for end, value in (("", 4.25), ("_median", 3.5), ("_metropolis", 18.0)):
+        for quantile, times in (("", 1.0), ("_q1", 0.5), ("_q3", 2.0)):
+            figures[f"light.vs_cycles{end}{quantile}"] = times * value
+    for view in (f"{home.lower()}_{k}" for home in HOMES for k in (0, 1)):
+        of_view = {"ours": 0.1, "theirs": 0.4, "ratio": 4.0, "ratio_median": 2.5,
+                   "ratio_metropolis": 7.0, "luminance": 0.99, "portals": 1.0}  # fmt: skip
+        figures |= {f"light.cycles_{view}_{name}": value for name, value in of_view.items()}
     (tmp_path / "light.md").write_text("\n".join(["## Against Cycles", *cycles_lines(figures)]))
     lines = compare_lines(figures)
     assert sum("<!-- figure: " in line for line in lines) == 4
-    assert "(3.5, 8.5)" in lines[2]
+    assert "4.2 (2.1 to 8.5)" in lines[2]
     assert list(stale("\n".join(lines), set(), tmp_path)) == []

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.api_examples import example_of, faults, public_names
+from tests.docs.api_examples import example_of, faults, public_names
 
 
 def test_nine_public_names_in_ten_have_an_example() -> None:

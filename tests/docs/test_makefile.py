@@ -9,12 +9,11 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.__main__ import DEFAULT, OWN_TARGET
+from benchmarks.__main__ import BENCHES
 
 REPO = Path(__file__).parents[2]
 MAKEFILE = (REPO / "Makefile").read_text(encoding="utf-8")
 TARGETS = re.findall(r"^([a-z][a-z0-9-]*):.*##", MAKEFILE, re.MULTILINE)
-BENCHES = [*DEFAULT, *OWN_TARGET]
 PAGES = [
     *sorted(REPO.glob("*.md")), *sorted((REPO / "docs").rglob("*.md")), *sorted((REPO / "deploy").rglob("*.md")),
     REPO / "tests/infra/README.md",
@@ -55,7 +54,7 @@ def test_a_target_is_commands_that_a_shell_can_read(target: str, name: str) -> N
 
 def test_a_bench_installs_what_it_needs_and_nothing_else() -> None:
     assert [c for c in commands_of("bench", "NAME=") if "pip" in c] == []
-    for name, extra in (("docs", "docs"), ("release", "release"), ("denoised", "bench")):
+    for name, extra in (("docs", "docs"), ("release", "release"), ("light", "bench")):
         (install,) = [c for c in commands_of("bench", f"NAME={name}") if "pip install" in c]
         assert install.endswith(f'-e ".[{extra}]"')
 

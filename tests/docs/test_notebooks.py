@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from benchmarks.bare_machine import BareMachine, built_wheel, can_be_made
+from tests.anywhere.bare_machine import BareMachine, built_wheel, can_be_made
 
 REPO = Path(__file__).parents[2]
 NOTEBOOKS = sorted((REPO / "docs/notebooks").glob("*.ipynb"))

@@ -10,7 +10,7 @@ from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.read.builtin.builtin_home import builtin_home
 from pbrs_farm.sample.house_sampler import sample_cameras
 
-gl_items = pytest.importorskip("benchmarks.views.gl_items")
+gl_items = pytest.importorskip("tests.sample.gl_items")
 
 
 def test_item_buffers_agree_with_opengls_but_for_pixels_on_edges() -> None:

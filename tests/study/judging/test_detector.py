@@ -84,11 +84,11 @@ def test_the_bench_tells_the_recall_of_kept_results(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(detector, "RESULTS", tmp_path / "results.json")
-    assert study_figures._detector() == {}
-    assert "benchmarks.study.detector" in capsys.readouterr().err
+    assert study_figures.detector_figures() == {}
+    assert "benchmarks.study.detector" in capsys.readouterr().out
     rows = {"views": [as_row(CUP)]}
     (tmp_path / "results.json").write_text(json.dumps(rows))
-    figures = study_figures._detector()
+    figures = study_figures.detector_figures()
     assert figures == {"study.detector_small": 0.0}
     assert figures.keys() <= study_figures.UNITS.keys()
 

@@ -1,6 +1,6 @@
 """Recomputes the answers of an export of questions from the stored files; imports nothing of pbrs_farm.
 
-`python -m benchmarks.question_check ROOT EXPORT` prints each wrong row and exits 1 if there is one.
+`python -m tests.export.question_check ROOT EXPORT` prints each wrong row and exits 1 if there is one.
 ROOT: the output folder that was exported. Distances come from points on house.glb's meshes, read with
 trimesh; everything else from view.json, house.json and the words of the question.
 """
@@ -265,7 +265,7 @@ def _fault_of_route(scene: _Scene, stops: list[int], turns: list[str]) -> str:
 def main(words: list[str]) -> int:
     """Print what is wrong; 1 if something is."""
     wrong = wrong_answers(Path(words[0]), Path(words[1]))
-    print("\n".join(wrong) or "all answers are right")
+    sys.stdout.write(("\n".join(wrong) or "all answers are right") + "\n")
     return int(bool(wrong))
 
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-REPO: Final = Path(__file__).parents[1]
+REPO: Final = Path(__file__).parents[2]
 HIDDEN: Final = (
     "/usr/lib/*/libLLVM*.so*", "/usr/lib/llvm-*/lib/libLLVM*.so*", "/usr/lib/*/libatomic.so*", "/usr/lib/*/libGL.so*",
     "/usr/lib/*/libEGL.so*", "/usr/lib/*/libOpenGL.so*", "/usr/lib/*/libGLX.so*", "/usr/lib/*/libOSMesa*",
@@ -85,7 +85,7 @@ class BareMachine:
         ]
         done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
         if done.returncode:
-            print(done.stdout[-2000:], done.stderr[-2000:])
+            sys.stderr.write(done.stdout[-2000:] + done.stderr[-2000:])
         return done
 
     def environment(self, name: str) -> Path:
