@@ -1,4 +1,4 @@
-"""Files that were read wrongly once, every format end to end, and hostile inputs: `make bench NAME=cases` -> out/bench/cases.json.
+"""Formerly misread files, every format end to end, and hostile inputs: `make bench NAME=cases` -> out/bench/cases.json.
 
 The builders are those of tests/cases, tests/inputs and tests/hostile. `python -m benchmarks.cases NAME...` runs the cases
 whose names contain one of the words and writes nothing.

@@ -64,15 +64,17 @@ def noise_figures(root: Path) -> dict[str, float]:
     )  # fmt: skip
     frames = sorted(pbrs_farm.open(root), key=lambda frame: frame.id)
     squared: dict[str, list[float]] = {"noise": [], "picture": [], "opengl": []}
+    pairs: dict[str, list[F32]]
     for first, second in itertools.pairwise(frames):
         exposure, gains = _metering(root, first)
         pairs = {
             "noise": [_exposed(root, frame, exposure, gains) for frame in (first, second)],
-            "picture": [frame.picture("mlt_il_ol") for frame in (first, second)],
-            "opengl": [frame.picture("opengl_il") for frame in (first, second)],
+            "picture": [np.float32(f.picture("mlt_il_ol")) for f in (first, second)],
+            "opengl": [np.float32(f.picture("opengl_il")) for f in (first, second)],
         }
         for name, (here, there) in pairs.items():
-            squared[name].append(_squared_error(first, here / 255.0, there / 255.0))
+            error = _squared_error(first, np.asarray(here / 255.0), np.asarray(there / 255.0))
+            squared[name].append(error)
         print(first.id, {n: round(_psnr(e[-1:]), 1) for n, e in squared.items()}, flush=True)
     seconds = [sum(_marker(root, step, frame)["seconds"] for step in ("light", "develop")) for frame in frames]  # fmt: skip
     return {f"film.{name}_db": round(_psnr(errors), 2) for name, errors in squared.items()} | {

@@ -15,6 +15,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, Final
 
 from benchmarks.figures import FOLDER, commit, write_report
@@ -57,35 +58,34 @@ def repair_home() -> Callable[[], object]:
     return _house
 
 
-def plan_home() -> Callable[[], object]:
-    """Plan and furnish a generated home."""
-    import numpy as np
+def make_items() -> Callable[[], object]:
+    """Generate six pieces of furniture from their seeds."""
+    import pbrs_farm as pf
 
-    from pbrs_farm.generate.drawn_home import drawn_home
-    from pbrs_farm.prepare.dress_catalogue import catalogue_of_words
-
-    catalogue = catalogue_of_words("")
-    return lambda: drawn_home(np.random.default_rng(7), catalogue)
+    names = ("bed", "bookcase", "desk", "chair", "sofa", "wardrobe")
+    return lambda: [pf.thing(name, seed=3) for name in names]
 
 
-def dress_home() -> Callable[[], object]:
-    """Dress the built-in home."""
-    from pbrs_farm.core.recipe import recipe_from_name
-    from pbrs_farm.dress.dressing import dress
-    from pbrs_farm.prepare.dress_catalogue import catalogue_of
-    from pbrs_farm.read.builtin.builtin_home import builtin_home
+def read_plan() -> Callable[[], object]:
+    """Read a floor plan into walls, rooms and openings."""
+    import tempfile
 
-    fields = recipe_from_name("preview").dress
-    home, catalogue = builtin_home(), catalogue_of(fields)
-    return lambda: dress(home, catalogue, fields, 1)
+    from pbrs_farm.core.recipe import ReadFields
+    from pbrs_farm.prepare.read_source import read_house
+    from pbrs_farm.prepare.source import resolve
+    from tests.inputs.plan_files import write_own
+
+    source = resolve(str(write_own(Path(tempfile.mkdtemp(prefix="hot-paths-")))))
+    return lambda: read_house(source, ReadFields())
 
 
 def sample_views() -> Callable[[], object]:
-    """Sample the cameras of the built-in home."""
+    """Sample the cameras of the built-in home on a coarse grid."""
     from pbrs_farm.core.recipe import recipe_from_name
     from pbrs_farm.sample.house_sampler import sample_cameras
 
-    house, fields = _house(), recipe_from_name("preview").cameras
+    coarse = {"cell_m": 1.5, "score_width_px": 40, "score_height_px": 30}
+    house, fields = _house(), recipe_from_name("preview").cameras.model_copy(update=coarse)
     caster = _caster(house)
     return lambda: sample_cameras(house, fields, 0, caster.item_counts, caster.depth_pictures)
 
@@ -120,7 +120,7 @@ def develop_picture() -> Callable[[], object]:
 
     noisy = np.random.default_rng(1).gamma(1.0, 0.5, (4, *_SIZE[::-1], 3)).astype(np.float32)
     aovs = LinearAovs(noisy[0], noisy[1], 0.5 + 0 * noisy[2], 0 * noisy[3] + np.float32([0, 0, 1]))
-    return lambda: develop(aovs, recipe_from_name("preview").tone)
+    return lambda: develop(aovs, recipe_from_name("preview").tone, denoise=True)
 
 
 def encode_layers() -> Callable[[], object]:
@@ -148,7 +148,7 @@ def match_edges() -> Callable[[], object]:
 PATHS: Final = {
     path.__name__: path
     for path in (
-        read_glb, repair_home, plan_home, dress_home, sample_views, cast_labels, trace_light,
+        read_glb, read_plan, repair_home, make_items, sample_views, cast_labels, trace_light,
         develop_picture, encode_layers, match_edges,
     )
 }  # fmt: skip

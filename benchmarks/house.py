@@ -96,7 +96,7 @@ def main() -> None:
 
 
 def static_figures() -> dict[str, Any]:
-    """What the source says by itself."""
+    """Figures that follow from the source alone."""
     texts = {path: path.read_text(encoding="utf-8") for path in sources()}
     trees = [ast.parse(text) for text in texts.values()]
     kinds = sum((line_kinds(text) for text in texts.values()), Counter[str]())
@@ -132,7 +132,7 @@ def sources() -> Iterator[Path]:
 
 
 def code_lines() -> int:
-    """Lines of everything that is code: TOML holds rules, Lua the ledger, JavaScript and GLSL pictures."""
+    """Lines of all code: TOML has rules, Lua the ledger, JavaScript and GLSL pictures."""
     files = [p for package in PACKAGES for p in Path(package).rglob("*") if p.suffix in CODE]
     ours = [p for p in files if not p.is_relative_to(VENDORED)]
     return sum(len(p.read_text(encoding="utf-8").splitlines()) for p in ours)
@@ -154,7 +154,7 @@ def shared_names(trees: Mapping[Path, ast.Module]) -> dict[str, list[Path]]:
 
 
 def headings(text: str) -> list[tuple[int, str]]:
-    """(line, text) of the comments that stand alone between blank lines, below a module's head."""
+    """(line, text) of comments alone between blank lines, below a module's head."""
     lines = text.splitlines()
     found = []
     for number, line in enumerate(lines):
@@ -206,7 +206,7 @@ raise SystemExit(0 if code in (0, 5) else code)
 
 
 def line_kinds(text: str) -> Counter[str]:
-    """How many lines of each of LINE_KINDS a module has; every line counts once."""
+    """Number of lines of each of LINE_KINDS in a module; every line counts once."""
     # Mark the lines of imports and docstrings, then tell the others by how they begin.
     kind: dict[int, str] = {}
     for node in ast.walk(ast.parse(text)):
@@ -251,7 +251,7 @@ def imports_of_modules() -> Imports:
 
 
 def single_importers(imports: Imports) -> list[str]:
-    """Modules that one other imports, which stands in the same folder."""
+    """Modules with a single importer, in the same folder."""
     importers = defaultdict(set)
     for importer, modules in imports.items():
         for module in modules:
@@ -359,7 +359,7 @@ def _covered(*folders: Path) -> float:
 
 
 def offenders(folders: list[str]) -> Iterator[str]:
-    """What the figures count, a line each: headings, shared names, short docstrings by file, crumbs."""
+    """The places behind the figures, a line each: headings, shared names, short docstrings by file, crumbs."""
     texts = {path: path.read_text(encoding="utf-8") for path in sources()}
     trees = {path: ast.parse(text) for path, text in texts.items()}
 

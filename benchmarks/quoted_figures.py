@@ -7,8 +7,8 @@ GitHub nor the site shows:
 
 docs/lab/views.md has a row whose first cell has these words, or a line with them, and that has the number, as far
 as the page rounds it; `views.md#a-run` names a chapter, too. Times, bytes, prices, rates and ratios without such a
-comment are told, but for those that stated_numbers.csv calls a limit, a default, the size of a download or an
-example. `python -m benchmarks.quoted_figures` prints what is told.
+comment are faults, except those that stated_numbers.csv calls a limit, a default, the size of a download or an
+example. `python -m benchmarks.quoted_figures` prints the faults.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ STATED: Final = Path(__file__).with_name("stated_numbers.csv")
 _MARK: Final = re.compile(r"<!-- figure: (\w+\.md)(?:#([\w-]+))?: (.+?) -->")
 _DIGITS: Final = r"\d+(?:,\d{3})*(?:\.\d+)?|\.\d+"
 _NUMBER: Final = re.compile(rf"(?<![\w.#/-])({_DIGITS})(?!\.?\d)")
-# What is measured: time, bytes, money, rates, and how many times or percent more or less something is.
+# Measured quantities: time, bytes, money, rates, and how many times or percent more or less something is.
 _UNIT: Final = (
     r"(?:ms|s|seconds?|minutes?|min|hours?|h|[kMGT]B|dollars|CPU-s|(?:views|tasks|homes)(?:/h| an hour| a second)"
     r"|times (?:the|as|less|more|faster|slower)\b|%(?= (?:more|less|longer|shorter|faster|slower)\b))"
@@ -68,7 +68,7 @@ def faults(page: Path) -> list[str]:
 
 
 def stale(text: str, stated: set[str], lab: Path) -> Iterator[tuple[int, str]]:
-    """(line, what is wrong) of a page's text. stated: numbers with units that are not measured."""
+    """(line, fault) of a page's text. stated: numbers with units that are not measured."""
     for number, line in enumerate(_plain(text).splitlines(), 1):
         rows: list[str] = []
         for page, chapter, words in _MARK.findall(line):
@@ -106,7 +106,7 @@ def _is_one_of(number: str, known: list[float]) -> bool:
 
 
 def _head(line: str) -> str:
-    """The first cell of a table's row; any other line as it is."""
+    """The first cell of a table's row, or the whole of any other line."""
     return line.split("|")[1] if line.startswith("|") else line
 
 

@@ -1,9 +1,8 @@
-"""The farm's own cost: queue, ledger, coordinator, store. FULL=1 runs the whole job.
+"""Overhead of the farm: queue, ledger, coordinator, store: `make bench NAME=farm` -> out/bench/farm.json.
 
-A simulated job of 45,622 houses is entered into the ledger with all its views; 100,000 of its
-tasks then run through coordinator, Redis, Celery, renderer processes and a folder store. Beside it,
-on a farm of its own, a worker is killed with the default settings and its task waited for. Then come ten thousand
-simulated workers, the requests that a view costs in the store, and a job beside `pbrs-farm run`.
+A simulated job of 45,622 houses enters the ledger with all its views; some of its tasks run through coordinator, Redis, Celery,
+renderer processes and a folder store. Meanwhile, on a second farm, a worker with default settings is killed. Then follow ten
+thousand simulated workers, the store requests of a view, and a job compared with `pbrs-farm run`. FULL=1 runs the whole job.
 """
 
 from __future__ import annotations
@@ -73,7 +72,7 @@ UNITS = {
 
 @dataclass
 class Bench:
-    """Redis, and the processes of a farm, in a folder of their own."""
+    """Redis and the processes of a farm, in a temporary folder."""
 
     folder: Path
     env: dict[str, str] = field(default_factory=dict)
@@ -371,7 +370,7 @@ def _farm_s(bench: Bench) -> float:
 
 
 def _same_objects(alone: FolderStore, farm: FolderStore) -> int:
-    """How many objects both runs made. Raises AssertionError unless they made the same ones.
+    """Number of objects of both runs. Raises AssertionError unless they are equal.
 
     Pictures, labels, JSON and manifests byte for byte; markers but for when, where and how long.
     """
@@ -387,7 +386,7 @@ def _same_objects(alone: FolderStore, farm: FolderStore) -> int:
 
 
 def _plain(store: FolderStore, key: str) -> object:
-    """What of an object must not depend on who made it."""
+    """The part of an object that must not depend on the run."""
     data = store.get(key)
     if "/done/" not in key:
         return data

@@ -1,7 +1,7 @@
 """Ten thousand workers on one machine: their heartbeats, claims and ends of tasks, and no rendering.
 
 Coordinators, Redis and ledger are the real ones; messages go through Celery's sender and are taken
-from its queues as workers take them. Two drivers stand for the workers: each worker registers, says
+from its queues as workers take them. Two drivers simulate the workers: each worker registers, says
 every 10 s that it lives, takes a message, holds its tasks as long as they would take, keeps its
 leases and ends them. The leading coordinator is killed half-way, and another one takes over.
 `python -m benchmarks.farm.simulated_farm FIRST N FILE` is one driver; it ends when FILE.stop is there.

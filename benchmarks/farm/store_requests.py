@@ -32,7 +32,7 @@ STAGES = (GEOMETRY, GL, LIGHT, REDUCE, SHARD, JOB)
 
 
 class CountedStore:
-    """A store that counts what it is asked: puts, gets (HEAD too), deletes and lists."""
+    """A store that counts its requests: puts, gets (HEAD too), deletes and lists."""
 
     def __init__(self, store: Store) -> None:
         self._store = store
@@ -117,7 +117,7 @@ def _house(inner: Store, *, packs: bool) -> CountedStore:
 
 
 def _worker(counted: CountedStore, *, packs: bool) -> HouseRunner:
-    """A worker that has loaded nothing yet; it has asked how the root lies, which it does once."""
+    """A worker without loaded homes that has read the layout of the root, which it does once."""
     store, n = LaidOutStore(counted, packs), counted.n
     counted.n = Counter()
     assert store.is_packed == packs

@@ -1,7 +1,7 @@
 """Example, generated and dressed homes: `make bench NAME=homes` -> out/bench/homes.json.
 
 Plans N_PLANS generated homes; reads, repairs and samples the nine example homes bare; dresses homes that nobody tunes
-on. Each home has a process of its own. `python -m benchmarks.homes.homes NAME` prints one home's row.
+on. Each home has a new process. `python -m benchmarks.homes.homes NAME` prints one home's row.
 """
 
 from __future__ import annotations

@@ -85,10 +85,10 @@ def _run(tree: Path, home: str, n_views: int) -> tuple[float, float, dict[str, f
         raise RuntimeError(f"{tree}: {home}: {done.stderr.strip().splitlines()[-1:]}")
     events = [json.loads(line) for line in done.stdout.splitlines() if line.startswith("{")]
     summary = next(event for event in events if event["event"] == "summary")
-    steps: Counter[str] = Counter()
+    steps: dict[str, float] = {}
     for event in events:
         if event["event"] == "done":
-            steps[event["step"]] += event["seconds"]
+            steps[event["step"]] = steps.get(event["step"], 0.0) + event["seconds"]
     seconds = {step: round(value, 1) for step, value in steps.items()}
     return _children_cpu_s() - before, summary["peak_mb"], seconds
 

@@ -1,4 +1,4 @@
-"""What opens in generated homes, and the same homes in MuJoCo: `make bench NAME=joints` -> out/bench/joints.json.
+"""Doors and drawers of generated homes, in the home and in MuJoCo: `make bench NAME=joints` -> out/bench/joints.json.
 
 N_HOMES dressed homes that nobody tunes on: doors, items with a joint, and furniture and machines whose name implies doors,
 drawers or a lid should open. N_SMALL small ones are exported as MJCF, loaded by MuJoCo, left alone for two seconds, and each

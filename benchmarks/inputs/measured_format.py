@@ -13,7 +13,7 @@ from tests.inputs.sound_files import sound_files
 
 
 def measure(title: str) -> dict[str, Any]:
-    """What became of the format's house, and how long it took."""
+    """Counts of the repaired house, and seconds."""
     from pbrs_farm.core.house import Enclosure
     from pbrs_farm.core.recipe import recipe_from_name
     from pbrs_farm.prepare.finished_house import repaired_house
