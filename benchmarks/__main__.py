@@ -33,7 +33,7 @@ BENCHES: Final = {
     "homes": Bench("homes.homes", "README, docs/homes.md: planning, cameras; label shares of dressed homes", 5.5),
     "house_cost": Bench("homes.house_cost", "CPU and memory of a home and of a further view", 2.5),
     "variety": Bench("homes.variety", "docs/dress/catalogue.md: models in dressed homes", 4),
-    "joints": Bench("homes.joints", "docs/homes_that_open.md: what opens, also in MuJoCo", 3),
+    "joints": Bench("homes.joints", "docs/howto/simulators.md: doors and drawers, also in MuJoCo", 3),
     "light": Bench("light.light_cost", "docs/light_costs.md: error and CPU by samples, presets, size", 4),
     "cycles": Bench("renderers.cycles", "docs/compare.md: CPU to equal error against Cycles", 10),
     "film": Bench("film", "docs/motion.md: errors of flow and disparity, noise of films", 2.5),

@@ -56,9 +56,9 @@ class Bare:
     def python(self) -> Path:
         """Its Python, after two installations: one to fill pip's cache, one timed."""
         install = ["-m", "pip", "install", "--quiet", f"{self.wheel}[llvm]"]
-        apart = self.machine.environment("apart")
-        self.machine.run([apart, *install], self.variables).check_returncode()
-        shutil.rmtree(apart.parents[1])
+        first_environment = self.machine.environment("apart")
+        self.machine.run([first_environment, *install], self.variables).check_returncode()
+        shutil.rmtree(first_environment.parents[1])
         began, before = time.monotonic(), startup.cpu_s()
         python = self.machine.environment("env")
         self.machine.run([python, *install], self.variables).check_returncode()
@@ -125,8 +125,8 @@ def posix_free(bare: Bare) -> dict[str, Any]:
 
 def _files_of_views(root: Path) -> dict[str, bytes]:
     """Bytes by path of the files of every view below a root."""
-    found = [p for p in root.glob("houses/*/views/**/*") if p.is_file()]
-    return {str(p.relative_to(root)): p.read_bytes() for p in found}
+    files = [p for p in root.glob("houses/*/views/**/*") if p.is_file()]
+    return {str(p.relative_to(root)): p.read_bytes() for p in files}
 
 
 def first_minute(_bare: Bare) -> dict[str, Any]:

@@ -67,8 +67,8 @@ def main() -> None:
 
 def commits_named(text: str) -> list[str]:
     """Numbers of a page that name a commit: those with a letter, and of bare digits those git knows."""
-    found = _HASH.findall(text)
-    return [h for h in found if not h.isdigit() or _is_commit(h)]
+    hashes = _HASH.findall(text)
+    return [h for h in hashes if not h.isdigit() or _is_commit(h)]
 
 
 def dates_named(text: str) -> list[str]:

@@ -63,13 +63,13 @@ def _cpu() -> str:
 
 def versions() -> dict[str, str]:
     """Versions of Python and of the packages that do the work, where installed."""
-    found = {"python": platform.python_version()}
+    versions_by_package = {"python": platform.python_version()}
     for package in PACKAGES:
         try:
-            found[package] = version(package)
+            versions_by_package[package] = version(package)
         except PackageNotFoundError:
             continue
-    return found
+    return versions_by_package
 
 
 def commit() -> str:

@@ -158,11 +158,11 @@ def _followed(
     view: StoredView, rays: Rays, relation: str, motion: str, occlusion: str
 ) -> tuple[float, float]:
     """(largest error of a view's motion layer in px, share of pixels with another occlusion)."""
-    other = OtherView.of(view, relation)
-    assert other is not None
+    partner = OtherView.of(view, relation)
+    assert partner is not None
     depth = _layer(view, "depth_z").astype(np.float64)
     rows, columns = np.nonzero(depth > 0)
-    point = follow_points(view, other, (rows, columns), depth[rows, columns], rays)
+    point = follow_points(view, partner, (rows, columns), depth[rows, columns], rays)
     state = _layer(view, occlusion)[rows, columns]
     stored = _layer(view, motion)[rows, columns]
     visible = (state == SEEN) & (point.state == SEEN)

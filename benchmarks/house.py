@@ -156,7 +156,7 @@ def shared_names(trees: Mapping[Path, ast.Module]) -> dict[str, list[Path]]:
 def headings(text: str) -> list[tuple[int, str]]:
     """(line, text) of comments alone between blank lines, below a module's head."""
     lines = text.splitlines()
-    found = []
+    comments = []
     for number, line in enumerate(lines):
         # The head of a file is no chapter: a licence, constants and their reasons.
         if number <= 10 or not line.startswith("# ") or lines[number - 1].strip():
@@ -165,8 +165,8 @@ def headings(text: str) -> list[tuple[int, str]]:
         while end < len(lines) and lines[end].startswith("#"):
             end += 1
         if end < len(lines) and not lines[end].strip():
-            found.append((number + 1, line))
-    return found
+            comments.append((number + 1, line))
+    return comments
 
 
 def docstrings(tree: ast.Module) -> Iterator[tuple[str, bool]]:

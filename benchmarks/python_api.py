@@ -1,7 +1,7 @@
 """Time, equality with `run`, physics and length of the examples in Python: `make bench NAME=python` -> out/bench/python.json.
 
 `python -m benchmarks python`: import, the first picture, equality with `run`, a warm view, physics over
-PBRS_SCATTERINGS scatterings (default 10), what people ask for, examples.
+PBRS_SCATTERINGS scatterings (default 10), length of the examples.
 """
 
 from __future__ import annotations
@@ -36,40 +36,14 @@ from pbrs_farm.scene import physics
 REPO: Final = Path(__file__).parents[1]
 EXAMPLES: Final = REPO / "examples"
 
-# Question of users -> the example that answers it; "" without one.
-ASKED: Final = {
-    "load a home, list rooms and things": "first_picture",
-    "move, remove, turn a thing": "move_and_remove",
-    "my GLB on a table": "object_poses",
-    "change a material": "materials",
-    "sun, time of day, sky": "sun_over_a_day",
-    "my K and pose": "given_poses",
-    "RGB, depth, normals, instances to numpy": "first_picture",
-    "ten random variations": "ten_variations",
-    "own label layer": "plugins/layers/height",
-    "own mesh before a room": "on_surfaces",
-    "physics drop": "physics",
-    "stereo": "stereo",
-    "trajectory": "trajectory",
-    "6-D poses, BOP": "bop_dataset",
-    "textures at random": "random_materials",
-    "distractors": "distractors",
-    "own class map": "class_map",
-    "which things are seen, how much": "object_poses",
-    "Jupyter, own Python": "first_picture",
-    "loader, epochs": "training_batch",
-    "own floor plan": "floor_plan",
-    "USD, Isaac, Unity out": "home_for_simulators",
-}
 UNITS: Final = {
-    "python.asked": f"of {len(ASKED)} things that people ask for, with an example that a test runs",
     "python.import_ms": "ms of `import pbrs_farm`, median of 9 processes, the interpreter apart",
     "python.first_picture_lines": "lines of docs/python.md's first picture",
     "python.render_equal": "1 = every file of a saved frame but markers equals that of `run`",
     "python.warm_overhead": "seconds a warm view takes over those of its steps in `run`",
     "python.examples": "scripts under examples/",
-    "python.shorter": "share of the peers' examples that ours answer in fewer lines of code",
-    "python.physics_scatterings": "scatterings of 20 things on a table, seeds 0...",
+    "python.shorter": "share of the peers' examples whose counterpart here has fewer lines of code",
+    "python.physics_scatterings": "scatterings of 20 items on a table, seeds 0...",
     "python.physics_settled": "share of them that came to rest",
     "python.physics_penetration_mm": "mm, deepest contact of any, as MuJoCo measures it",
     "python.physics_s": "s a scattering, median",
@@ -79,9 +53,6 @@ UNITS: Final = {
 def main() -> None:
     """Measure everything and write the report."""
     figures: dict[str, Any] = {
-        "python.asked": sum(
-            bool(name) and (EXAMPLES / f"{name}.py").exists() for name in ASKED.values()
-        ),
         "python.import_ms": import_ms(),
         "python.first_picture_lines": first_picture_lines(),
         "python.examples": len(list(EXAMPLES.glob("*.py"))),
@@ -109,8 +80,8 @@ def import_ms() -> float:
 def first_picture_lines() -> int:
     """Lines of the first block of docs/python.md until the frame is there."""
     text = (REPO / "docs/python.md").read_text(encoding="utf-8")
-    found = re.search(r"```python\n(.*?frame = [^\n]*)\n", text, re.DOTALL)
-    return len([line for line in found[1].splitlines() if line.strip()]) if found else 0
+    match = re.search(r"```python\n(.*?frame = [^\n]*)\n", text, re.DOTALL)
+    return len([line for line in match[1].splitlines() if line.strip()]) if match else 0
 
 
 def shorter() -> float:
@@ -127,15 +98,15 @@ def code_lines(path: Path) -> int:
     text = path.read_text(encoding="utf-8")
     nothing = {tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT}
     tokens = tokenize.generate_tokens(io.StringIO(text).readline)
-    held = {
+    code = {
         line for t in tokens if t.type not in nothing | {tokenize.ENDMARKER}
         for line in range(t.start[0], t.end[0] + 1)
     }  # fmt: skip
     for node in ast.walk(ast.parse(text)):
         value = node.value if isinstance(node, ast.Expr) else None
         if isinstance(value, ast.Constant) and isinstance(value.value, str):
-            held -= set(range(value.lineno, (value.end_lineno or value.lineno) + 1))
-    return len(held)
+            code -= set(range(value.lineno, (value.end_lineno or value.lineno) + 1))
+    return len(code)
 
 
 def against_run() -> dict[str, Any]:
@@ -165,8 +136,8 @@ def _seconds_of_steps(root: Path, view: str) -> float:
 
 
 def _files(root: Path) -> dict[str, bytes]:
-    every = (p for p in root.rglob("*") if p.is_file() and p.parent.name != "done")
-    return {str(p.relative_to(root)): p.read_bytes() for p in every}
+    files = (p for p in root.rglob("*") if p.is_file() and p.parent.name != "done")
+    return {str(p.relative_to(root)): p.read_bytes() for p in files}
 
 
 def of_physics(n: int) -> dict[str, Any]:

@@ -73,14 +73,14 @@ def main() -> None:
     # The forms' tests run in another process, beside the other parts.
     with ThreadPoolExecutor(1) as beside:
         passing = beside.submit(_passed)
-        others = {"sets.same_bytes": int(_is_made_alike()), **_questions()}
+        figures_of_sets = {"sets.same_bytes": int(_is_made_alike()), **_questions()}
         passed = passing.result()
     wrong = [form for form in READ_BACK if not _is_equal(form, passed)]
     figures: dict[str, Any] = {
         "sets.forms": len(READ_BACK) - len(wrong),
         "sets.forms_written": len(READ_BACK),
         "sets.forms_wrong": wrong,
-        **others,
+        **figures_of_sets,
     }
     write_report("sets", figures, UNITS)
 
@@ -200,11 +200,11 @@ def _passed() -> dict[tuple[str, str], bool]:
 def _is_equal(form: str, passed: dict[tuple[str, str], bool]) -> bool:
     """True if the form has a test and all of them passed."""
     file, words = READ_BACK[form]
-    own = [
+    verdicts = [
         is_right
         for (name, test), is_right in passed.items()
         if name == file and (not words or any(word in test for word in words))
     ]
-    is_right = bool(own) and all(own)
-    print(f"   {'right' if is_right else 'wrong'} {form}: {len(own)} tests", flush=True)
+    is_right = bool(verdicts) and all(verdicts)
+    print(f"   {'right' if is_right else 'wrong'} {form}: {len(verdicts)} tests", flush=True)
     return is_right

@@ -60,9 +60,9 @@ def main() -> None:
     with tempfile.TemporaryDirectory(prefix="bench-truth-") as name:
         folder = Path(name)
         figures |= _true_roots(folder / "roots")
-        found = _found(folder)
+        n_found = _found(folder)
         n_kinds = sum(len(kinds) for kinds in FALSEHOODS.values())
-        figures |= {"truth.planted": found, "truth.kinds": n_kinds}
+        figures |= {"truth.planted": n_found, "truth.kinds": n_kinds}
         figures["truth.albedo_error"] = round(_albedo_error(), 3)
         figures["truth.emitter_error"] = round(_emitter_error(), 5)
         figures["truth.layers_union"] = int(_is_union(folder / "union"))
@@ -147,12 +147,12 @@ def _emitter_error() -> float:
     house, _report = repair(read(scene), recipe.repair)
     geometry = geometry_from_house(house)
     keep = np.ones(len(geometry.faces), bool)
-    found = {
+    radiance = {
         house.items[e.item].name: np.array(e.radiance) * LM_PER_W
         for e in area_emitters_of_house(house, geometry, keep, recipe)
     }
     return max(
-        float(np.abs(found[name] - np.array(rgb) * strength).max()) / strength
+        float(np.abs(radiance[name] - np.array(rgb) * strength).max()) / strength
         for name, (rgb, strength) in in_file.items()
     )
 
@@ -168,11 +168,12 @@ def _is_union(root: Path) -> bool:
         if run_local(run).failures or run_local(run).n_done or not verify(root).is_clean:
             return False
     (view,) = root.glob("houses/*/views/*")
-    kept = {"material.png", "class_source.png", "depth_z.exr", "albedo.png"}
+    expected_files = {"material.png", "class_source.png", "depth_z.exr", "albedo.png"}
     tables = json.loads((view / "view.json").read_text())
-    return all((view / f).is_file() for f in kept) and {"materials", "source_classes"} <= set(
-        tables
-    )
+    return all((view / f).is_file() for f in expected_files) and {
+        "materials",
+        "source_classes",
+    } <= set(tables)
 
 
 def _verify_cpu_s(root: Path) -> float:
@@ -205,14 +206,14 @@ def _box_errors() -> tuple[float, int]:
 
 def _errors_mm(house: House) -> list[float]:
     """Largest distance in mm between the sides of each item's box and its triangles."""
-    found = []
+    errors = []
     for item in house.items:
         points = corners_of_surfaces(item.surfaces).reshape(-1, 3)
         if len(points):
             local = (points - item.oriented_box.centre) @ item.oriented_box.axes
             sides = np.array([-local.min(0), local.max(0)]) - item.oriented_box.half
-            found.append(1000 * float(np.abs(sides).max()))
-    return found
+            errors.append(1000 * float(np.abs(sides).max()))
+    return errors
 
 
 if __name__ == "__main__":

@@ -204,7 +204,12 @@ class Watch:
     def until(self, n_tasks: int) -> None:
         while self._done() < 1:
             time.sleep(0.05)
-        began, first, cpu, asked = time.monotonic(), self._done(), self._cpu(), self._redis()
+        began, first, cpu, n_redis_before = (
+            time.monotonic(),
+            self._done(),
+            self._cpu(),
+            self._redis(),
+        )
         while (done := self._done()) < n_tasks and (FULL or time.monotonic() - began < MOST_S):
             self._sample(done)
             if len(self._samples) % 15 == 1:
@@ -213,7 +218,7 @@ class Watch:
             time.sleep(2.0)
         self._seconds = time.monotonic() - began
         self._n = self._done() - first
-        self._cpu_s, self._n_redis = self._cpu() - cpu, self._redis() - asked
+        self._cpu_s, self._n_redis = self._cpu() - cpu, self._redis() - n_redis_before
 
     def figures(self) -> dict[str, Any]:
         half = [s for s in self._samples if s[0] >= self._samples[-1][0] / 2]
@@ -335,8 +340,8 @@ def against_local(give_up_at: float = float("inf")) -> dict[str, Any]:
                 n = _same_objects(alone, FolderStore(bench.folder / "store"))
         if len(seconds["farm"]) == 2:
             seconds["local"].append(_local_s(Path(name) / "second"))
-    told = ", ".join(f"{who} {' '.join(f'{x:.1f}' for x in xs)} s" for who, xs in seconds.items())
-    print(f"   {told}; {n} objects alike", flush=True)
+    times = ", ".join(f"{who} {' '.join(f'{x:.1f}' for x in xs)} s" for who, xs in seconds.items())
+    print(f"   {times}; {n} objects alike", flush=True)
     return {"farm.vs_local": round(sum(seconds["farm"]) / sum(seconds["local"]), 3)}
 
 
@@ -378,8 +383,8 @@ def _same_objects(alone: FolderStore, farm: FolderStore) -> int:
         {key for key in store.list() if not key.startswith("jobs/")} for store in (alone, farm)
     )
     odd = sorted(keys_alone ^ keys_farm)
-    both = sorted(keys_alone & keys_farm)
-    odd += [key for key in both if _plain(alone, key) != _plain(farm, key)]
+    common_keys = sorted(keys_alone & keys_farm)
+    odd += [key for key in common_keys if _plain(alone, key) != _plain(farm, key)]
     if odd or not keys_alone:
         raise AssertionError(f"{len(odd)} objects of local run and farm differ: {odd[:5]}")
     return len(keys_alone)

@@ -106,17 +106,17 @@ class Driver:
     def run(self, stop: Path) -> dict[str, Any]:
         """Be the workers until the file is there, and end nothing after that."""
         began = time.monotonic()
-        every = range(self.first, self.first + self.n)
-        self.idle.extend(every)
+        workers = range(self.first, self.first + self.n)
+        self.idle.extend(workers)
         for k in range(0, self.n, TOGETHER):
-            self.at(began + HEARTBEAT_S * k / self.n, "beat", every[k : k + TOGETHER])
+            self.at(began + HEARTBEAT_S * k / self.n, "beat", workers[k : k + TOGETHER])
         late, look_at = 0.0, 0.0
         while (now := time.monotonic()) < look_at or not stop.exists():
             look_at = look_at if now < look_at else now + 0.5
             if self.events and self.events[0][0] <= now:
-                when, _n, what, more = heapq.heappop(self.events)
+                when, _n, method, more = heapq.heappop(self.events)
                 late = max(late, now - when)
-                getattr(self, f"_{what}")(*more)
+                getattr(self, f"_{method}")(*more)
             elif not self._take():
                 time.sleep(0.005)
         cpu_s = round(time.process_time(), 1)
@@ -148,8 +148,8 @@ class Driver:
         tasks = tasks_from_group(group)
         token = f"w{worker:05d}:1:{self.number}:x"
         claims = self.ledger.claim_many(job, [*map(str, tasks)], token=token, recipe=recipe)
-        held = [t for t, claim in zip(tasks, claims, strict=True) if claim.verdict == "run"]
-        self._hold(worker, job, recipe, token, held)
+        claimed = [t for t, claim in zip(tasks, claims, strict=True) if claim.verdict == "run"]
+        self._hold(worker, job, recipe, token, claimed)
 
     def _hold(self, worker: int, job: str, recipe: str, token: str, held: list[TaskId]) -> None:
         if not held:
@@ -179,9 +179,9 @@ class Driver:
 
 
 def _with_client(ledger: RedisLedger, client: Any) -> RedisLedger:
-    found = copy.copy(ledger)
-    found.client = client
-    return found
+    copied = copy.copy(ledger)
+    copied.client = client
+    return copied
 
 
 def simulated_farm(seconds: float) -> dict[str, Any]:
@@ -233,9 +233,12 @@ def simulated_farm(seconds: float) -> dict[str, Any]:
             file.with_suffix(".stop").touch()
         for k in range(N_DRIVERS):
             bench.processes[f"driver{k}"].wait(120)
-        told = [json.loads(file.read_text()) for file in files]
-        n_ended, n_done = sum(row["ended"] for row in told), _n_done(farm, spec.job_id) - n_before
-        print(f"   {n_ended} ended, {n_done} counted, drivers {told}", flush=True)
+        reports = [json.loads(file.read_text()) for file in files]
+        n_ended, n_done = (
+            sum(row["ended"] for row in reports),
+            _n_done(farm, spec.job_id) - n_before,
+        )
+        print(f"   {n_ended} ended, {n_done} counted, drivers {reports}", flush=True)
         farm.ledger.client.close()
     return {
         "farm.simulated_workers": n_alive,

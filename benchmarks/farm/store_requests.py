@@ -81,12 +81,12 @@ def requests_a_view() -> dict[str, Any]:
         url = f"s3://{bucket}/bench-{secrets.token_hex(4)}" if endpoint else folder
         store = store_from_url(url, settings_from_environment().store)
         inner = store.inner if isinstance(store, LaidOutStore) else store
-        found = _house(inner, packs=os.environ.get("PBRS_STORE_LAYOUT") != "files")
+        counted = _house(inner, packs=os.environ.get("PBRS_STORE_LAYOUT") != "files")
         for key in [*inner.list()]:
             inner.delete(key)
-    n = found.n
+    n = counted.n
     print(f"   store: {endpoint or 'a folder laid out as S3'}; {dict(n)}", flush=True)
-    print(f"   lists: {sorted(set(found.listed))}", flush=True)
+    print(f"   lists: {sorted(set(counted.listed))}", flush=True)
     return {
         "farm.store_puts_a_view": round(n["puts"] / N_VIEWS, 1),
         "farm.store_gets_a_view": round(n["gets"] / N_VIEWS, 1),
@@ -136,8 +136,10 @@ def _requests(
     elif stage == SHARD:
         yield TaskRequest(job_id=spec.job_id, house="-", unit="s0", stage=stage)
     else:
-        at = "-" if stage == JOB else house
-        yield TaskRequest(job_id=spec.job_id, house=at, unit="-", stage=stage, source=source)
+        task_house = "-" if stage == JOB else house
+        yield TaskRequest(
+            job_id=spec.job_id, house=task_house, unit="-", stage=stage, source=source
+        )
 
 
 if __name__ == "__main__":

@@ -102,5 +102,5 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("homes", nargs="*", default=HOMES)
     parser.add_argument("--against", default="", metavar="FOLDER", help="another checkout")
-    given = parser.parse_args()
-    main(given.homes, given.against)
+    arguments = parser.parse_args()
+    main(arguments.homes, arguments.against)

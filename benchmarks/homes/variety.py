@@ -82,12 +82,12 @@ def _things(seed: int) -> Iterator[Row]:
     fields = recipe.dress.model_copy(update={"surfaces": 0.0, "parts": 0.0})
     house, _report = dress(source, catalogue, fields, DRESS_SEED)
     groups = {key: piece.group for key, piece in pieces_by_plain_id(catalogue).items()}
-    own = _groups_of_generated()
+    generated_groups = _groups_of_generated()
     for number, item in enumerate(house.items):
         if item.kind.is_structure or not item.n_faces:
             continue
         name = item.source_class.partition("#")[2]
-        group = groups.get(plain_id(item.source_class)) or own.get(name, name)
+        group = groups.get(plain_id(item.source_class)) or generated_groups.get(name, name)
         if group:
             yield group, model_of(house, item), number >= len(source.items)
 
@@ -95,14 +95,18 @@ def _things(seed: int) -> Iterator[Row]:
 def _groups_of_generated() -> dict[str, str]:
     """Name of every generated item, family and form -> its group."""
     books = ("books", "stack_of_books", "leaning_book", "open_book", "magazines")
-    found = dict.fromkeys(books, "book")
-    found |= dict.fromkeys(("framed_picture", "canvas", "poster"), "picture_frame")
-    others = described_in((case_goods, hung, radiators), Thing)
-    every: list[Thing[...] | Family] = [*THINGS.values(), *others.values(), *families().values()]
-    for one in every:
-        forms = re.findall(r'm\.name = "(\w+)"', inspect.getsource(one.build))
-        found |= dict.fromkeys((one.name, one.called, *forms), one.group)
-    return found
+    groups = dict.fromkeys(books, "book")
+    groups |= dict.fromkeys(("framed_picture", "canvas", "poster"), "picture_frame")
+    more_things = described_in((case_goods, hung, radiators), Thing)
+    generated: list[Thing[...] | Family] = [
+        *THINGS.values(),
+        *more_things.values(),
+        *families().values(),
+    ]
+    for item in generated:
+        forms = re.findall(r'm\.name = "(\w+)"', inspect.getsource(item.build))
+        groups |= dict.fromkeys((item.name, item.called, *forms), item.group)
+    return groups
 
 
 def model_of(house: House, item: Item) -> str:
@@ -135,7 +139,7 @@ def _figures(rows: list[Row]) -> dict[str, Any]:
     for group, model, _added in rows:
         by_class.setdefault(group, Counter())[model] += 1
     common = sorted(by_class, key=lambda g: -by_class[g].total())[:N_CLASSES]
-    found = {group: effective(by_class[group]) for group in common}
+    effective_models = {group: effective(by_class[group]) for group in common}
     everything = Counter(model for _g, model, _a in rows)
     for group in sorted(by_class, key=lambda g: -by_class[g].total())[: 3 * N_CLASSES]:
         n, most = by_class[group].total(), by_class[group].most_common(1)[0]
@@ -145,15 +149,19 @@ def _figures(rows: list[Row]) -> dict[str, Any]:
     )
     families = Counter(model.partition(" ")[0] for model in everything.elements())
     print("   families", *(f"\n      {m} {n / len(rows):.3f}" for m, n in families.most_common(12)))
-    made = [model.startswith(("generated#", "pbrs_farm#")) for _g, model, _a in rows]
-    drawn = [is_made for (_g, _m, added), is_made in zip(rows, made, strict=True) if not added]
+    is_generated = [model.startswith(("generated#", "pbrs_farm#")) for _g, model, _a in rows]
+    drawn = [
+        is_made for (_g, _m, added), is_made in zip(rows, is_generated, strict=True) if not added
+    ]
     return {
         "variety.things": len(rows),
-        "variety.effective_models": round(min(found.values()), 1),
-        "variety.effective_models_median": round(float(np.median(list(found.values()))), 1),
-        "variety.classes_below_12": sum(n < 12 for n in found.values()),
+        "variety.effective_models": round(min(effective_models.values()), 1),
+        "variety.effective_models_median": round(
+            float(np.median(list(effective_models.values()))), 1
+        ),
+        "variety.classes_below_12": sum(n < 12 for n in effective_models.values()),
         "variety.top_share": round(everything.most_common(1)[0][1] / len(rows), 4),
-        "variety.generated_share": round(float(np.mean(made)), 3),
+        "variety.generated_share": round(float(np.mean(is_generated)), 3),
         "variety.generated_share_of_furniture": round(float(np.mean(drawn)), 3),
     }
 

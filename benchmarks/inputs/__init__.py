@@ -33,13 +33,13 @@ def main() -> None:
 
     rows = {title: _measured(title) for title in sound_files()}
     good = [row for row in rows.values() if "error" not in row]
-    kept = [r["openings"] / r["told"] for r in good if r["told"]]
+    kept_shares = [r["openings"] / r["told"] for r in good if r["told"]]
     cases, failed = hostile.counted(("input/",))
     figures = {
         "inputs.formats": sum(r["closed_rooms"] > 0 for r in good),
         "inputs.leaks": sum(r["leaks"] for r in good),
         "inputs.walls_lost": sum(r["walls_lost"] for r in good),
-        "inputs.openings_kept": round(min(kept, default=0.0), 3),
+        "inputs.openings_kept": round(min(kept_shares, default=0.0), 3),
         "inputs.class_agreement": class_agreement(),
         "inputs.roundtrip": roundtrip(),
         "inputs.seconds": max((r["seconds"] for r in good), default=0.0),

@@ -104,8 +104,8 @@ def main() -> None:
             name = f"light.vs_cycles{end.removeprefix('ratio')}{suffix}"
             figures[name] = float(np.quantile(values, quantile))
             units[name] = f"{VIEW_UNITS[end]}, quantile {quantile} of {len(values)} views"
-    apart = max(abs(row["luminance"] - 1) for row in views.values())
-    figures["light.cycles_luminance_apart"] = apart
+    luminance_apart = max(abs(row["luminance"] - 1) for row in views.values())
+    figures["light.cycles_luminance_apart"] = luminance_apart
     units["light.cycles_luminance_apart"] = "largest relative difference of mean luminance"
     write_report("cycles", figures, units)
 

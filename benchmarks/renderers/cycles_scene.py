@@ -74,15 +74,15 @@ def set_up(scene, job):  # type: ignore[no-untyped-def]
 
 def camera_of(job):  # type: ignore[no-untyped-def]
     """The camera at the exported pose (OpenGL axes, like Blender's)."""
-    held = bpy.data.objects.get("camera")
-    if held is None:
-        held = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
-        bpy.context.scene.collection.objects.link(held)
-    held.data.sensor_fit = "HORIZONTAL"
-    held.data.angle = job["hfov_rad"]
-    held.data.clip_start, held.data.clip_end = 1e-3, 1e4
-    held.matrix_world = BLENDER_FROM_WORLD @ Matrix(job["world_from_camera"])
-    return held
+    camera = bpy.data.objects.get("camera")
+    if camera is None:
+        camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
+        bpy.context.scene.collection.objects.link(camera)
+    camera.data.sensor_fit = "HORIZONTAL"
+    camera.data.angle = job["hfov_rad"]
+    camera.data.clip_start, camera.data.clip_end = 1e-3, 1e4
+    camera.matrix_world = BLENDER_FROM_WORLD @ Matrix(job["world_from_camera"])
+    return camera
 
 
 def add_mesh(folder: Path, described) -> None:  # type: ignore[no-untyped-def]
@@ -124,10 +124,10 @@ def add_sky(folder: Path, sun) -> None:  # type: ignore[no-untyped-def]
         light = bpy.data.lights.new("sun", "SUN")
         light.energy, light.angle = irradiance, 2 * sun["half_angle_rad"]
         light.color = [v / irradiance for v in sun["irradiance"]]
-        held = bpy.data.objects.new("sun", light)
+        sun_object = bpy.data.objects.new("sun", light)
         towards = BLENDER_FROM_WORLD.to_3x3() @ Vector(sun["direction"])
-        held.rotation_euler = towards.to_track_quat("Z", "Y").to_euler()
-        bpy.context.scene.collection.objects.link(held)
+        sun_object.rotation_euler = towards.to_track_quat("Z", "Y").to_euler()
+        bpy.context.scene.collection.objects.link(sun_object)
 
 
 def add_portal(portal):  # type: ignore[no-untyped-def]
@@ -141,10 +141,10 @@ def add_portal(portal):  # type: ignore[no-untyped-def]
     x, z = along.normalized(), -(BLENDER_FROM_WORLD.to_3x3() @ Vector(portal["inwards"]))
     axes = Matrix((x, z.cross(x), z)).transposed().to_4x4()
     axes.translation = (corners[0] + corners[2]) / 2
-    held = bpy.data.objects.new("portal", light)
-    held.matrix_world = axes
-    bpy.context.scene.collection.objects.link(held)
-    return held
+    portal_object = bpy.data.objects.new("portal", light)
+    portal_object.matrix_world = axes
+    bpy.context.scene.collection.objects.link(portal_object)
+    return portal_object
 
 
 def material_of(folder: Path, part):  # type: ignore[no-untyped-def]
@@ -170,11 +170,11 @@ def material_of(folder: Path, part):  # type: ignore[no-untyped-def]
         product.operation = "MULTIPLY"
         links.new(picture.outputs["Color"], product.inputs[0])
         product.inputs[1].default_value = rgb
-        held = nodes.new("ShaderNodeVectorMath")
-        held.operation = "MINIMUM"
-        held.inputs[1].default_value = 3 * [part["max_kd"] if node.bl_idname == DIFFUSE else 1.0]
-        links.new(product.outputs[0], held.inputs[0])
-        links.new(held.outputs[0], node.inputs["Color"])
+        clamped = nodes.new("ShaderNodeVectorMath")
+        clamped.operation = "MINIMUM"
+        clamped.inputs[1].default_value = 3 * [part["max_kd"] if node.bl_idname == DIFFUSE else 1.0]
+        links.new(product.outputs[0], clamped.inputs[0])
+        links.new(clamped.outputs[0], node.inputs["Color"])
         return node
 
     def both(a, b):  # type: ignore[no-untyped-def]
@@ -236,14 +236,14 @@ def _pane_fresnel(nodes, links):  # type: ignore[no-untyped-def]
     links.new(side.outputs["Backfacing"], index.inputs["Value"])
     fresnel = nodes.new("ShaderNodeFresnel")
     links.new(index.outputs[0], fresnel.inputs["IOR"])
-    twice, one, share = (nodes.new("ShaderNodeMath") for _k in range(3))
-    twice.operation, one.operation, share.operation = "MULTIPLY", "ADD", "DIVIDE"
+    twice, one_plus, share = (nodes.new("ShaderNodeMath") for _k in range(3))
+    twice.operation, one_plus.operation, share.operation = "MULTIPLY", "ADD", "DIVIDE"
     twice.inputs[1].default_value = 2.0
-    one.inputs[1].default_value = 1.0
+    one_plus.inputs[1].default_value = 1.0
     links.new(fresnel.outputs[0], twice.inputs[0])
-    links.new(fresnel.outputs[0], one.inputs[0])
+    links.new(fresnel.outputs[0], one_plus.inputs[0])
     links.new(twice.outputs[0], share.inputs[0])
-    links.new(one.outputs[0], share.inputs[1])
+    links.new(one_plus.outputs[0], share.inputs[1])
     return share
 
 

@@ -12,10 +12,12 @@ def _views(figures: Figures) -> dict[str, dict[str, float]]:
     for home in HOMES:
         for k in range(N_CAMERAS):
             prefix = f"light.cycles_{home.lower()}_{k}_"
-            own = {n.removeprefix(prefix): v for n, v in figures.items() if n.startswith(prefix)}
-            if not own:
+            view_figures = {
+                n.removeprefix(prefix): v for n, v in figures.items() if n.startswith(prefix)
+            }
+            if not view_figures:
                 raise KeyError(f"{prefix}*")
-            views[f"{home}, camera {k + 1}"] = own
+            views[f"{home}, camera {k + 1}"] = view_figures
     return views
 
 

@@ -117,13 +117,13 @@ def portals_inwards(house: House) -> list[tuple[F64, F64]]:
             for room, outline in rooms
         )
 
-    found = []
+    portals = []
     for quad in portals_of_house(house):
         across = np.cross(quad[1] - quad[0], quad[3] - quad[0])
         normal, middle = across / np.linalg.norm(across), quad.mean(0)
         sides = [n for n in (normal, -normal) if is_indoors(middle + BESIDE_M * n)]
-        found += [(quad, n) for n in sides]
-    return found
+        portals += [(quad, n) for n in sides]
+    return portals
 
 
 def _part(tag: int, tables: SceneTables, house: House, textures: set[str]) -> dict[str, Any]:

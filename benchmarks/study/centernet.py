@@ -66,31 +66,33 @@ def detect(colour: NDArray[np.uint8], least: float = 0.1) -> list[Detection]:
     scores, reach = _maps(np.asarray(squeezed, np.float32))
     # A centre is where no neighbour of its class is surer.
     peaks = scores * (functional.max_pool2d(scores, 3, 1, 1) == scores)
-    values, at = peaks.flatten().topk(_MOST)
+    values, indices = peaks.flatten().topk(_MOST)
     n_cells = scores.shape[-1]
     scale = np.array([width, height, width, height]) / _SIZE
-    found: list[Detection] = []
-    for score, k in zip(values.tolist(), at.tolist(), strict=True):
+    detections: list[Detection] = []
+    for score, k in zip(values.tolist(), indices.tolist(), strict=True):
         kind, cell = divmod(k, n_cells**2)
         row, column = divmod(cell, n_cells)
         left, top, right, bottom = reach[0, :, row, column].tolist()
         x, y = column * _STRIDE, row * _STRIDE
         box = np.array([x - left, y - top, x + right, y + bottom]) * scale
-        own = Detection(COCO[kind], score, tuple(np.round(box, 1).tolist()))
+        detection = Detection(COCO[kind], score, tuple(np.round(box, 1).tolist()))
         if score >= least and not any(
-            one.name == own.name and overlap(one.box, own.box) > _OVERLAP for one in found
+            kept_detection.name == detection.name
+            and overlap(kept_detection.box, detection.box) > _OVERLAP
+            for kept_detection in detections
         ):
-            found.append(own)
-    return found
+            detections.append(detection)
+    return detections
 
 
 def overlap(a: tuple[float, ...], b: tuple[float, ...]) -> float:
     """Intersection over union of two boxes (left, top, right, bottom)."""
     across = min(a[2], b[2]) - max(a[0], b[0])
     down = min(a[3], b[3]) - max(a[1], b[1])
-    both = max(across, 0) * max(down, 0)
+    intersection = max(across, 0) * max(down, 0)
     areas = sum((box[2] - box[0]) * (box[3] - box[1]) for box in (a, b))
-    return both / max(areas - both, 1e-9)
+    return intersection / max(areas - intersection, 1e-9)
 
 
 def _maps(picture: NDArray[np.float32]) -> tuple[Tensor, Tensor]:
@@ -155,10 +157,10 @@ def _convolved(op: str, inputs: list[Tensor], attributes: dict[str, Any]) -> Ten
 def _enlarged(x: Tensor, size: int) -> Tensor:
     """As TensorFlow's first resize: the new pixel k samples the old position k / 2, without half-pixel offset."""
     for axis in (2, 3):
-        at = torch.arange(size) * (x.shape[axis] / size)
-        low = at.floor().long()
+        positions = torch.arange(size) * (x.shape[axis] / size)
+        low = positions.floor().long()
         high = (low + 1).clamp(max=x.shape[axis] - 1)
-        share = (at - low).view(-1, *(1,) * (3 - axis))
+        share = (positions - low).view(-1, *(1,) * (3 - axis))
         x = x.index_select(axis, low) * (1 - share) + x.index_select(axis, high) * share
     return x
 
@@ -167,16 +169,16 @@ def _enlarged(x: Tensor, size: int) -> Tensor:
 def _network() -> tuple[dict[str, dict[str, Any]], dict[str, Tensor]]:
     """Nodes by name, and constants."""
     folder = fetched()
-    found = json.loads((folder / "centernet.json").read_bytes())
-    data, weights, at = (folder / "centernet.bin").read_bytes(), {}, 0
-    for row in found["weightsManifest"][0]["weights"]:
+    model = json.loads((folder / "centernet.json").read_bytes())
+    data, weights, offset = (folder / "centernet.bin").read_bytes(), {}, 0
+    for row in model["weightsManifest"][0]["weights"]:
         kind = np.float16 if "quantization" in row else np.int32
-        array = np.frombuffer(data, kind, int(np.prod(row["shape"])), at)
-        at += array.nbytes
+        array = np.frombuffer(data, kind, int(np.prod(row["shape"])), offset)
+        offset += array.nbytes
         tensor = torch.from_numpy(array.astype(np.float32)).reshape(row["shape"])
         # A constant of one number, or of one a channel, is broadcast as those of pictures are.
         weights[row["name"]] = tensor
-    return {node["name"]: node for node in found["modelTopology"]["node"]}, weights
+    return {node["name"]: node for node in model["modelTopology"]["node"]}, weights
 
 
 def fetched() -> Path:

@@ -65,13 +65,13 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=RESULTS)
     args = parser.parse_args()
     views = (picture for root in args.roots for picture in pictures_of_root(root, args.mode))
-    found = {"views": judged(views)}
+    objects = {"views": judged(views)}
     if args.coco and args.pictures:
-        found["photographs"] = judged(pictures_of_coco(args.coco, args.pictures))
+        objects["photographs"] = judged(pictures_of_coco(args.coco, args.pictures))
     args.out.parent.mkdir(parents=True, exist_ok=True)
-    rows = {name: [as_row(thing) for thing in things] for name, things in found.items()}
+    rows = {name: [as_row(thing) for thing in things] for name, things in objects.items()}
     args.out.write_text(json.dumps(rows, indent=1) + "\n")
-    for name, things in found.items():
+    for name, things in objects.items():
         print(f"{name}: {len({thing.picture for thing in things})} pictures with such things\n")
         print(table(things))
 
@@ -95,14 +95,14 @@ def pictures_of_root(root: str, mode: str = "") -> Iterator[Picture]:
 
 def pictures_of_coco(path: Path, folder: Path) -> Iterator[Picture]:
     """Each photograph of a COCO file with an object of our classes."""
-    found = json.loads(path.read_bytes())
-    names = {row["id"]: row["name"] for row in found["categories"]}
+    coco = json.loads(path.read_bytes())
+    names = {row["id"]: row["name"] for row in coco["categories"]}
     boxes: dict[int, list[tuple[str, Any]]] = {}
-    for row in found["annotations"]:
+    for row in coco["annotations"]:
         name = {"wine glass": "cup"}.get(names[row["category_id"]], names[row["category_id"]])
         if name in _ACCEPTED and not row.get("iscrowd"):
             boxes.setdefault(row["image_id"], []).append((name, row["bbox"]))
-    for row in found["images"]:
+    for row in coco["images"]:
         file = folder / row["file_name"]
         if row["id"] in boxes and file.is_file():
             colour = np.asarray(Image.open(file).convert("RGB"))
@@ -132,8 +132,9 @@ def judged(pictures: Iterator[Picture]) -> list[Thing]:
 def is_found(thing: Thing, detections: Sequence[Detection]) -> bool:
     """True if a detection with an accepted name overlaps it by half."""
     return any(
-        one.name in _ACCEPTED[thing.name] and overlap(one.box, thing.box) >= _LEAST_OVERLAP
-        for one in detections
+        detection.name in _ACCEPTED[thing.name]
+        and overlap(detection.box, thing.box) >= _LEAST_OVERLAP
+        for detection in detections
     )
 
 
@@ -148,8 +149,8 @@ def recall(
 def detector_figures(rows: dict[str, Any]) -> dict[str, float]:
     """The bench's figures of kept results."""
     things = [Thing(**row | {"box": tuple(row["box"])}) for row in rows["views"]]
-    found, n = recall(things, VESSELS, *SMALL)
-    return {"study.detector_small": found / n} if n else {}
+    n_found, n = recall(things, VESSELS, *SMALL)
+    return {"study.detector_small": n_found / n} if n else {}
 
 
 def table(things: Sequence[Thing]) -> str:
