@@ -8,6 +8,7 @@ from typing import Any, Final
 import numpy as np
 import shapely
 from shapely.geometry import LineString, Point, Polygon
+from shapely.geometry.base import BaseGeometry
 from shapely.ops import polygonize, unary_union
 
 from pbrs_farm.core.arrays import F64
@@ -89,7 +90,7 @@ def parted_at_doorways(piece: Polygon, lines: Iterable[LineString]) -> list[Poly
     return parts if len(parts) > 1 else [piece]
 
 
-def ground_between(feet: Sequence[Polygon], lines: Sequence[LineString]) -> list[Polygon]:
+def ground_between(feet: Sequence[BaseGeometry], lines: Sequence[LineString]) -> list[Polygon]:
     """The pieces of ground that walls enclose, closed at doorways, by their place.
 
     feet: of the walls, metres; gaps of ends that miss each other are closed. lines: of doors, as door_line.

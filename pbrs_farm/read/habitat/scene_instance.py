@@ -191,7 +191,7 @@ class _Dataset:
         may be left out, or a model without a config. The data set's default attributes come first.
         """
         self.folder.name_from("", name)  # a name that leads out is refused
-        base, defaults = _base_name(name, kind), {}
+        base, defaults = _base_name(name, kind), dict[str, Any]()
         for config in self.configs:
             section = object_at(self.json(config), _SECTIONS[kind])
             defaults = defaults | object_at(section, "default_attributes")
@@ -212,7 +212,7 @@ class _Dataset:
         if config is not None:
             return self.json(config), config
         model = self._by_name.get(f"{base}.glb") if kind in ("stage", "object") else None
-        return model and ({"render_asset": posixpath.basename(model)}, model)
+        return ({"render_asset": posixpath.basename(model)}, model) if model else None
 
     def asset(self, config: str, reference: Any) -> str:
         """The name below the root of an asset that a config names."""

@@ -118,12 +118,9 @@ def voids_of_walls(
                 if _holds(points, i) and any(_holds(items[w].bounds, i) for w in walls)
             ]
         )
-        item, *others = [i for i in drawn if i.kind in (ItemKind.DOOR, ItemKind.WINDOW)] or [None]
-        undrawn = (
-            [f for f in fillings if f.is_a("IfcDoor") or f.is_a("IfcWindow")]
-            if item is None
-            else []
-        )
+        of_kind = [i for i in drawn if i.kind in (ItemKind.DOOR, ItemKind.WINDOW)]
+        item, others = (of_kind[0], of_kind[1:]) if of_kind else (None, [])
+        undrawn = [] if item else [f for f in fillings if f.is_a("IfcDoor") or f.is_a("IfcWindow")]
         yield Void(
             id=str(opening.GlobalId),
             level_id=item.level_id if item is not None else level_of(float(points[:, 1].min())),

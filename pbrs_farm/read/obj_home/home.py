@@ -118,7 +118,9 @@ def _document(
     groups: dict[str, list[Mesh]], mtl: dict[str, ObjMaterial], matrix: F64
 ) -> tuple[dict[str, Any], GlbWriter]:
     """The glTF document of the groups, a node each below one that turns and scales them."""
-    writer, nodes, meshes = GlbWriter(), [], []
+    writer = GlbWriter()
+    nodes: list[dict[str, Any]] = []
+    meshes: list[dict[str, Any]] = []
     images: list[dict[str, str]] = []
     numbers = {name: k for k, name in enumerate(mtl)}
     materials = [_material(m, images) for m in mtl.values()]
