@@ -52,7 +52,7 @@ def _over_basin(hanging: Hanging, bounds: F64, rng: np.random.Generator, style: 
             low = rim + float(rng.uniform(0.15, 0.3))
             s = (s0 + s1) / 2
             if hanging.faces[k].free_m(s - width / 2, s + width / 2, low, low + height) > 0.12:
-                hanging.hang(*mirror(width, height, frame), k, s, low)
+                hanging.hang(*mirror(rng, width, height, frame), k, s, low)
                 return
     hanging.house.refused["walls: no free wall for a mirror"] += 1
 
@@ -67,7 +67,7 @@ def _tall_mirror(hanging: Hanging, rng: np.random.Generator, style: Style) -> No
         )
     else:
         width, height = float(rng.uniform(0.4, 0.6)), float(rng.uniform(1.1, 1.5))
-        model, low = mirror(width, height, frame, 0.03), 0.45
+        model, low = mirror(rng, width, height, frame, 0.03), 0.45
     hang_anywhere(hanging, model, low, 0.4, rng)
 
 

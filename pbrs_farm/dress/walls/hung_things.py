@@ -17,7 +17,7 @@ from pbrs_farm.core.arrays import F64, Srgb8Image
 from pbrs_farm.core.classes import MIRROR, OTHERPROP, PICTURE
 from pbrs_farm.core.house import Material, MaterialKind, Surface, Texture
 from pbrs_farm.dress.content import content
-from pbrs_farm.dress.models import Model, hanging_piece
+from pbrs_farm.dress.models import Model, Part, hanging_piece
 from pbrs_farm.dress.style import Rgb, Style, shade
 from pbrs_farm.dress.thing_materials import metal, plain
 from pbrs_farm.geometry.bodies import square_tube
@@ -205,15 +205,33 @@ def poster(
     return hanging_piece("poster", "picture_frame", PICTURE, parts, [print_])
 
 
-def mirror(width: float, height: float, frame: Material | None, frame_m: float = 0.02) -> Model:
-    """A mirror, framed or with a bare edge."""
+def mirror(
+    rng: np.random.Generator,
+    width: float,
+    height: float,
+    frame: Material | None,
+    frame_m: float = 0.02,
+) -> Model:
+    """A mirror in one of nine mouldings, or with a bare edge on clips, a shelf or nothing seen."""
     low, high = np.array([-width / 2, 0.0]), np.array([width / 2, height])
     glass = Material("mirror", MaterialKind.MIRROR, specular=(0.9, 0.9, 0.9))
-    parts = []
-    depth = 0.006
+    chrome = plain("clip", (0.72, 0.72, 0.73), 0.2)
+    parts: list[Part] = []
+    depth, form = 0.006, int(rng.integers(3))
     if frame is not None:
-        parts.append((ring("frame", low, high, frame_m, 0.022, "flat"), frame))
-        low, high, depth = low + frame_m, high - frame_m, 0.014
+        kind = str(rng.choice(list(_PROFILES)))
+        frame_m *= 1.6 if kind in list(_PROFILES)[4:] else 1.0
+        parts.append((ring("frame", low, high, frame_m, 0.024, kind), frame))
+        low, high = low + frame_m, high - frame_m
+        depth = 0.024 * _PROFILES[kind][-2][1] - 0.003
+    elif form == 1:
+        half, y = np.array([0.008, 0.006, 0.004]), (0.005, height - 0.005)
+        places = [(x * 0.3 * width, b, 0.005) for x in (-1, 1) for b in y]
+        parts = [(box("clip", np.array(p), half, 0), chrome) for p in places]
+    elif form == 2:
+        half = np.array([width / 2, 0.004, 0.05])
+        parts.append((box("shelf", np.array([0.0, 0.004, 0.05]), half, 0), chrome))
+        low = low + np.array([0.0, 0.008])
     face, back = faced_slab("mirror", low, high, (0.001 if frame else 0.0, depth))
     parts += [(face, glass), (back, plain("mirror edge", (0.35, 0.4, 0.4), 0.3))]
     return hanging_piece("mirror", "mirror", MIRROR, parts)

@@ -126,9 +126,9 @@ def shelf_basket(m: Maker) -> None:
             with m.of(weave):
                 tray(m, w, h, d, 0.008)
         case 1:  # courses of rope that swell a little
-            rope_side(m, w, d, 0.04, h, 7, weave)
+            rope_side(m, w, d, 0.04, h, m.pick(4, 5, 6, 7), weave)
         case 2:  # round, with two grips
-            rope_side(m, w * 0.9, w * 0.9, 0.12, h, 7, weave)
+            rope_side(m, w * 0.9, w * 0.9, 0.12, h, m.pick(4, 5, 6, 7), weave)
             for x in (-1.0, 1.0):
                 m.tube(bent([(x * w * 0.44, h * 0.85, -0.05), (x * w * 0.44, h * 1.2, -0.04),
                     (x * w * 0.44, h * 1.2, 0.04), (x * w * 0.44, h * 0.85, 0.05)], 0.03, n=3),
@@ -148,7 +148,7 @@ def shelf_basket(m: Maker) -> None:
                 m.box(0.006, (h * 0.72, h * 0.86), 0.08, 0.001, x=x * hw,
                     of=plain("leather", (0.35, 0.22, 0.13), 0.6))
         case 5:  # with a lid
-            rope_side(m, w, d, 0.03, h * 0.85, 6, weave)
+            rope_side(m, w, d, 0.03, h * 0.85, m.pick(4, 5, 6), weave)
             m.loft(rings(rect, [(w + 0.012, d + 0.012, 0.03, h * 0.85 + 0.012),
                 (w + 0.012, d + 0.012, 0.03, h * 0.98), (w * 0.9, d * 0.85, 0.03, h * 1.02)], n=3),
                 of=weave)

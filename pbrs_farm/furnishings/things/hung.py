@@ -24,7 +24,7 @@ from pbrs_farm.furnishings.things.maker import Maker, thing
 from pbrs_farm.furnishings.things.papers import printed, white_paper
 from pbrs_farm.furnishings.things.shapes import Pair
 from pbrs_farm.geometry.bodies import smooth
-from pbrs_farm.geometry.outlines import Profile, spaced
+from pbrs_farm.geometry.outlines import Profile, rect, spaced
 from pbrs_farm.geometry.solids import lathe, quads_surface
 
 # fmt: off
@@ -36,12 +36,33 @@ _LYING: Final = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
 
 @thing(group="shelves", nyu40=SHELVES, place=Place.WALL)
 def wall_shelf(m: Maker, width: float, depth: float, n: int, board: Material) -> None:
-    """Boards above one another on two brackets each; the lowest board's top is at y = 0.04."""
+    """Boards above one another on brackets, rails or nothing seen; the lowest board's top is at y = 0.04."""
+    form, thick = m.pick("slab", "bracket", "bracket", "bent", "corbel", "rail"), m.pick(0.018, 0.024)
+    thick = m.pick(0.035, 0.05) if form == "slab" and n < 3 else thick
+    xs = (0.12 - width / 2, width / 2 - 0.12) if width < 1.1 or m.chance(0.5) else (0.12 - width / 2,
+        0.0, width / 2 - 0.12)
+    lipped = m.chance(0.2)
     for k in range(n):
-        y = 0.028 + 0.32 * k
-        m.box(width, 0.024, (0.0, depth), on=y - 0.012, name="board", of=board)
-        for x in (-(width / 2 - 0.12), width / 2 - 0.12):
-            m.box(0.02, 0.016, (0.0, 0.8 * depth), x=x, on=y - 0.028, name="bracket", of=m.metal)
+        top = 0.04 + 0.32 * k
+        m.box(width, (max(top - thick, 0.0), top), (0.0, depth), 0.002, name="board", of=board)
+        if lipped:  # a dark band along its front
+            m.box(width, (max(top - thick, 0.0), top), (depth, depth + 0.003), of=m.metal)
+        low = top - thick
+        for x in xs:
+            match form:
+                case "bracket":
+                    m.box(0.02, (low - 0.012, low), (0.0, 0.8 * depth), x=x, name="bracket",
+                        of=m.metal)
+                case "bent":  # a strip up the wall and under the board
+                    m.box(0.025, (low - 0.004, low), (0.0, 0.9 * depth), x=x, of=m.metal)
+                    m.box(0.025, (top, top + 0.09), 0.004, x=x, against=0.0, of=m.metal)
+                case "corbel":
+                    m.loft([(rect(0.03, 0.02, 0.002, x=x, z=0.01, n=1), max(low - 0.12, 0.0)),
+                        (rect(0.03, 0.75 * depth, 0.002, x=x, z=0.375 * depth, n=1), low)], of=board)
+                case "rail":
+                    m.box(0.012, (low - 0.012, low), (0.0, 0.85 * depth), x=x, of=m.metal)
+    for x in xs if form == "rail" else ():
+        m.box(0.025, (0.0, 0.32 * n - 0.1), 0.008, x=x, against=0.0, of=m.metal)
 
 
 @thing(group="upper_cabinet", nyu40=CABINET, place=Place.WALL)
@@ -244,11 +265,19 @@ def cover(m: Maker, n: int) -> None:
 
 @thing(group="mirror", nyu40=MIRROR, place=Place.WALL)
 def round_mirror(m: Maker, diameter: float, frame: Material) -> None:
-    """A round mirror in a narrow ring."""
-    r = diameter / 2
-    m.add(facing_disc([(0, 0), (r, 0), (r, 0.02), (r - 0.014, 0.02), (r - 0.014, 0.012)], r),
-        name="rim", of=frame)
-    m.add(facing_disc([(r - 0.014, 0.012), (0, 0.012)], r), name="mirror", of=MIRROR_GLASS)
+    """A round mirror: in a ring, a wide or a round one, with a bare edge, or with rays about it."""
+    form = m.pick("ring", "ring", "wide", "bead", "bare", "rays")
+    r = diameter / 2 * (0.7 if form == "rays" else 1.0)
+    y, t = diameter / 2, {"wide": 0.045, "bare": 0.002}.get(form, 0.014)
+    rim = {"bead": [(r, 0.0), (r, 0.012), (r - 0.003, 0.019), (r - 0.007, 0.021),
+        (r - 0.011, 0.019), (r - t, 0.012)], "wide": [(r, 0.0), (r, 0.014), (r - 0.006, 0.022),
+        (r - t + 0.006, 0.016), (r - t, 0.012)]}.get(form, [(r, 0.0), (r, 0.02), (r - t, 0.02), (r - t, 0.012)])
+    m.add(facing_disc([(0, 0), *rim], y), name="rim", of=frame)
+    m.add(facing_disc([(r - t, 0.012), (0, 0.012)], y), name="mirror", of=MIRROR_GLASS)
+    rays = m.pick(16, 24, 32) if form == "rays" else 0
+    for k in range(rays):
+        with m.moved(turn=rotation_z(2 * np.pi * k / rays), at=(0.0, y, 0.0)):
+            m.box(0.008, (r - 0.004, y * (0.86 if k % 2 else 1.0)), (0.004, 0.012), of=frame)
 
 
 @thing(group="pin_board", nyu40=WHITEBOARD, place=Place.WALL)

@@ -93,9 +93,22 @@ def folded_towels(m: Maker) -> None:
 
 @thing(group="blanket")
 def folded_blanket(m: Maker) -> None:
-    """A folded blanket."""
-    colour, n = m.textile(), m.integers(2, 4)
+    """A folded blanket or two, some rolled, some with a fringe or a band."""
+    colour, n = m.textile(), m.integers(2, 5)
+    if m.chance(0.25):  # rolled, with a strap
+        r = m.uniform(0.06, 0.09)
+        m.rod((-0.21, 0.21), r, 0.0, r, n=m.pick(14, 18), of=plain("blanket", colour, 0.95))
+        for x in m.pick((0.0,), (-0.1, 0.1)):
+            m.rod((x - 0.012, x + 0.012), r, 0.0, r + 0.002, n=18, of=plain("leather", (0.35, 0.22, 0.13), 0.6))
+        return
     folded(m, 0.42, 0.03, 0.32, n, colour, "blanket")
+    trim = plain("blanket", shade(colour, m.pick(0.7, 1.25)), 0.95)
+    if m.chance(0.4):
+        for k in range(m.pick(14, 20)):
+            m.box(0.006, 0.003, (0.158, 0.158 + m.uniform(0.03, 0.045)), x=0.02 * (k - 7), on=0.03 * n - 0.018,
+                of=trim)
+    if m.chance(0.35):
+        m.box(0.03, (0.002, 0.03 * n + 0.003), 0.323, 0.001, x=m.uniform(-0.1, 0.1), of=trim)
 
 
 @thing(group="clothes", nyu40=CLOTHES)

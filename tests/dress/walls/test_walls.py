@@ -186,7 +186,7 @@ def test_a_round_thing_looks_away_from_the_wall() -> None:
 
 
 def test_a_mirror_is_a_mirror() -> None:
-    _piece, shape = hung_things.mirror(0.5, 0.8, None)
+    _piece, shape = hung_things.mirror(np.random.default_rng(1), 0.5, 0.8, None)
     assert any(m.kind is MaterialKind.MIRROR for m in shape.materials)
 
 
