@@ -144,7 +144,7 @@ def new_folder(out: Path) -> Iterator[Path]:
     Raises BadInput if out is not empty or cannot be written.
     """
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
-        raise BadInput(out, "", "is there already", hint="name a new folder")
+        raise BadInput(out, "", "already exists", hint="name a new folder")
     # Write to a sibling on the same file system, then rename it.
     scratch = out.with_name(f".{out.name}.partial")
     shutil.rmtree(scratch, ignore_errors=True)

@@ -57,7 +57,7 @@ class Deb:
                     return _extract_files(_plain_tar(name, content, self.path), wanted)
         except (tarfile.TarError, lzma.LZMAError, EOFError, OSError, ValueError) as error:
             raise self.damaged(str(error)) from None
-        raise self.damaged("holds no files")
+        raise self.damaged("has no files")
 
     def damaged(self, why: str) -> MachineFailed:
         """The error for a package with missing or invalid contents."""
@@ -82,7 +82,7 @@ def fetched_deb(package: str, tested_version: str, folder: Path | None = None) -
         cached = cached_deb(package, tested_version, folder)
         return cached or _download_into(package, tested_version, folder)
     except OSError as error:
-        hint = "set PBRS_CACHE to a folder of yours"
+        hint = "set PBRS_CACHE to a writable folder"
         raise MachineFailed(f"{folder}: {error.strerror or error}", hint=hint) from None
 
 
@@ -93,7 +93,7 @@ def _download_into(package: str, tested_version: str, folder: Path) -> Deb:
         _fetch(package, tested_version, Path(scratch))
         debs = sorted(Path(scratch).glob(f"{package}_*.deb"))
         if not debs:
-            raise MachineFailed(f"no file of {package} came", hint=_HINT)
+            raise MachineFailed(f"apt-get downloaded no {package}", hint=_HINT)
         target = folder / debs[0].name
         debs[0].replace(target)
     return _deb(package, tested_version, target)
@@ -142,7 +142,7 @@ def _sha256(path: Path, size: int, mtime_ns: int) -> str:
     return sha256
 
 
-_HINT: Final = "type `sudo apt-get update`, then try again"
+_HINT: Final = "run `sudo apt-get update`, then try again"
 
 
 def _download(package: str, scratch: Path) -> None:

@@ -51,7 +51,7 @@ def _unpacked(deb: Deb) -> FurniturePackage:
         files = deb.members(lambda name: name in paths)
         if set(files) != paths:
             missing = ", ".join(sorted(PurePosixPath(f).name for f in paths - set(files)))
-            raise deb.damaged(f"holds no {missing}")
+            raise deb.damaged(f"has no {missing}")
         folder.mkdir(exist_ok=True)
         for name, path in place.items():
             write_whole(path, files[f"{FOLDER}/{name}.sh3f"])

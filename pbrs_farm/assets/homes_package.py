@@ -131,6 +131,6 @@ def _unpacked(deb: Deb) -> Package:
         # Unpack the jar under its package's hash.
         files = deb.members(lambda name: name == JAR)
         if JAR not in files:
-            raise deb.damaged(f"holds no {JAR}")
+            raise deb.damaged(f"has no {JAR}")
         write_whole(jar, files[JAR])
     return Package(deb.version, deb.sha256, jar, deb.note)

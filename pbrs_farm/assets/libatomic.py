@@ -55,7 +55,7 @@ def unpacked_library(deb: Deb) -> Path:
     if not library.exists():
         files = deb.members(lambda name: name.rpartition("/")[2].startswith(f"{NAME}."))
         if not files:
-            raise deb.damaged(f"holds no {NAME}")
+            raise deb.damaged(f"has no {NAME}")
         library.parent.mkdir(exist_ok=True)
         write_whole(library, next(iter(files.values())))
     return library

@@ -28,7 +28,7 @@ def fetch_skies() -> Path:
     paths = {f"{name}.exr" for name in NAMES}
     files = deb.members(lambda path: "studiolights/world/" in path and Path(path).name in paths)
     if {Path(path).name for path in files} != paths:
-        raise deb.damaged(f"holds no {', '.join(sorted(paths))}")
+        raise deb.damaged(f"has no {', '.join(sorted(paths))}")
     folder.mkdir(parents=True, exist_ok=True)
     for path, data in files.items():
         write_whole(folder / Path(path).name, data)

@@ -92,7 +92,7 @@ def intrinsics_from_k(size: tuple[int, int] | None, k: Any, hfov_deg: float) -> 
     not positive, and for a K of another picture size. The lens is a pinhole.
     """
     if size is None and k is not None:
-        raise BadInput("camera", "size", "is missing", hint="the size of the pictures K is of")
+        raise BadInput("camera", "size", "is missing", hint="the picture size for K")
     width, height = (int(v) for v in (DEFAULT_SIZE if size is None else size))
     if min(width, height) < 1:
         raise BadInput("camera", "size", f"{width}x{height} is not a size")

@@ -36,7 +36,7 @@ def json_from_bytes(data: bytes, file: object, *, error: type[BadInput] = BadHou
     Python's stack. `checked` checks the value.
     """
     if not data.strip():
-        raise error(file, "", "no valid JSON: the text is empty")
+        raise error(file, "", "not valid JSON: the text is empty")
     try:
         return json.loads(data, parse_constant=_refuse_constant)
     except RecursionError:
@@ -52,7 +52,7 @@ def json_from_bytes(data: bytes, file: object, *, error: type[BadInput] = BadHou
     if other_kind(data, file) is not None:
         text, hint = wrong_kind(data, file)
         raise error(file, "", text, hint=hint)
-    raise error(file, place, f"no valid JSON: {text}")
+    raise error(file, place, f"not valid JSON: {text}")
 
 
 def utf8_of_json(data: bytes) -> bytes:
@@ -95,7 +95,7 @@ def checked(
     if first["type"] == "json_invalid" and isinstance(data, bytes):
         # json gives the place of a syntax error, and nests deeper than pydantic.
         json_from_bytes(data, file, error=error)
-        raise error(file, "", "no valid JSON: nested too deeply", hint=hint)
+        raise error(file, "", "not valid JSON: nested too deeply", hint=hint)
     if first["type"] == "extra_forbidden":
         word, field_names = str(first["loc"][-1]), _field_names(adapter)
         offer = hint_of_choice if len(field_names) <= _MOST_NAMES else did_you_mean
@@ -136,7 +136,7 @@ _SENTENCES: Final = {
     "too_long": "expected {max_length} values at most, got {actual_length}",
     "string_too_short": "expected {min_length} characters or more",
     "string_too_long": "expected {max_length} characters at most",
-    "string_pattern_mismatch": "is not written as {pattern}",
+    "string_pattern_mismatch": "does not match {pattern}",
     "greater_than": "expected more than {gt:g}",
     "greater_than_equal": "expected {ge:g} or more",
     "less_than": "expected less than {lt:g}",
@@ -166,7 +166,7 @@ def sentence(fault: ErrorDetails) -> str:
         text = _SENTENCES[kind].format(**facts)
     else:
         expected_kind = _WANTED.get(kind.partition("_")[0])
-        text = f"expected {expected_kind}" if expected_kind else "is not what belongs here"
+        text = f"expected {expected_kind}" if expected_kind else "has the wrong type"
     tells_value = text.startswith("expected") and ", got" not in text
     return f"{text}, got {_shown_value(fault['input'])}" if tells_value else text
 

@@ -124,7 +124,7 @@ def parse_house_key(key: str) -> HouseKey | None:
 def selection_key(run: str, ending: str) -> str:
     """Key of a selection's "parquet", "jsonl" or "html"; BadInput for a name that could leave the folder."""
     if not _RUN_NAME.fullmatch(run):
-        raise BadInput("--run", run, "a run's name holds letters, digits, dots and dashes")
+        raise BadInput("--run", run, "the name of a run may have letters, digits, dots and dashes")
     return f"selection/{run}.{ending}"
 
 

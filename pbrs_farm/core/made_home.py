@@ -156,7 +156,7 @@ def check_wishes(
     if storeys not in (1, 2):
         raise BadInput("storeys", str(storeys), "homes have one storey or two", hint="storeys=2")
     if offices and high <= offices:
-        text, most_rooms = "offices are bedrooms, of which one stays", len(_AREA_OF_HOMES) - 1
+        text, most_rooms = ("at least one bedroom must stay", len(_AREA_OF_HOMES) - 1)
         hint = f"rooms={min(offices + 1, most_rooms)}..{most_rooms}, offices=1..{most_rooms - 1}"
         raise BadInput("offices", f"{offices} of {high} bedrooms", text, hint=hint)
     low = max(low, offices + 1 if offices else 0)

@@ -132,7 +132,7 @@ class LensFields(FieldGroup):
         if abs(width_px * h / (height_px * w) - 1) <= _ASPECT_ERROR:
             return None
         hint = f"--set image.width_px={w} --set image.height_px={h}"
-        fault = f"lens.model {self.model} is of pictures {w}:{h}"
+        fault = f"lens.model {self.model} needs pictures of {w}:{h}"
         return f"{fault}, not {width_px}x{height_px}: add {hint}"
 
     def _unchecked(self, pinhole: Intrinsics) -> Intrinsics:

@@ -61,7 +61,7 @@ class Recipe(FieldGroup):
     repair: RepairFields = RepairFields()
     surroundings: SurroundingFields = SurroundingFields()
     cameras: CameraFields = CameraFields()
-    rig: RigFields | None = field(None, "cameras that take each view together, by --rig")
+    rig: RigFields | None = field(None, "cameras of --rig")
     lens: LensFields = LensFields()
     blur: BlurFields = BlurFields()
     sensor: SensorFields = SensorFields()
@@ -90,7 +90,7 @@ class Recipe(FieldGroup):
     @model_validator(mode="after")
     def _is_one_rig(self) -> Self:
         if self.rig is not None and self.cameras.stereo_m > 0:
-            raise ValueError("rig: a stereo pair is a rig: give rig or cameras.stereo_m")
+            raise ValueError("rig: give rig or cameras.stereo_m")
         return self
 
     @property
@@ -115,7 +115,7 @@ class Recipe(FieldGroup):
     def _blur_fits(self) -> Self:
         """Blur is of `path`, and depth of field of a lens with an optical axis."""
         if self.blur.is_on and self.light.integrator == "metropolis":
-            raise ValueError("group blur is of `path` alone: add --set light.integrator=path")
+            raise ValueError("group blur needs `path`: add --set light.integrator=path")
         for place, lens in self.lenses.items():
             if self.blur.aperture_mm > 0 and not lens.lens.depth_is_planar:
                 text = f"{place}blur.aperture_mm: lens.model {lens.model} has no plane of focus"

@@ -323,7 +323,7 @@ class LightFields(FieldGroup):
     @model_validator(mode="after")
     def _lamps_are_of_path(self) -> Self:
         if self.groups == "lamps" and self.integrator == "metropolis":
-            raise ValueError("groups lamps is of `path` alone: add --set light.integrator=path")
+            raise ValueError("groups lamps needs `path`: add --set light.integrator=path")
         return self
 
 

@@ -99,7 +99,7 @@ class RigFields(FieldGroup):
         names = [camera.name for camera in self.cameras]
         twice = next((name for name in names if names.count(name) > 1), None)
         if twice is not None:
-            raise ValueError(f"two cameras are called {twice}")
+            raise ValueError(f"two cameras are named {twice}")
         return self
 
     @property

@@ -159,7 +159,7 @@ def yields(
         frame.line([(0.03, y), (0.09, y)], f"curve {css}")
         frame.text((0.11, y), name, dy=4)
     frame.add("circle", css="paper", cx=frame.x(paper[0]), cy=frame.y(paper[1]), r=6)
-    frame.text((0.03, 0.30 - 0.07 * len(curves)), f"ring: the paper's own, {paper[1]:.1%}", dy=4)
+    frame.text((0.03, 0.30 - 0.07 * len(curves)), f"ring: the paper's, {paper[1]:.1%}", dy=4)
     return frame.svg()
 
 

@@ -104,7 +104,7 @@ def pairs_in(folder: Path) -> tuple[PhotoFiles, ...]:
             pairs += _pairs_by_suffix(folder, inner)
     if not pairs:
         hint = "rgb/NAME.jpg with depth/NAME.png; see docs"
-        raise BadInput(folder, "", "holds no RGB-D pairs", hint=hint)
+        raise BadInput(folder, "", "has no RGB-D pairs", hint=hint)
     return tuple(sorted(pairs, key=lambda pair: pair.id))
 
 
@@ -130,7 +130,7 @@ def _photograph_files(folder: Path, endings: tuple[str, ...]) -> dict[str, Path]
     for path in sorted(folder.iterdir()):
         if path.is_file() and path.suffix.lower() in endings:
             if path.stem in files:
-                raise BadInput(path, "", f"a second file of the name {path.stem}")
+                raise BadInput(path, "", f"two files are named {path.stem}")
             files[path.stem] = path
     return files
 
@@ -180,7 +180,7 @@ def photo_from_pair(pair: PhotoFiles, *, depth_scale: float | None, sun_rgbd: bo
     # Convert depth to whole millimetres.
     if sun_rgbd:
         if stored.dtype != np.uint16:
-            raise BadInput(pair.depth, "", "SUN RGB-D's depth has 16 bits; this file has not")
+            raise BadInput(pair.depth, "", "expected 16 bits, as in SUN RGB-D")
         stored = sun_rgbd_depth(stored)
     is_float = np.issubdtype(stored.dtype, np.floating)
     scale = depth_scale or pair.depth_scale or (1.0 if is_float else 1000.0)

@@ -219,11 +219,11 @@ def accessor_array(gltf: Gltf, index: Any) -> NDArray[Any]:
     dtype = DTYPES.get(_hashable(accessor.get("componentType")))
     width = WIDTHS.get(_hashable(accessor.get("type")))
     if dtype is None or width is None:
-        raise BadHouse(gltf.file, place, "is of a type that no mesh uses")
+        raise BadHouse(gltf.file, place, "has a type that meshes do not use")
     if "sparse" in accessor:
         return _sparse_array(gltf, accessor, place, dtype, width)
     if "bufferView" not in accessor:
-        text, hint = "holds no data: its mesh is compressed", "export again without compression"
+        text, hint = "has no data: its mesh is compressed", "export again without compression"
         raise BadHouse(gltf.file, place, text, hint=hint)
     n = count(gltf, accessor, "count", place)
     # Elements may be interleaved with others: step over the bytes between them.

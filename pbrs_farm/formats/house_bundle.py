@@ -96,7 +96,7 @@ def house_from_bundle(glb_data: bytes, json_data: bytes) -> House:
     if not isinstance(data, dict) or data.get("format") != FORMAT:
         raise BadHouse("house.json", "format", f"expected {FORMAT!r}; this is not a house bundle")
     if data.get("glb_sha256") != keys.sha256(glb_data):
-        raise BadHouse("house.json", "glb_sha256", "house.glb is not the one it was written with")
+        raise BadHouse("house.json", "glb_sha256", "belongs to another house.glb")
     # Put arrays and pictures of house.glb where house.json left them out.
     gltf = glb.gltf_from_glb(glb_data, "house.glb")
     data["items"] = [
@@ -142,7 +142,7 @@ def _surface_with_arrays(
         arrays = _arrays_of_primitive(gltf, primitive, place)
     got = {"n_vertices": len(arrays["positions"]), "n_faces": len(arrays["faces"])}
     if not got.items() <= surface.items():
-        raise BadHouse("house.glb", place, f"has {got}, house.json says otherwise")
+        raise BadHouse("house.glb", place, f"has {got}, unlike house.json")
     return surface | arrays
 
 

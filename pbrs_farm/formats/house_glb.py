@@ -107,7 +107,7 @@ def primitive(writer: glb.GlbWriter, house: House, item: Item, s: Surface) -> di
     place = f"item {item.id}, surface {s.name}"
     for array in (s.positions, s.uvs, s.normals):
         if array is not None and not np.isfinite(array).all():
-            raise BadHouse(house.source.file, place, "holds a number that is not finite")
+            raise BadHouse(house.source.file, place, "has a number that is not finite")
     if len(s.faces) and not (s.faces.min() >= 0 and s.faces.max() < len(s.positions)):
         raise BadHouse(house.source.file, place, "a face names a vertex that does not exist")
     if not 0 <= s.material < len(house.materials):

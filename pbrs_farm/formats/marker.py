@@ -54,7 +54,7 @@ def read_marker(store: Store, key: str) -> Marker | None:
     try:
         return None if data is None else Marker.model_validate_json(data)
     except ValidationError:
-        raise StoreFailed(key, "not a marker", hint="remove it to do the step again") from None
+        raise StoreFailed(key, "not a marker", hint="remove it to repeat the step") from None
 
 
 def copy_done(of: Store, to: Store, key: str) -> Marker | None:

@@ -71,8 +71,8 @@ def views_of(root: Path) -> tuple[ViewEntry, ...]:
     Raises BadInput if root is no output folder or a JSON file in it cannot be read.
     """
     if (root / LAYOUT).is_file():
-        hint = "pbrs-farm pull ROOT --out FOLDER, then that folder"
-        raise BadInput(root, LAYOUT, "its views are packed, and this reads files", hint=hint)
+        hint = "pbrs-farm pull ROOT --out FOLDER, then use FOLDER"
+        raise BadInput(root, LAYOUT, "its views are packed, but files are needed", hint=hint)
     # Homes first, then objects without context.
     roots = [root / name for name in keys.FOLDERS if (root / name).is_dir()]
     if not roots:

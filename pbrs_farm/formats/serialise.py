@@ -162,7 +162,7 @@ def _array_from_json(
     except (ValueError, TypeError, OverflowError):
         raise ValueError(f"expected an array of {np.dtype(dtype)}") from None
     if not np.isfinite(array).all() or (wide.dtype.kind == "i" and (array != wide).any()):
-        raise ValueError("holds a number that is not finite or out of range")
+        raise ValueError("has a number that is not finite or out of range")
     return _shaped(array, shape)
 
 

@@ -66,5 +66,5 @@ def lamps_from_view_json(data: bytes, place: object) -> list[dict[str, Any]]:
     except (ValueError, KeyError, TypeError):
         command = "pbrs-farm run HOME --out OUT --groups lamps"
         hint = f"render it with them: {command}, and --update if OUT is the same"
-        raise BadInput(place, "", "was stored without the light of each lamp", hint=hint) from None
+        raise BadInput(place, "", "lacks the light of each lamp", hint=hint) from None
     return rows

@@ -106,7 +106,7 @@ def _pixels_of_classes(view: ViewEntry) -> np.ndarray[tuple[int], np.dtype[np.in
     place = f"{view.folder}/semantic.png"
     ids = array_from_png(read_regular(view.folder / "semantic.png"), place)
     if ids.max(initial=0) >= len(NYU40_NAMES):
-        raise BadInput(place, "", f"holds class {ids.max()}, not 0..40")
+        raise BadInput(place, "", f"has class {ids.max()}, not 0..40")
     return np.bincount(ids.reshape(-1), minlength=256).astype(np.int64)
 
 

@@ -48,7 +48,7 @@ def contact_sheet(
     # Choose the views and make their tiles.
     everything = best_first(views_of(folder))
     if not everything:
-        raise BadInput(folder, "houses/", "holds no view yet", hint="run `pbrs-farm run` first")
+        raise BadInput(folder, "houses/", "has no view yet", hint="run `pbrs-farm run` first")
     views = spread_views(everything, max_views)
     tiles_of_view = made or {}
     rows = [(view, tiles_of_view.get(view.folder) or tiles_of(view, TILE_PX)) for view in views]

@@ -105,7 +105,7 @@ def _check_same(path: Path, expected: str) -> None:
         raise BadInput(
             path,
             "",
-            "is there already and is not this home",
+            "already exists and differs from this home",
             hint="another --out, or delete the file",
         )
 

@@ -71,7 +71,7 @@ def _splits_of(path: Path) -> Path:
 
 def _numbers_of_split(path: Path, split: str) -> set[int]:
     if not has_splits(path):
-        text, hint = "needed beside the .mat: it says which train", "it comes with NYUv2's data set"
+        text, hint = "needed beside the .mat: it has the split", "it comes with NYUv2's data set"
         raise BadInput(_splits_of(path), "", text, hint=hint)
     # Numbers start at 1.
     return {n for n in _mat_numbers(_splits_of(path), f"{split}Ndxs").tolist() if n > 0}

@@ -70,8 +70,8 @@ def real_pairs(folder: Path, plan: TrainingPlan) -> tuple[PhotoFiles, ...]:
     if plan.task == "segmentation":
         pairs = tuple(pair for pair in pairs if has_labels_of(pair))
     if plan.task not in ("normals", "depth", "segmentation") or not pairs:
-        text = f"photographs with depth say nothing of {plan.task}: normals and depth alone"
-        hint = "NYUv2's .mat holds classes and instances"
+        text = f"photographs with depth have only normals and depth, not {plan.task}"
+        hint = "NYUv2's .mat has classes and instances"
         if plan.task == "segmentation":
             hint += f", ScanNet's label/ classes, of SUN RGB-D {sun_rgbd_labels.CLASSES} beside it"
         raise BadInput(folder, "", text, hint=hint)
@@ -148,7 +148,7 @@ def camera_of(folder: Path, top: Path) -> PhotoCamera:
     camera = find_camera(folder, top)
     if camera is not None:
         return camera
-    text = "photographs without intrinsics: normals cannot be taken from their depth"
+    text = "photographs without intrinsics: normals cannot be computed from depth"
     hint = 'put intrinsics.json there: {"fx": 518.9, "fy": 519.5, "cx": 325.6, "cy": 253.7}'
     raise BadInput(folder, "", text, hint=hint)
 

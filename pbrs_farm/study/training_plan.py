@@ -88,17 +88,17 @@ class TrainingPlan:
                 raise BadInput("plan", name, f"expected {least} or more, got {getattr(self, name)}")
         halved = self.network in ("small", "residual", "efficient")
         if halved and (self.width_px % 2 or self.height_px % 2):
-            text = f"{self.width_px}x{self.height_px}: network {self.network} wants even numbers"
+            text = f"{self.width_px}x{self.height_px}: network {self.network} needs even numbers"
             raise BadInput("plan", "width_px, height_px", text)
         # A deepest stage of one cell has no variance in a batch of one.
         deep = self.network in ("residual", "efficient")
         if deep and max(self.width_px, self.height_px) <= 32:
-            text = f"{self.width_px}x{self.height_px}: network {self.network} wants a side above 32 pixels"
+            text = f"{self.width_px}x{self.height_px}: network {self.network} needs sides above 32 pixels"
             raise BadInput("plan", "width_px, height_px", text)
         if not 0 <= self.average < 1:
             raise BadInput("plan", "average", f"expected 0 to below 1, got {self.average}")
         if self.task == "depth" and self.turn_deg:
-            text = "depth along the axis is another one where the camera turns: 0 alone"
+            text = "depth along the axis changes with camera rotation, so only 0 works"
             raise BadInput("plan", "turn_deg", text)
         for name, choices in _CHOICES.items():
             if getattr(self, name) not in choices:

@@ -150,7 +150,7 @@ class LightScene:
         moving = {motion.item for motion in house.motions}
         for item in house.items:
             if item.lights and item.id in moving:
-                text = "is a lamp that moves: its light would not follow"
+                text = "is a moving lamp: its light would not follow"
                 raise BadHouse(house.source.file, item.id, text, hint="make it static")
 
     @property
@@ -231,7 +231,7 @@ class LightScene:
         facts: dict[str, Any] = {"seed": seed, "lamp_weights": self._weights_by_name(weights)}
         if fields.integrator == "metropolis":
             if camera.blur is not None:
-                text = "depth of field and motion blur are of `path` alone"
+                text = "depth of field and motion blur need `path`"
                 raise RenderFailed(text, view=room_id, mode="light", seed=seed)
             return self._render_metropolis(view, room_id, checkpoint, facts)
         facts |= {"integrator": "path", "guided": weights.is_guided}
@@ -276,7 +276,7 @@ class LightScene:
             text = f"shading needs LLVM or CUDA, this is {self.variant}"
             raise MachineFailed(text, hint="sudo apt-get install -y libllvm19")
         if fields.integrator == "metropolis":
-            text, hint = "shading and residual are of `path` alone", "--set light.integrator=path"
+            text, hint = "shading and residual need `path`", "--set light.integrator=path"
             raise RenderFailed(text, view=room_id, mode="light", seed=seed, hint=hint)
 
     def _streams(self, camera: Camera, anchors: NoiseAnchors) -> Streams:

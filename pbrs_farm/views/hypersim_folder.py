@@ -33,7 +33,7 @@ _SCENES: Final = "ai_*"
 _FRAME: Final = re.compile(r"frame\.(\d{4})\.depth_meters\.hdf5")
 _MODE: Final = "mlt_il_ol"  # mode of its pictures: all light
 _DEPTH_MAX_MM: Final = 65535
-_TILTED: Final = "a tilted projection, which no K describes"
+_TILTED: Final = "a tilted projection, which K cannot describe"
 _LAYER_FILES: Final = {
     "depth": "depth_meters",
     "depth_z": "depth_meters",
@@ -165,7 +165,7 @@ class HypersimFolder:
         return _LAYER_OF[name](stored, self._intrinsics_of(ref), self._metres(ref.house))
 
     def kept_by(self, run: str) -> frozenset[ViewRef]:
-        raise BadInput(self.url, "", f"a folder of Hypersim knows of no selection {run}")
+        raise BadInput(self.url, "", f"a Hypersim folder has no selection {run}")
 
     def split_of(self, ref: ViewRef, shares: SplitShares | None) -> str:
         row = self._splits.get(ref)
@@ -218,7 +218,7 @@ class HypersimFolder:
         try:
             return float(rows["meters_per_asset_unit"])
         except (KeyError, ValueError):
-            raise BadInput(file, "meters_per_asset_unit", "is not there") from None
+            raise BadInput(file, "meters_per_asset_unit", "is missing") from None
 
     def _pose(self, ref: ViewRef) -> F64:
         """(4, 4) world_from_camera, OpenCV's axes, metres, y up."""

@@ -76,7 +76,7 @@ class ShardSet:
                 raise BadInput(self.url, "", f"no layer {layer} in these shards", hint=hint)
         if "colour" in request.layers and request.mode not in dataset.modes:
             hint = f"packed: {', '.join(dataset.modes)}"
-            raise BadInput(self.url, "", f"no pictures in {request.mode} light", hint=hint)
+            raise BadInput(self.url, "", f"no pictures of the mode {request.mode}", hint=hint)
 
     def read_at(self, shard: Shard, view: int, request: SampleRequest) -> Sample:
         """The Sample of a view by its index in a shard.
@@ -129,7 +129,7 @@ class ShardSet:
 
     def kept_by(self, run: str) -> frozenset[ViewRef]:
         hint = "pack them with --selection"
-        raise BadInput(self.url, "", f"shards know of no selection {run}", hint=hint)
+        raise BadInput(self.url, "", f"shards have no selection {run}", hint=hint)
 
     def save(self, refs: Sequence[ViewRef], place: str | Path) -> None:
         hint = "save frames of the output folder itself"

@@ -107,7 +107,7 @@ def check_array(name: str, array: NDArray[Any], size: Size, place: str) -> NDArr
     """
     want = STORED[name]
     shape = (size[1], size[0], 3) if want.channels == 3 else (size[1], size[0])
-    hint = "a program has written the file again: take the original"
+    hint = "another program rewrote the file: use the original"
     if array.dtype == np.uint8 and want.dtype == "uint16":
         raise BadInput(place, "", "8 bits a value, 16 are stored", hint=hint)
     if array.dtype != np.dtype(want.dtype) or array.shape != shape:

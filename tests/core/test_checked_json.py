@@ -58,12 +58,12 @@ def test_a_value_that_does_not_fit_is_one_line_with_its_place(part, place, text)
 @pytest.mark.parametrize(
     ("data", "text"),
     [
-        (b"", "a.json: no valid JSON: the text is empty"),
-        (b"[1, 2", "a.json: line 1 column 6: no valid JSON"),
-        (b"[" * 500, "a.json: line 1 column 501: no valid JSON"),
-        (b"[" * 500 + b"]" * 500, "a.json: no valid JSON: nested too deeply"),
+        (b"", "a.json: not valid JSON: the text is empty"),
+        (b"[1, 2", "a.json: line 1 column 6: not valid JSON"),
+        (b"[" * 500, "a.json: line 1 column 501: not valid JSON"),
+        (b"[" * 500 + b"]" * 500, "a.json: not valid JSON: nested too deeply"),
         (b"[1, NaN]", "a.json: list[1]: is not a finite number"),
-        (b'[1, "\xff"]', "a.json: byte 5: no valid JSON: the text is not UTF-8"),
+        (b'[1, "\xff"]', "a.json: byte 5: not valid JSON: the text is not UTF-8"),
         (b"[1, []]", "a.json: list[1]: expected a number, got a list"),
     ],
 )

@@ -176,7 +176,7 @@ def test_damaged_pictures_are_named(folder: Path) -> None:
 
 
 def test_empty_and_missing_sources_are_named(tmp_path: Path) -> None:
-    with pytest.raises(BadInput, match="holds no RGB-D pairs"):
+    with pytest.raises(BadInput, match="has no RGB-D pairs"):
         build_reference(tmp_path, FIELDS, LIMITS)
     with pytest.raises(BadInput, match=r"nowhere.*no such"):
         build_reference(tmp_path / "nowhere", FIELDS, LIMITS)

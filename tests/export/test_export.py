@@ -440,7 +440,7 @@ def test_a_wrong_form_a_full_folder_and_an_empty_root_are_told(root, tmp_path):
         export(root, tmp_path / "x", "stl")
     (tmp_path / "full").mkdir()
     (tmp_path / "full/file").write_text("mine")
-    with pytest.raises(BadInput, match="is there already"):
+    with pytest.raises(BadInput, match="already exists"):
         export(root, tmp_path / "full", "coco")
     (tmp_path / "empty/houses").mkdir(parents=True)
     with pytest.raises(BadInput, match="no finished view"):

@@ -21,7 +21,7 @@ PYTHONS_WORDS = ("literal", "codec", "integer string", "maximum recursion", "Tra
         (b"[" * 100_000, "nested too deeply"),
         (b'{"a": NaN}', "NaN is not a number"),
         (b'{"a" 1}', "line 1 column 6"),
-        (b"", "no valid JSON"),
+        (b"", "not valid JSON"),
     ],
 )
 def test_what_is_no_json_is_refused_in_words_that_say_nothing_of_python(data, said):

@@ -39,7 +39,7 @@ def test_a_second_call_keeps_what_is_there(tmp_path: Path) -> None:
 def test_a_file_of_another_home_is_not_written_over(tmp_path: Path) -> None:
     (tmp_path / "made-1.sh3d").write_bytes(b"a person's")
     (done,) = make_homes(HOMES[:1], tmp_path)
-    assert "is not this home" in done.fault
+    assert "differs from this home" in done.fault
     assert (tmp_path / "made-1.sh3d").read_bytes() == b"a person's"
 
 

@@ -132,7 +132,7 @@ def test_a_turned_plan_is_turned_back(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("value", "message"),
     [
-        ("[", "plan.json: line 1 column 2: no valid JSON"),
+        ("[", "plan.json: line 1 column 2: not valid JSON"),
         ({}, "rooms: is missing.*doors"),
         ({"rooms": []}, "rooms: expected 1 values or more, got 0"),
         (

@@ -41,7 +41,7 @@ def test_the_rooms_take_the_area_of_the_whole_home(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("value", "message"),
     [
-        ("{", "flat.json: line 1 column 2: no valid JSON"),
+        ("{", "flat.json: line 1 column 2: not valid JSON"),
         ([], "flat.json: expected an object, got a list.*rooms"),
         (
             {"rooms": [*FLAT, "cellar"]},

@@ -245,7 +245,7 @@ def test_a_recipe_with_a_rig_is_written_and_read_as_the_same(tmp_path: Path) -> 
         ("[[cameras]]\nname = 'A b'", "cameras[0].name"),
         ("[[cameras]]\nname = 'a'\nrotation_wxyz = [1, 1, 0, 0]", "cameras[0].rotation_wxyz"),
         ("[[cameras]]\nname = 'a'\nrotation_wxyz = [1, 0, 0, 0]\nyaw_deg = 3", "cameras[0]"),
-        ("[[cameras]]\nname = 'a'\n[[cameras]]\nname = 'a'", "two cameras are called a"),
+        ("[[cameras]]\nname = 'a'\n[[cameras]]\nname = 'a'", "two cameras are named a"),
         ("[[cameras]]\nname = 'a'\nlens = {model = 'bent'}", "cameras[0].lens.model"),
         ("[[cameras]", "is not valid TOML"),
     ],

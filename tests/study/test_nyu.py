@@ -107,7 +107,7 @@ def test_a_run_is_tuned_on_it_and_judged_beside_the_papers_tuned_row(
 
 def test_what_training_on_it_needs_is_said(mat: Path) -> None:
     plan = small_plan()
-    with pytest.raises(BadInput, match="NYUv2 trains alone"):
+    with pytest.raises(BadInput, match="NYUv2 cannot be combined"):
         training_views(TrainingSource((str(mat), "root")), plan)
     (mat.parent / "splits.mat").write_bytes(b"no matrix")
     with pytest.raises(BadInput, match="not the expected MATLAB 5 file"):

@@ -115,7 +115,7 @@ def test_light_is_the_same_as_without_and_is_kept_by_lamp():
 def test_shading_is_refused_where_there_is_none():
     house, camera = rooms.furnace(0.5)
     metropolis = FIELDS.model_copy(update={"integrator": "metropolis"})
-    with pytest.raises(RenderFailed, match="shading and residual are of `path` alone"):
+    with pytest.raises(RenderFailed, match="shading and residual need `path`"):
         split(house, camera, dark_sky(), metropolis)
     scalar = LightScene.load(house, {}, RECIPE, dark_sky(), variant="scalar_rgb")
     with pytest.raises(MachineFailed, match="shading needs LLVM or CUDA"):

@@ -156,7 +156,7 @@ def test_a_scalar_variant_says_what_light_by_lamp_needs(monkeypatch: pytest.Monk
 
 
 def test_metropolis_has_no_light_by_lamp_and_says_so() -> None:
-    with pytest.raises(BadRecipe, match="groups lamps is of `path` alone"):
+    with pytest.raises(BadRecipe, match="groups lamps needs `path`"):
         recipe_from_name("paper", {"light.groups": "lamps"})
 
 

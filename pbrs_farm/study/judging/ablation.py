@@ -204,7 +204,7 @@ def training_sets(
         for light in (mode,) if mode else tuple(modes):
             name = "_".join(part for part in (label, "" if mode and label else light) if part)
             if name in sets:
-                raise BadInput("ablation", word, f"a second row called {name}", hint="NAME=ROOT")
+                raise BadInput("ablation", word, f"two rows are named {name}", hint="NAME=ROOT")
             row_source = replace(source, places=tuple(places.split("+")), modes=(light,))
             sets[name] = TrainingSet(name, row_source)
     return tuple(sets.values())

@@ -57,7 +57,7 @@ def open_judged_places(
         )
         if views.name in places:
             hint = f"--on other={word.partition('=')[2] or word}"
-            raise BadInput("--on", word, f"a second place named {views.name}", hint=hint)
+            raise BadInput("--on", word, f"two places are named {views.name}", hint=hint)
         places[views.name] = views
     return list(places.values())
 
@@ -82,11 +82,11 @@ def open_judged_place(
     label, rest = (label, rest) if equals else ("", word)
     place, _, place_mode = rest.partition("@")
     if not place:
-        raise BadInput("--on", word, "names no place", hint="--on nyu=PLACE")
+        raise BadInput("--on", word, "has no place", hint="--on nyu=PLACE")
     path = Path(place)
     is_nyu, is_folder = path.suffix == ".mat", path.is_dir() and not is_root(path)
     if place_mode and (is_nyu or is_folder):
-        raise BadInput("--on", word, f"photographs have no light of ours, such as {place_mode}")
+        raise BadInput("--on", word, f"photographs have no lighting mode, such as {place_mode}")
     if is_nyu:
         return _nyu_views(path, plan, label or "NYUv2", trained_on)
     if is_folder:
@@ -131,12 +131,12 @@ def _of_homes(
     else:
         held_out = held_out_views(source, plan, most)
         if held_out is None:
-            text = f"all its homes trained: {', '.join(sorted(shared)[:3])}"
+            text = f"all its homes were used for training: {', '.join(sorted(shared)[:3])}"
             raise BadInput(source.name, "", text, hint="other homes, or train with --hold-out")
         views = held_out
     leaked = trained_homes & {home_of(house) for house in views.homes}
     if leaked:
-        text = f"home {min(leaked)} has trained, it may not judge"
+        text = f"home {min(leaked)} was used for training"
         raise BadInput(source.name, "", text, hint="the same --hold-out as in training")
     truth = f"{task_of(plan.task).truth}; {source.modes[0]} light, {len(views.homes)} homes"
     return judged_of_arrays(name, truth, views, credits_of(source, views.homes))
@@ -149,7 +149,7 @@ def _photographs(
     frames = [read_frame(pair, folder, plan) for pair in real_pairs(folder, plan)]
     for frame in frames:
         if frame.digest in trained_on:
-            text = "this photograph has trained, it may not judge"
+            text = "this photograph was used for training"
             raise BadInput(folder, frame.id, text, hint="photographs of other rooms")
     return _judged_frames(name, PHOTO_TRUTHS[plan.task], frames)
 

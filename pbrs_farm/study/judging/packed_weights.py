@@ -25,11 +25,11 @@ from pbrs_farm.study.training_plan import plan_as_json
 
 SHIPPED: Final = Path(__file__).parents[1] / "weights"
 _TOLD_RAYS: Final = " and the direction of each pixel's ray (`predict --hfov`)"
-_SAYS: Final = {
-    "normals": "the direction of the surface at each pixel",
-    "segmentation": "which of NYU's {n_classes} classes each pixel is of",
-    "depth": "how far each pixel's surface is along the camera's axis",
-    "boundaries": "how likely each pixel is an edge of an object",
+_PREDICTS: Final = {
+    "normals": "the surface normal at each pixel",
+    "segmentation": "one of NYU's {n_classes} classes for each pixel",
+    "depth": "depth along the camera's axis",
+    "boundaries": "the probability of an object boundary at each pixel",
 }
 _MOST_HOMES: Final = 12  # number of homes named on the card
 
@@ -39,8 +39,8 @@ def shipped_run(task: str) -> Path:
     folder = SHIPPED / task
     if not (folder / "run.json").exists():
         tasks = sorted(path.parent.name for path in SHIPPED.glob("*/run.json"))
-        hint = f"weights come for {', '.join(tasks)}" if tasks else "pbrs-farm predict RUN PHOTO..."
-        raise BadInput("--task", task, "no weights of this task come with the package", hint=hint)
+        hint = f"shipped weights: {', '.join(tasks)}" if tasks else "pbrs-farm predict RUN PHOTO..."
+        raise BadInput("--task", task, "the package has no weights for this task", hint=hint)
     return folder
 
 
@@ -90,13 +90,13 @@ def model_card(run: Trained, record: Mapping[str, Any], evaluations: list[dict[s
     parts = [
         f"---\ntags: [{task.name}, indoor, synthetic-data]\nlibrary_name: pbrs-farm\n---",
         f"# {task.name}, plan {plan.name}",
-        f"Says {_SAYS[task.name].format(n_classes=plan.n_classes)}, from one colour picture of a room{_TOLD_RAYS * plan.rays}. Network `{plan.network}`,"
+        f"Predicts {_PREDICTS[task.name].format(n_classes=plan.n_classes)}, from one colour picture of a room{_TOLD_RAYS * plan.rays}. Network `{plan.network}`,"
         f" {record['weights']:,} weights in half floats, trained at {size}.",
         "```\npbrs-farm predict FOLDER PHOTO... --out seen\n```",
         "FOLDER is the folder of this card; for weights of the package, `--task` also works.",
-        "## What it was trained on",
+        "## Training data",
         _seen(record, homes),
-        f"First weights: {record['init_origin']['source']}. Weights of {chosen}; seed {record['seed']};"
+        f"Initial weights: {record['init_origin']['source']}. Weights of {chosen}; seed {record['seed']};"
         f" pbrs_farm {record['versions']['pbrs_farm']}, torch {record['versions']['torch']}{machine}.",
         *([f"Made by:\n\n```\n{commands}\n```"] if commands else []),
         f"Truth: {record['truth']}.",
@@ -104,11 +104,11 @@ def model_card(run: Trained, record: Mapping[str, Any], evaluations: list[dict[s
         _figures(run, evaluations),
         *(f"Truth of {row['on']}: {row['truth']}." for row in evaluations),
         "## Limits",
-        f"A small network at {size}, trained on few pictures: nothing for measuring or for safety."
-        " It knows rooms of homes by day and by lamplight; other places, people, animals and close-ups"
-        " are unlike anything it saw.",
-        "## Whose works it saw",
-        "\n".join(f"- {line}" for line in _training_credits(record)) or "The run names none.",
+        f"A small network at {size}, trained on few pictures: not for measuring or for safety."
+        " It was trained on rooms of homes by day and by lamplight, not on other places, people,"
+        " animals or close-ups.",
+        "## Credits of the training data",
+        "\n".join(f"- {line}" for line in _training_credits(record)) or "The run has no credits.",
         f"weights.safetensors, sha256 {record['weights_sha256']}",
     ]
     return "\n\n".join(parts) + "\n"
@@ -129,9 +129,9 @@ def _seen(record: Mapping[str, Any], homes: Sequence[str]) -> str:
     named = f"{', '.join(homes[:_MOST_HOMES])}{' and others' if len(homes) > _MOST_HOMES else ''}"
     text = f"{n:,} rendered views of {len(homes)} homes in light `{record['mode']}`: {named}."
     if first == NYU_LIGHT:
-        return f"{text} The first weights saw photographs of NYU Depth v2 (Silberman et al., 2012)."
+        return f"{text} The initial weights used NYU Depth v2 (Silberman et al., 2012)."
     photographs = record["init_origin"].get("photographs")
-    first = f"; the first weights saw {photographs}" if photographs else ""
+    first = f"; the initial weights used {photographs}" if photographs else ""
     return f"{text} {'Beside them ' + '; '.join(real) if real else 'No photograph was trained on'}{first}."
 
 
@@ -157,4 +157,4 @@ def _figures(run: Trained, evaluations: list[dict[str, Any]]) -> str:
         for name in run.task.figures
     ]
     text = markdown(["", *(title for title, _, _ in columns)], rows)
-    return f"{text}\n\nIn brackets: {baseline_name}, which looks at no picture."
+    return f"{text}\n\nIn brackets: {baseline_name}, a constant prediction."

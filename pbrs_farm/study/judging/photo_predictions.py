@@ -62,7 +62,7 @@ def photograph_files(words: Sequence[Path]) -> list[Path]:
             continue
         pictures = sorted(p for p in word.iterdir() if p.suffix.lower() in SUFFIXES)
         if not pictures:
-            raise BadInput(word, "", f"holds no picture ({', '.join(SUFFIXES)})")
+            raise BadInput(word, "", f"has no picture ({', '.join(SUFFIXES)})")
         files += pictures
     return files
 

@@ -43,7 +43,7 @@ class ViewLoader:
         else:
             self._n_views = len(dataset)
         if len(self) < 1:
-            text = f"{self._n_views} views make no batch of {batch_size}"
+            text = f"{self._n_views} views are too few for a batch of {batch_size}"
             raise BadInput("batch size", "", text, hint=f"{world} ranks, {max(workers, 1)} workers")
 
     def __len__(self) -> int:

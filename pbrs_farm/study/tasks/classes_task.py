@@ -54,7 +54,7 @@ class ClassesTask(StudyTask):
         highest = int(labels.max(initial=0))
         if highest > plan.n_classes:
             name = f" ({NYU40_NAMES[highest]})" if highest < len(NYU40_NAMES) else ""
-            text = f"holds class {highest}{name}; the network has {plan.n_classes}"
+            text = f"has class {highest}{name}; the network has {plan.n_classes}"
             raise BadInput(sample.id, "class40", text)
         return {"labels": labels}
 

@@ -53,7 +53,7 @@ def mix_of(word: str) -> Mix:
     """Parse DIR:SHARE or DIR:SHARE:N; BadInput for another form or a share outside 0..1."""
     match = _MIX.fullmatch(word)
     if match is None:
-        text = "expected a folder, the share of each batch and how many at most"
+        text = "expected a folder, a share of each batch and a maximum number"
         raise BadInput("--mix", word, text, hint="--mix /my/rgbd:0.2 or /my/rgbd:0.2:80")
     mix = Mix(match[1], float(match[2]), int(match[3] or 0))
     if not 0 < mix.share < 1:

@@ -89,7 +89,7 @@ class RunFolder:
             was, now = (_identity(r, str(self.root / "run.json")) for r in (older, row))
             for name, value in now.items():
                 if was.get(name) != value:
-                    text = f"holds a run with another {name} {was.get(name)}, now {value}"
+                    text = f"has a run with another {name} {was.get(name)}, now {value}"
                     raise BadInput(self.root, "", text, hint="give another --out")
             if older["state"] == FINISHED:
                 return False
@@ -171,7 +171,7 @@ def finished_run(root: Path) -> tuple[RunFolder, dict[str, Any], TrainingPlan]:
     row = folder.record()
     if row["state"] != FINISHED:
         text = f"the run is {row['state']}" + (f": {row['why']}" if row.get("why") else "")
-        hint = "the same `train` goes on with it" if row["state"] == RUNNING else ""
+        hint = "run the same `train` to resume it" if row["state"] == RUNNING else ""
         raise BadInput(root, "", text, hint=hint)
     return folder, row, plan_from_json(row["plan"], str(root / "run.json"))
 

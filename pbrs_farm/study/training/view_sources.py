@@ -88,7 +88,7 @@ def training_views(source: TrainingSource, plan: TrainingPlan) -> TrainingViews:
     if not source.mix:
         return views
     if sum(mix.share for mix in source.mix) >= 1:
-        text = "the shares leave nothing to the views: together below 1"
+        text = "the shares must sum to less than 1"
         raise BadInput("--mix", ", ".join(mix.place for mix in source.mix), text)
     parts = [(photographs_of(Path(mix.place), plan, mix.most), mix.share) for mix in source.mix]
     return MixedViews(views, tuple((part.views(plan), share) for part, share in parts))
@@ -265,7 +265,7 @@ def _nyu_views(source: TrainingSource, plan: TrainingPlan, split: str, most: int
     from pbrs_farm.study.nyu_pictures import NYU_HOME, nyu_pictures
 
     if len(source.places) > 1:
-        text = "NYUv2 trains alone"
+        text = "NYUv2 cannot be combined with views"
         raise BadInput(source.name, "", text, hint="pre-train first, then --init RUN")
     frames = nyu_pictures(Path(source.places[0]), plan, split)
     named = (replace(frame, id=f"{NYU_HOME}/{frame.id}") for frame in frames)

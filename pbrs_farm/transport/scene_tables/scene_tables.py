@@ -77,7 +77,7 @@ def tables_from_house(
     geometry = geometry_from_house(house, with_panes=False)
     keep = solid_faces(geometry)
     if not keep.any():
-        raise BadHouse(house.source.file, house.id, "no surface that light could meet")
+        raise BadHouse(house.source.file, house.id, "no surface for light to hit")
     n_left_out = int((~keep).sum())
     notes = [f"{n_left_out} degenerate faces left out of the light"] * (n_left_out > 0)
 

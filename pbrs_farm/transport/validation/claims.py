@@ -89,7 +89,7 @@ def light_claims(variant: str) -> Iterator[LightClaim]:
     Raises MachineFailed in a scalar variant: our kernels do not run there.
     """
     if variant.startswith("scalar"):
-        text = "the light's kernels need LLVM or CUDA, nothing to prove in scalar_rgb"
+        text = "the light's kernels need LLVM or CUDA, so scalar_rgb cannot be checked"
         hint = "sudo apt-get install -y libllvm19"
         raise MachineFailed(text, hint=hint)
     for measure in _CLAIMS:
@@ -164,7 +164,7 @@ def _normal_map(variant: str) -> LightClaim:
     camera = rooms.camera((0, 2, 0.01), (0, 0, 0), 8, 8, 0.3)
     result = scene.render(camera, "0_0", _spp(256), 1)
     measured = float((result.outdoor @ LUMINANCE).mean()) / 0.5
-    text = "a normal map takes of a white sky what a tilted floor sees above the ground"
+    text = "a normal map receives as much of a white sky as a tilted floor"
     return _claim_near(text, measured, (1 + math.cos(math.pi / 3)) / 2, 0.01, "of it")
 
 
@@ -272,7 +272,7 @@ def _window_pane(variant: str) -> LightClaim:
     (b,) = _rendered(variant, (glazed, away), _sun(), _spp(16), 1)
     off = float(np.abs(a.mode(Mode.MLT_IL_OL) - b.mode(Mode.MLT_IL_OL)).max())
     return LightClaim(
-        "a pane that is not seen changes no bit", f"largest difference {off:g}", "0", off == 0
+        "an invisible pane changes no bit", f"largest difference {off:g}", "0", off == 0
     )
 
 

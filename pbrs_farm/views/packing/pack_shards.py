@@ -58,7 +58,7 @@ def pack(
     {'all': 1}
     """
     if form not in FORMS:
-        raise BadInput("--to", form, "no such form", hint=hint_of_choice(form, FORMS))
+        raise BadInput("--to", form, "no such format", hint=hint_of_choice(form, FORMS))
     source, left_out = views.source, dict(views.left_out)
     if not isinstance(source, StoredRoot):
         raise BadInput(source.url, "", "is packed already", hint="pack the output folder itself")

@@ -45,7 +45,7 @@ class Packing:
             SampleRequest(self.layers, mode, size=self.size)  # raises BadInput for invalid values
         if self.colour not in COLOURS:
             raise BadInput(
-                "colour", self.colour, "no such form", hint=hint_of_choice(self.colour, COLOURS)
+                "colour", self.colour, "no such format", hint=hint_of_choice(self.colour, COLOURS)
             )
         if self.views_per_shard < 1 or not 1 <= self.quality <= 100:
             text = f"{self.views_per_shard} views a shard, quality {self.quality}"

@@ -18,7 +18,7 @@ _MOST_HOMES: Final = 100  # rows of the card
 
 def card(views: Views, packing: Packing, facts: RootFacts, *, form: str) -> str:
     """README.md: front matter for Hugging Face, contents, how to load them, limits."""
-    size = "x".join(map(str, packing.size)) if packing.size else "the size it was rendered in"
+    size = "x".join(map(str, packing.size)) if packing.size else "the rendered size"
     arrays = [
         f"| {n} | {STORED[n].dtype} | {STORED[n].unit} |" for n in array_names(packing.layers)
     ]
@@ -110,7 +110,7 @@ def _making(packing: Packing, facts: RootFacts) -> Iterator[str]:
     yield f"Rendered at {sizes}{wide}."
     recipe = facts.recipe
     if recipe is None:
-        yield "The output root holds no recipe.json: cameras, light and seeds are not known."
+        yield "The output root has no recipe.json: cameras, light and seeds are not known."
         return
     origins = f" ({', '.join(facts.origins)})" if facts.origins else ""
     yield (
@@ -142,8 +142,8 @@ def _class_table(facts: RootFacts) -> str:
 
 
 def _limits(packing: Packing, facts: RootFacts) -> Iterator[str]:
-    yield "The pictures are rendered, not photographed; a network trained on them alone meets a gap."
-    yield "Classes of furniture mostly follow from words and sizes by rules, unchecked by hand."
+    yield "The pictures are rendered, not photographed; networks trained on them alone see a domain gap."
+    yield "Classes of furniture mostly follow from names and sizes by rules, without manual checks."
     if "depth" in packing.layers:
         yield "Depth is whole millimetres and ends at 65.535 m."
     if any(mode.startswith("opengl") for mode in packing.modes):
@@ -153,15 +153,15 @@ def _limits(packing: Packing, facts: RootFacts) -> Iterator[str]:
         if recipe.light.denoise and any(mode.startswith("mlt") for mode in packing.modes):
             yield "Light is denoised: fine texture in dark places may be smoothed."
         if recipe.repair.remove_persons:
-            yield "Persons are taken out of homes."
+            yield "Persons are removed from homes."
         if recipe.repair.remove_plants:
-            yield "Plants are taken out of homes."
+            yield "Plants are removed from homes."
         if recipe.repair.fallback_light:
-            yield "A room that nothing lights gets a lamp that its designer did not draw."
+            yield "A room without light gets an added lamp."
     if packing.size is not None:
         yield f"Labels are the nearest pixel's at {packing.size[0]}x{packing.size[1]}."
     if "colour" in packing.layers and packing.colour == "jpeg":
-        yield f"Colour is JPEG of quality {packing.quality}: it has lost a little."
+        yield f"Colour is JPEG of quality {packing.quality}: it is lossy."
     if packing.shares is None:
         yield "It is not split. Split by home, not by view: rooms of a home share their furniture."
     if facts.n_warned:

@@ -287,7 +287,7 @@ def test_truncated_files_nan_and_centimetres_are_refused(tmp_path: Path) -> None
     text = path.read_text()
     for damaged in (text[: len(text) * 3 // 4], text.replace("2.7", "NaN")):
         path.write_text(damaged)
-        with pytest.raises(BadHouse, match="no valid JSON"):
+        with pytest.raises(BadHouse, match="not valid JSON"):
             read(path)
     scene = files.front_house()
     for mesh in scene["mesh"]:

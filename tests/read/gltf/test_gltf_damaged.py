@@ -53,7 +53,7 @@ def test_a_damaged_scene_is_refused_naming_the_place(edit: Any, place: str) -> N
     ("data", "name", "said"),
     [
         (b"a list of things", "list.glb", "is not a GLB file"),
-        (b"a list of things", "list.gltf", "no valid JSON"),
+        (b"a list of things", "list.gltf", "not valid JSON"),
         (b' {"nodes": []}', "text.glb", "this is not a glTF file"),
     ],
 )

@@ -145,7 +145,7 @@ def test_a_row_of_the_lamps_that_nobody_understands_costs_one_lamp_and_no_house(
         ("metadata/suncgModelLights.json", '{"lamp": [{"type": "Sun"}]}', r"lamp\[0\]"),
         ("metadata/suncgModelLights.json", '{"lamp": [{"type": "PointLight", "power": 3}]}', "position"),
         ("metadata/suncgModelLights.json", '{"lamp": [{"type": []}]}', r"lamp\[0\]"),
-        ("metadata/suncgModelLights.json", "{", "no valid JSON"),
+        ("metadata/suncgModelLights.json", "{", "not valid JSON"),
     ],
 )  # fmt: skip
 def test_a_wrong_model_is_left_out_and_a_wrong_table_refused_naming_the_file(

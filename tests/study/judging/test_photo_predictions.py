@@ -127,7 +127,7 @@ def test_a_file_that_is_no_picture_is_told_and_the_rest_goes_on(
 
 
 def test_a_folder_without_pictures_is_an_error(tmp_path: Path) -> None:
-    with pytest.raises(BadInput, match="holds no picture"):
+    with pytest.raises(BadInput, match="has no picture"):
         photograph_files([tmp_path])
 
 
@@ -197,8 +197,8 @@ def test_weights_that_start_from_a_run_name_it_and_whose_works_it_saw(
     assert main(words) == 0
     packed = tmp_path / "run" / "packed"
     card = (packed / "README.md").read_text()
-    assert "First weights: a run of normals" in card
-    assert "No photograph was trained on; the first weights saw ImageNet's." in card
+    assert "Initial weights: a run of normals" in card
+    assert "No photograph was trained on; the initial weights used ImageNet's." in card
     for home in ("home-0-00000000", "home-7-00000000"):
         assert f"home {home}: a person" in card
     assert str(tmp_path) not in (packed / "run.json").read_text()

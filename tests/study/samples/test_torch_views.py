@@ -141,7 +141,7 @@ def test_a_state_of_another_loader_is_refused(places):
 
 
 def test_fewer_views_than_a_batch_are_told(places):
-    with pytest.raises(BadInput, match="24 views make no batch of 3"):
+    with pytest.raises(BadInput, match="24 views are too few for a batch of 3"):
         loader_of(places[0], 0, world=9)
 
 

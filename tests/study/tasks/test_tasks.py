@@ -98,7 +98,7 @@ def test_a_plan_for_depth_turns_no_camera() -> None:
 def test_a_class_that_the_network_lacks_names_the_view() -> None:
     plan = small_plan("segmentation", n_classes="12")
     labels = np.full((32, 40), 22, np.uint8)
-    with pytest.raises(BadInput, match=r"home-3-00000000/3: class40: holds class 22 \(ceiling\)"):
+    with pytest.raises(BadInput, match=r"home-3-00000000/3: class40: has class 22 \(ceiling\)"):
         task_of("segmentation").targets(replace(sample(3), class40=labels), plan)
 
 

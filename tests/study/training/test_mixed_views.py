@@ -116,7 +116,7 @@ def test_a_run_with_photographs_says_so_and_they_may_not_judge(
     (tmp_path / "moved").mkdir()
     sequences.rename(tmp_path / "moved/elsewhere")
     assert main(["evaluate", str(out), "--on", str(tmp_path / "moved")]) != 0
-    assert "this photograph has trained" in capsys.readouterr().err
+    assert "this photograph was used for training" in capsys.readouterr().err
     pack_weights(out, tmp_path / "packed")
     card = (tmp_path / "packed/README.md").read_text()
     assert "4 photographs with depth of real, 0.5 of each batch" in card
@@ -155,7 +155,7 @@ def test_labels_of_scannet_train_beside_views(root: Path, tmp_path: Path) -> Non
     assert ids[0] == "s0/000100"
     assert set(np.unique(arrays["labels"][0])) == {1, 5}
     write_scene(tmp_path / "none/s1", "intrinsics_depth.txt", label=False)
-    with pytest.raises(BadInput, match="say nothing of segmentation"):
+    with pytest.raises(BadInput, match="only normals and depth, not segmentation"):
         training_views(TrainingSource((str(root),), mix=(Mix(str(tmp_path / "none"), 0.2),)), plan)
 
 
@@ -172,7 +172,7 @@ def test_a_folders_name_may_hold_a_colon() -> None:
 
 def test_shares_leave_something_to_the_views(root: Path, sequences: Path) -> None:
     mix = (Mix(str(sequences), 0.6), Mix(str(sequences), 0.4))
-    with pytest.raises(BadInput, match="together below 1"):
+    with pytest.raises(BadInput, match="must sum to less 1"):
         training_views(TrainingSource((str(root),), mix=mix), small_plan())
 
 

@@ -280,13 +280,13 @@ def test_a_place_that_is_no_folder_is_one_line(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("network", ["small", "residual"])
 def test_a_size_that_the_network_cannot_halve_is_one_line(network: str) -> None:
-    with pytest.raises(BadInput, match=f"33x32: network {network} wants even numbers"):
+    with pytest.raises(BadInput, match=f"33x32: network {network} needs even numbers"):
         small_plan(width_px="33", network=network)
     assert small_plan("boundaries", width_px="33").width_px == 33
 
 
 def test_pictures_of_32_pixels_are_too_small_for_the_residual_network(tmp_path: Path) -> None:
-    with pytest.raises(BadInput, match="32x32: network residual wants a side above 32 pixels"):
+    with pytest.raises(BadInput, match="32x32: network residual needs sides above 32 pixels"):
         small_plan(width_px="32", height_px="32")
     least = small_plan(width_px="34", height_px="32", batch="1", steps="1")
     assert train(Job(least, tmp_path), views(1, least))["network"]["train"]["mean_deg"] < 180

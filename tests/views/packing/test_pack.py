@@ -197,7 +197,7 @@ def test_the_card_says_what_is_true_of_the_root(tmp_path):
 def test_a_root_without_a_recipe_or_licences_is_told(root, tmp_path):
     pack(pbrs_farm.open(root), tmp_path / "x", Packing(modes=MODES))
     card = (tmp_path / "x/README.md").read_text()
-    assert "holds no recipe.json" in card
+    assert "has no recipe.json" in card
     assert "Homes whose source names no licence: 8." in card
 
 
@@ -227,7 +227,7 @@ def test_what_was_not_packed_is_told(root, tmp_path):
         BadInput, match=r"no layer depth in these shards \(packed: colour, normal\)"
     ):
         view.sample(SampleRequest(("depth",)))
-    with pytest.raises(BadInput, match=r"no pictures in opengl_dl light"):
+    with pytest.raises(BadInput, match=r"no pictures of the mode opengl_dl"):
         view.sample(SampleRequest(("colour",), "opengl_dl"))
     with pytest.raises(BadInput, match="is packed already"):
         pack(pbrs_farm.open(tmp_path / "x"), tmp_path / "y", Packing())
@@ -244,7 +244,7 @@ def test_the_verb_packs_and_says_what_it_left_out(tmp_path, capsys):
     assert "2 views, 3 files" in said.out
     assert "lack a layer: 1." in (out / "README.md").read_text()
     assert main(words) == 1
-    assert "is there already" in capsys.readouterr().err
+    assert "already exists" in capsys.readouterr().err
     for wrong in (["--size", "8"], ["--split", "1/2"], ["--layers", "x"], ["--colour", "bmp"]):
         assert main(["pack", str(root), "--out", str(tmp_path / "y"), *wrong]) == 1
     assert not (tmp_path / "y").exists()
