@@ -179,12 +179,12 @@ def cameras_from_file_text(
     if not is_json:
         lines = cameras_from_text(text, file, width_px, height_px)
         if not lines:
-            raise BadInput(file, "", "holds no camera")
+            raise BadInput(file, "", "has no camera")
         return [(line.camera, line.room_id) for line in lines]
     given: object = text.encode()
     if text.lstrip().startswith("{"):
         given = checked(_Transforms, given, file).cameras()
     rows = checked(_CAMERAS, given, file, "camera")
     if not rows:
-        raise BadInput(file, "", "holds no camera")
+        raise BadInput(file, "", "has no camera")
     return [(camera.camera(width_px, height_px), camera.room) for camera in rows]

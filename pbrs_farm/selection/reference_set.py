@@ -99,7 +99,7 @@ def reference_from_histograms(
     Raises BadInput for an empty set, for a single image, and for an image without known depth.
     """
     if len(ids) < 2:
-        problem = "holds no image" if not ids else "holds a single image"
+        problem = "has no image" if not ids else "has a single image"
         raise BadInput(source[0], "", f"{problem}; a reference needs two at least")
     colour = np.stack([h.colour for h in histograms]).astype(np.uint32)
     depth = np.stack([h.depth for h in histograms]).astype(np.uint32)

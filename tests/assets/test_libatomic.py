@@ -38,7 +38,7 @@ def test_the_library_is_unpacked_beside_its_package(tmp_path: Path) -> None:
 
 
 def test_a_package_without_the_library_is_damaged(tmp_path: Path) -> None:
-    with pytest.raises(MachineFailed, match=r"holds no libatomic\.so\.1"):
+    with pytest.raises(MachineFailed, match=r"has no libatomic\.so\.1"):
         libatomic.unpacked_library(deb_of(tmp_path, "README", b""))
 
 

@@ -173,7 +173,7 @@ def test_skies_unpacks_the_outdoor_panoramas_and_says_how_to_use_them(
 def test_skies_names_a_package_that_holds_none(tmp_path, monkeypatch, capsys):
     monkeypatch.setenv("PBRS_CACHE", str(tmp_path))
     write_deb(tmp_path / "blender-data_3_all.deb", {"usr/share/doc/readme": b""})
-    assert "holds no city.exr" in printed(capsys, "skies", code=1)
+    assert "has no city.exr" in printed(capsys, "skies", code=1)
 
 
 def test_repair_writes_the_bundle_the_report_and_a_cut_of_each_level(tmp_path, capsys):

@@ -180,7 +180,7 @@ def test_empty_and_missing_sources_are_named(tmp_path: Path) -> None:
         build_reference(tmp_path, FIELDS, LIMITS)
     with pytest.raises(BadInput, match=r"nowhere.*no such"):
         build_reference(tmp_path / "nowhere", FIELDS, LIMITS)
-    with pytest.raises(BadInput, match="holds no image"):
+    with pytest.raises(BadInput, match="has no image"):
         build_reference(write_mat_empty(tmp_path / "empty.mat"), FIELDS, LIMITS)
     with pytest.raises(BadInput, match=r"ref\.npz.*no such file"):
         read_reference(tmp_path / "ref.npz")

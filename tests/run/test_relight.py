@@ -178,7 +178,7 @@ def test_a_lamp_that_brings_no_light_is_told(view: Path, tmp_path: Path) -> None
         ("sun=0.5", "sun: no such lamp"),
         ("1", "expected LAMP=F"),
         ("1=dim", "expected LAMP=F"),
-        ("1=-1", "not negative"),
+        ("1=-1", "0 or more"),
         ("1=inf", "finite"),
         ("1=0.5,0.5", "LAMP=R,G,B"),
         ("=0.5", "expected LAMP=F"),

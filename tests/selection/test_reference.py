@@ -125,7 +125,7 @@ def test_an_empty_a_single_and_a_blind_set_are_rejected() -> None:
     some = random_histogram(np.random.default_rng(0), FINE)
     blind = Histogram(some.colour, np.zeros(128, np.uint32))
     for ids, sets, text in (
-        ((), (), "holds no image"),
+        ((), (), "has no image"),
         (("a",), (some,), "single image"),
         (("a", "b"), (some, blind), "b: no pixel has a known depth"),
     ):

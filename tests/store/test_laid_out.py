@@ -374,7 +374,7 @@ def test_a_later_layout_is_refused() -> None:
         LaidOutStore(inner).get("houses/h/house.json")
     inner.put(pack_key(HOUSE, VIEW, "light"), b"no tar")
     inner.put("layout.json", b'{"format": 1, "layout": "packed"}')
-    with pytest.raises(StoreFailed, match="no pack"):
+    with pytest.raises(StoreFailed, match="not a pack"):
         LaidOutStore(inner).get(keys.view_key(HOUSE, VIEW, "radiance.exr"))
 
 

@@ -68,7 +68,7 @@ def poses_from_tum(text: str, file: str) -> list[Pose]:
             hint = "write it with all its digits" if "e" in stamps[-1].lower() else ""
             raise BadInput(file, f"line {number}", text, hint=hint)
     if not poses:
-        raise BadInput(file, "", "holds no row", hint="rows are t x y z qx qy qz qw")
+        raise BadInput(file, "", "has no row", hint="rows are t x y z qx qy qz qw")
     return _in_seconds(poses, stamps, file)
 
 

@@ -65,7 +65,7 @@ def read_views(place: str, size: Size, *, mode: str = "", most: int = 0) -> Pict
 def _frames(place: str) -> list[Frame]:
     frames = [frame for frame in open_views(place) if not frame.ref.is_object]
     if len(frames) < _LEAST:
-        text = f"holds {len(frames) or 'no'} view, {_LEAST} at least are compared"
+        text = f"has {len(frames) or 'no'} view, {_LEAST} at least are compared"
         raise BadInput(place, "", text)
     return frames
 

@@ -254,7 +254,7 @@ def _vgg_of(network: nn.Module, init: str) -> list[nn.Conv2d]:
 
 def _fill(convs: list[nn.Conv2d], kernels: list[tuple[Tensor, Tensor]], place: str) -> None:
     if len(convs) != len(kernels):
-        raise BadInput("--init", place, f"holds {len(kernels)} convolutions, expected {len(convs)}")
+        raise BadInput("--init", place, f"has {len(kernels)} convolutions, expected {len(convs)}")
     for k, (conv, (kernel, bias)) in enumerate(zip(convs, kernels, strict=True)):
         kernel = kernel if k else _widened(kernel, conv.weight)
         if conv.weight.shape != kernel.shape:

@@ -88,7 +88,7 @@ def test_a_byte_order_mark_and_ends_of_lines_of_windows_change_nothing(tmp_path:
 
 
 def test_a_file_without_a_row_is_rejected() -> None:
-    with pytest.raises(BadInput, match="holds no row"):
+    with pytest.raises(BadInput, match="has no row"):
         poses_from_tum("# nothing\n", "way.txt")
 
 

@@ -118,7 +118,7 @@ def test_verify_wants_a_folder_or_light_and_not_both(capsys: pytest.CaptureFixtu
     assert main(["verify"]) == 1
     assert "give a FOLDER, or --light" in capsys.readouterr().err
     assert main(["verify", "somewhere", "--light"]) == 1
-    assert "one at a time" in capsys.readouterr().err
+    assert "takes no folder" in capsys.readouterr().err
 
 
 def test_a_block_that_varies_more_than_the_others_is_no_difference() -> None:
