@@ -87,7 +87,7 @@ def sample_views() -> Callable[[], object]:
     coarse = {"cell_m": 1.5, "score_width_px": 40, "score_height_px": 30}
     house, fields = _house(), recipe_from_name("preview").cameras.model_copy(update=coarse)
     caster = _caster(house)
-    return lambda: sample_cameras(house, fields, 0, caster.item_counts, caster.depth_pictures)
+    return lambda: sample_cameras(house, fields, 0, caster.item_counts, caster.item_pictures)
 
 
 def cast_labels() -> Callable[[], object]:

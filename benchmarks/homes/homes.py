@@ -169,7 +169,7 @@ def measured(name: str) -> Row:
     caster = Caster.of_house(house)
     began = time.perf_counter()
     sampling = sample_cameras(
-        house, recipe.cameras, camera_seed(house.id, recipe), caster.item_counts, caster.depth_pictures
+        house, recipe.cameras, camera_seed(house.id, recipe), caster.item_counts, caster.item_pictures
     )  # fmt: skip
     views = list(sampling.views)
     large = {room.id for room in house.rooms if shapely.area(room_shape(room)) > _LEAST_ROOM_M2}

@@ -116,15 +116,23 @@ class Caster:
 
         cameras: N of one size. For small pictures: all rays are in memory at once.
         """
+        return self.item_pictures(cameras)[0]
+
+    def item_pictures(self, cameras: Sequence[Camera]) -> tuple[F32, ItemBuffer]:
+        """Depth as of depth_pictures, and (N, H, W) uint32 instance id of the same hit; 0 = nothing."""
         if not cameras:
-            return np.zeros((0, 0, 0), np.float32)
+            return np.zeros((0, 0, 0), np.float32), np.zeros((0, 0, 0), np.uint32)
         rays = [camera.rays() for camera in cameras]
         directions = np.stack([d for _origin, d in rays])
         origins = np.broadcast_to(np.stack([o for o, _d in rays])[:, None, None], directions.shape)
         # Directions are as long as makes the distance along a ray the depth.
-        t, _face = self.first_hit(origins.reshape(-1, 3), directions.reshape(-1, 3))
-        depth = np.where(np.isfinite(t), t, np.float32(0)).reshape(directions.shape[:3])
-        return np.where(directions.any(-1), depth, np.float32(0))
+        t, face = self.first_hit(origins.reshape(-1, 3), directions.reshape(-1, 3))
+        is_hit = np.isfinite(t).reshape(directions.shape[:3]) & directions.any(-1)
+        depth = np.where(is_hit, t.reshape(is_hit.shape), np.float32(0))
+        if not len(self.geometry.face_item):
+            return depth, np.zeros(is_hit.shape, np.uint32)
+        items = self.geometry.face_item[face].reshape(is_hit.shape)
+        return depth, np.where(is_hit, items, np.uint32(0))
 
     def first_hit(
         self,

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from pbrs_farm.core.house import Geometry
     from pbrs_farm.sample.eye_probes import ItemCounter
     from pbrs_farm.sample.room_sampler import RoomTrace
-    from pbrs_farm.sample.view_overlap import DepthOf
+    from pbrs_farm.sample.view_overlap import DepthOf, ItemPictures
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,6 +69,8 @@ class HouseCaster(Protocol):
     def item_counts(self) -> ItemCounter: ...
     @property
     def depth_pictures(self) -> DepthOf: ...
+    @property
+    def item_pictures(self) -> ItemPictures: ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -19,7 +19,7 @@ from pbrs_farm.sample.eye_probes import ItemCounter
 from pbrs_farm.sample.photo_choice import RoomCandidates
 from pbrs_farm.sample.photo_sampler import PhotoSampler, room_report
 from pbrs_farm.sample.room_sampler import RoomSampler, RoomTrace
-from pbrs_farm.sample.view_overlap import DepthOf
+from pbrs_farm.sample.view_overlap import ItemPictures
 
 
 def sample_cameras(
@@ -27,21 +27,21 @@ def sample_cameras(
     fields: CameraFields,
     seed: int,
     counter: ItemCounter,
-    depth_of: DepthOf | None = None,
+    pictures_of: ItemPictures | None = None,
 ) -> Sampling:
     """The best view of each sector of each room that something lights (paper section 3.1).
 
-    counter: pixels of each item of this house in each camera, panes included. depth_of: depth
-    pictures of cameras, which the preset photo asks for (ValueError without). The same house,
+    counter: pixels of each item of this house in each camera, panes included. pictures_of: depth and
+    items of cameras, which the preset photo asks for (ValueError without). The same house,
     fields and seed give the same views, whatever the counter's speed and the rooms' order.
     Views have the scoring size (640x480) and are in order of rooms and sectors; with the preset
     released in order of falling score, as published.
     """
     geometry = geometry_from_house(house)
     if fields.preset == "photo":
-        if depth_of is None:
-            raise ValueError("the preset photo needs depth_of")
-        photographer = PhotoSampler(house, fields, seed, counter, depth_of, geometry)
+        if pictures_of is None:
+            raise ValueError("the preset photo needs pictures_of")
+        photographer = PhotoSampler(house, fields, seed, counter, pictures_of, geometry)
         return _photographed(photographer)
     # Sample room by room, each with separate random numbers.
     views: list[View] = []

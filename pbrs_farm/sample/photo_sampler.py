@@ -29,13 +29,14 @@ from pbrs_farm.sample.photo_choice import PhotoChoice, RoomCandidates
 from pbrs_farm.sample.photo_score import (
     ItemRoles,
     PhotoShares,
+    cut_shares,
     foreground_cost,
     framing_cost,
     item_roles,
     photo_score,
     photo_shares,
 )
-from pbrs_farm.sample.view_overlap import DEPTH_SIZE, DepthOf
+from pbrs_farm.sample.view_overlap import DEPTH_SIZE, ItemPictures
 
 Size = tuple[int, int]  # width and height of a picture, px
 
@@ -48,13 +49,13 @@ _TINY_DEPTH_SIZE: Final = (DEPTH_SIZE[0] // 2, DEPTH_SIZE[1] // 2)
 
 @dataclass(eq=False)
 class PhotoSampler:
-    """The sampler of one home. counter: pixels of each item; depth_of: small depth pictures."""
+    """The sampler of one home. counter: pixels of each item; pictures_of: small pictures of depth and items."""
 
     house: House
     fields: CameraFields
     seed: int
     counter: ItemCounter
-    depth_of: DepthOf
+    pictures_of: ItemPictures
     geometry: Geometry
     _looked_at: dict[tuple[str, int], tuple[Camera, F32]] = field(default_factory=dict)
     _at_full_size: dict[tuple[str, int], tuple[Camera, NDArray[np.uint32]]] = field(
@@ -95,8 +96,8 @@ class PhotoSampler:
         f, candidates = self.fields, placed.candidates
         cameras = candidates.cameras(which, self._intrinsics(*size))
         small = [camera.with_size(*depth_size) for camera in cameras]
-        depth = self.depth_of(small)
-        shares = self._shares(cameras, depth)
+        depth, seen_items = self.pictures_of(small)
+        shares = self._shares(cameras, depth, seen_items)
         # Used to find near-duplicates.
         if depth_size == DEPTH_SIZE:
             names = [(placed.room.id, int(k)) for k in which]
@@ -123,7 +124,8 @@ class PhotoSampler:
         rooms: all of the house at once. Sectors without a choice may be missing.
         """
         lens = self._intrinsics(*DEPTH_SIZE)
-        choice = PhotoChoice(self.fields, lens, self.depth_of, dict(self._looked_at))
+        looked_at = dict(self._looked_at)
+        choice = PhotoChoice(self.fields, lens, lambda c: self.pictures_of(c)[0], looked_at)
         chosen = choice.choose(rooms)
         # Count the pixels of furniture again at the size of stored scores, for all views at once.
         f = self.fields
@@ -181,12 +183,15 @@ class PhotoSampler:
             return self._sizes
         return (width, height), _TINY_DEPTH_SIZE
 
-    def _shares(self, cameras: list[Camera], depth: F32) -> PhotoShares:
-        """Class shares in pictures of these cameras. depth: (N, H, W) small pictures of them."""
+    def _shares(
+        self, cameras: list[Camera], depth: F32, seen_items: NDArray[np.uint32]
+    ) -> PhotoShares:
+        """Class shares in pictures of these cameras. depth, seen_items: (N, H, W) small ones of them."""
         rows = [part for _which, part in count_items(self.counter, cameras, self._n_items)]
         counts = np.concatenate([np.zeros((0, self._n_items + 1), np.uint32), *rows])
         flat = depth.reshape(len(cameras), depth.shape[1] * depth.shape[2])
-        return photo_shares(counts, flat, self._roles, self.fields.min_object_fraction)
+        cut = cut_shares(depth, seen_items, self._roles)
+        return photo_shares(counts, flat, self._roles, self.fields.min_object_fraction, cut)
 
     def _intrinsics(self, width_px: int, height_px: int) -> Intrinsics:
         f = self.fields

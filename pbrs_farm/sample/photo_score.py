@@ -63,18 +63,23 @@ FOREGROUND: Final = (
 )
 """Costs of close objects; all of them are added."""
 
+# An item that the picture's edge cuts, seen nearer than CUT_NEARER_M, costs from CUT_FREE of the picture
+# on: a photographer steps aside. At most CUT_MOST: enough to leave a view out that is not its room's best.
+CUT_NEARER_M, CUT_FREE, CUT_COST, CUT_MOST = 1.0, 0.12, 20.0, 1.5
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ItemRoles:
     """Role of each instance id of a house in a photograph; index 0 = nothing.
 
-    furniture, opening, wall, floor: (n_items + 1,) bool. nyu13: (n_items + 1,) int64 class.
+    furniture, opening, wall, floor, structure: (n_items + 1,) bool. nyu13: (n_items + 1,) int64 class.
     """
 
     furniture: Bools
     opening: Bools
     wall: Bools
     floor: Bools
+    structure: Bools
     nyu13: I64
 
 
@@ -83,8 +88,8 @@ class PhotoShares:
     """Contents of N pictures, as shares of the picture; each array (N,) except for the last two.
 
     largest: of the largest piece of furniture. wall: of the largest wall. n_objects: pieces that cover the
-    minimum share. n_classes: visible NYU13 classes. median_m: median planar depth. foreground: (N, K) of
-    objects closer than each row of FOREGROUND. nyu13: (N, 14) of each class, column 0 of unclassified
+    minimum share. n_classes: visible NYU13 classes. median_m: median planar depth. cut: of the largest
+    close item that the edge cuts. foreground: (N, K) of objects closer than each row of FOREGROUND. nyu13: (N, 14) of each class, column 0 of unclassified
     pixels.
     """
 
@@ -96,6 +101,7 @@ class PhotoShares:
     n_objects: I64
     n_classes: I64
     median_m: F64
+    cut: F64
     foreground: F64
     nyu13: F64
 
@@ -111,17 +117,19 @@ def item_roles(house: House) -> ItemRoles:
         opening=_flags([_is_opening(item) for item in items]),
         wall=_flags([item.kind is ItemKind.WALL for item in items]),
         floor=_flags([item.kind is ItemKind.FLOOR for item in items]),
+        structure=~_flags([not item.kind.is_structure for item in items]),
         nyu13=NYU13_FROM_NYU40[np.array([0, *(item.nyu40 for item in items)])].astype(np.int64),
     )
 
 
 def photo_shares(
-    counts: NDArray[np.uint32], depth_m: F32, roles: ItemRoles, least: float
+    counts: NDArray[np.uint32], depth_m: F32, roles: ItemRoles, least: float, cut: F64 | None = None
 ) -> PhotoShares:
     """Contents of each picture.
 
     counts: (N, n_items + 1) pixels of each instance. depth_m: (N, K) planar depth at K pixels spread over
-    the picture, 0 = nothing. least: minimum share of the picture for an object.
+    the picture, 0 = nothing. least: minimum share of the picture for an object. cut: (N,) of
+    cut_shares; None = nothing is cut.
     """
     # Turn pixels into shares, of instances and of classes.
     pixels = np.maximum(counts.sum(1, dtype=np.int64), 1)
@@ -136,6 +144,7 @@ def photo_shares(
         n_objects=(share[:, roles.furniture] >= least).sum(1),
         n_classes=(classes[:, 1:] >= LEAST_CLASS_SHARE).sum(1),
         median_m=_median_depth(depth_m),
+        cut=np.zeros(len(counts)) if cut is None else cut,
         foreground=np.stack(
             [
                 ((depth_m > 0) & (depth_m < f.nearer_m)).sum(1) / max(depth_m.shape[1], 1)
@@ -145,6 +154,27 @@ def photo_shares(
         ),
         nyu13=classes,
     )
+
+
+def cut_shares(depth_m: F32, seen_items: NDArray[np.uint32], roles: ItemRoles) -> F64:
+    """(N,) share of each picture of the largest item that its edge cuts close to the lens; 0 without any.
+
+    depth_m, seen_items: (N, H, W) planar depth and instance id at each pixel, 0 = nothing. Walls, floors
+    and other structure do not count.
+    """
+    n, height, width = seen_items.shape
+    if not n:
+        return np.zeros(0)
+    n_ids, picture = len(roles.nyu13), np.arange(n)[:, None, None]
+    name = picture * n_ids + seen_items  # of each item in each picture
+    size = n * n_ids
+    share = np.bincount(name.ravel(), minlength=size) / max(height * width, 1)
+    is_close, is_at_edge = np.zeros(size, np.bool_), np.zeros(size, np.bool_)
+    is_close[name[(depth_m > 0) & (depth_m < CUT_NEARER_M)]] = True
+    for edge in (name[:, 0], name[:, -1], name[:, :, 0], name[:, :, -1]):
+        is_at_edge[edge] = True
+    is_cut = (is_close & is_at_edge).reshape(n, n_ids) & ~roles.structure
+    return np.asarray(np.where(is_cut, share.reshape(n, n_ids), 0).max(1, initial=0))
 
 
 def _median_depth(depth_m: F32) -> F64:
@@ -173,6 +203,7 @@ def photo_score(shares: PhotoShares) -> F64:
     score -= OPENING_COST * np.maximum(shares.opening - MOST_OPENING, 0)
     score -= np.maximum(shares.largest - MOST_OF_ONE, 0)
     score -= np.maximum(shares.wall - MOST_OF_A_WALL, 0)
+    score -= np.minimum(CUT_COST * np.maximum(shares.cut - CUT_FREE, 0), CUT_MOST)
     # Prefer the distance across a room.
     score -= NEAR_COST * np.maximum(NEAR_M - shares.median_m, 0)
     score -= FAR_COST * np.maximum(shares.median_m - FAR_M, 0)

@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F32
 from pbrs_farm.core.camera import Camera
@@ -19,6 +20,9 @@ TOLERANCE: Final = 0.05
 
 DepthOf = Callable[[Sequence[Camera]], F32]
 """Planar depth at each pixel's centre of cameras of one size: (N, H, W) metres, 0 = nothing."""
+
+ItemPictures = Callable[[Sequence[Camera]], tuple[F32, NDArray[np.uint32]]]
+"""The same depth, and (N, H, W) instance id of each pixel, 0 = nothing."""
 
 
 def shared_part(a: Camera, depth_a: F32, b: Camera, depth_b: F32) -> float:

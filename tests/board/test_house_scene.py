@@ -74,7 +74,7 @@ def test_the_candidates_are_those_that_the_run_refused() -> None:
         store.put(f"houses/{house.id}/{name}", data)
     answer = candidates(store, house.id)
     caster = Caster(geometry_from_house(house))
-    counters = caster.item_counts, caster.depth_pictures
+    counters = caster.item_counts, caster.item_pictures
     sampling = sample_cameras(house, recipe.cameras, camera_seed(house.id, recipe), *counters)
     counted = Counter(answer["verdicts"][row[3]] for row in answer["rows"])
     refused = {k: n for k, n in counted.items() if k not in ("winner", "lower_score")}

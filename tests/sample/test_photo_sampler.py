@@ -20,10 +20,12 @@ from pbrs_farm.sample.camera_report import Verdict
 from pbrs_farm.sample.camera_source import Sampling
 from pbrs_farm.sample.eye_probes import EnclosureLimits, enclosure_limits
 from pbrs_farm.sample.house_sampler import sample_cameras
+from pbrs_farm.sample.photo_choice import MOST_WORSE
 from pbrs_farm.sample.photo_sampler import PhotoSampler
 from pbrs_farm.sample.photo_score import (
     FOREGROUND,
     PhotoShares,
+    cut_shares,
     foreground_cost,
     framing_cost,
     item_roles,
@@ -44,7 +46,7 @@ FIELDS: CameraFields = recipe_from_name("fast").cameras.model_copy(
 def sampled(house: House, **fields: object) -> Sampling:
     caster = Caster(geometry_from_house(house))
     changed = FIELDS.model_copy(update=fields)
-    return sample_cameras(house, changed, 0, caster.item_counts, caster.depth_pictures)
+    return sample_cameras(house, changed, 0, caster.item_counts, caster.item_pictures)
 
 
 def with_classes(house: House) -> House:
@@ -60,7 +62,7 @@ def shares(**changes: float) -> PhotoShares:
     """A good view of one room, but for what is changed."""
     plain = {
         "furniture": 0.4, "opening": 0.05, "largest": 0.2, "wall": 0.3, "floor": 0.1,
-        "n_objects": 5, "n_classes": 6, "median_m": 2.5,
+        "n_objects": 5, "n_classes": 6, "median_m": 2.5, "cut": 0.0,
     }  # fmt: skip
     columns = {k: np.array([v]) for k, v in (plain | changes).items()}
     near = np.zeros((1, len(FOREGROUND)))
@@ -97,6 +99,22 @@ def test_what_stands_before_the_lens_costs_the_more_the_nearer_it_is() -> None:
     cost = foreground_cost(photo_shares(counts, depth, item_roles(house), 0.01))
     assert cost[:2].tolist() == [0, 0]
     assert (np.diff(cost[1:]) > 0.1).all()
+
+
+def test_a_close_item_that_the_edge_cuts_costs_by_its_share_of_the_picture() -> None:
+    house = room_house([box((0, 0, 0), (1, 1, 1)), *shell(3, 3)], 3, 3)
+    roles = item_roles(house)
+    wall = 1 + next(k for k, i in enumerate(house.items) if i.kind is ItemKind.WALL)
+    # Four pictures of a box: at the edge and close, at the edge and far, in the middle and close, and a
+    # close wall in its place.
+    items, depth = np.zeros((4, 10, 10), np.uint32), np.full((4, 10, 10), 3.0, np.float32)
+    items[:2, :5, :4], items[2, 3:7, 3:8], items[3, :5, :4] = 1, 1, wall
+    depth[0, 4, 3], depth[2, 3:7, 3:8], depth[3, :5, :4] = 0.9, 0.9, 0.9
+    cut = cut_shares(depth, items, roles)
+    assert cut.tolist() == [0.2, 0, 0, 0]
+    assert photo_score(shares(cut=0.2))[0] < photo_score(shares())[0] - MOST_WORSE
+    assert photo_score(shares(cut=0.05))[0] == photo_score(shares())[0]
+    assert cut_shares(depth[:0], items[:0], roles).shape == (0,)
 
 
 def test_doors_curtains_and_built_in_parts_are_no_furniture() -> None:
@@ -176,7 +194,7 @@ def test_of_views_of_one_spot_one_counts_across_rooms_too() -> None:
     house = with_classes(furnished())
     caster = Caster(geometry_from_house(house))
     sampler = PhotoSampler(
-        house, FIELDS, 0, caster.item_counts, caster.depth_pictures, geometry_from_house(house)
+        house, FIELDS, 0, caster.item_counts, caster.item_pictures, geometry_from_house(house)
     )
     one = sampler.room_candidates(house.rooms[0])
     twin = replace(one, room=replace(one.room, id="0_1"), verdict=one.verdict.copy())
@@ -221,7 +239,7 @@ def test_few_candidates_are_looked_at_in_small_pictures_and_the_best_are_among_t
         n_looks[i.width_px, i.height_px] += len(cameras)
         return caster.item_counts(cameras)
 
-    sampler = PhotoSampler(house, fields, 0, counted, caster.depth_pictures, geometry)
+    sampler = PhotoSampler(house, fields, 0, counted, caster.item_pictures, geometry)
     tiny = [sampler.room_candidates(house.rooms[0])]
     few = sampler.with_better_scores(tiny)
     assert 0 < 4 * n_looks[160, 120] < n_looks[36, 27]
@@ -233,10 +251,8 @@ def test_few_candidates_are_looked_at_in_small_pictures_and_the_best_are_among_t
     assert sum(map(len, by_few.values())) == sum(map(len, by_all.values())) > 2
     best = sum(score[k].sum() for k in by_all.values())
     assert sum(score[k].sum() for k in by_few.values()) >= 0.98 * best
-    assert (
-        few[0].score[np.concatenate([*by_few.values()])]
-        == score[np.concatenate([*by_few.values()])]
-    ).all()
+    numbers = [number for some in by_few.values() for number in some]
+    assert (few[0].score[numbers] == score[numbers]).all()
 
 
 def test_what_encloses_an_eye_is_found_once_for_all_rooms(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -249,7 +265,7 @@ def test_what_encloses_an_eye_is_found_once_for_all_rooms(monkeypatch: pytest.Mo
     monkeypatch.setattr(photo_sampler, "enclosure_limits", counted)
     geometry = geometry_from_house(house)
     caster = Caster(geometry)
-    sampler = PhotoSampler(house, FIELDS, 0, caster.item_counts, caster.depth_pictures, geometry)
+    sampler = PhotoSampler(house, FIELDS, 0, caster.item_counts, caster.item_pictures, geometry)
     for _ in range(2):
         assert (sampler.room_candidates(house.rooms[0]).verdict == Verdict.NEAR_OBSTACLE).any()
     assert found == [house]

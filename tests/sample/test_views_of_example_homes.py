@@ -50,7 +50,7 @@ def test_photos_of_an_example_home_show_furniture_from_where_people_stand() -> N
     fields: CameraFields = recipe_from_name("fast").cameras
     fields = fields.model_copy(update={**SMALL, "coarse_height_px": 60})
     caster = Caster(geometry_from_house(house))
-    sampling = sample_cameras(house, fields, 0, caster.item_counts, caster.depth_pictures)
+    sampling = sample_cameras(house, fields, 0, caster.item_counts, caster.item_pictures)
     assert len(sampling.views) >= 8
     look = IndependentLook(house)
     openings = {

@@ -41,7 +41,7 @@ def candidates(store: Store, house_id: str) -> dict[str, Any]:
     if keys.is_object(house_id) or not source_of(recipe.cameras).is_ranked:
         raise BadInput(house_id, "", "its cameras were given, not sampled")
     cached = CachedHouse(store, recipe, house_id, "")
-    counters = cached.caster.item_counts, cached.caster.depth_pictures
+    counters = cached.caster.item_counts, cached.caster.item_pictures
     seed = camera_seed(house_id, recipe)
     sampling = sample_cameras(cached.house, recipe.judged_cameras, seed, *counters)
     rows = [

@@ -10,7 +10,7 @@ def _views(request: CameraRequest) -> Sampling:
 
     caster = request.caster
     return sample_cameras(
-        request.house, request.fields, request.seed, caster.item_counts, caster.depth_pictures
+        request.house, request.fields, request.seed, caster.item_counts, caster.item_pictures
     )
 
 
